@@ -446,6 +446,20 @@ def test_a_limit_of_address_space(tmp_path, cube, limit, name):
     assert len(done.stderr.splitlines()) == 1 and names(tmp_path) == ["cube.toml"]
 
 
+def test_a_design_is_measured_as_its_mesh_is(tmp_path, cube):
+    """Tile by tile: the figures of the file; what is not looked for is named."""
+    run("mesh", cube, "-o", "a.ply", "--edge", "0.2", cwd=tmp_path)
+    found = json.loads(run("measure", cube, "--edge", "0.2", "--json", cwd=tmp_path).stdout)
+    file = json.loads(run("measure", "a.ply", "--region", cube, "--json", cwd=tmp_path).stdout)
+    assert found["by_construction"] == ["self_intersections", "defects"]
+    assert [file[key] for key in found["by_construction"]] == [found[key] for key in found["by_construction"]] == [0, []]
+    for key in ("euler", "pieces", "cavities", "closed"):
+        assert found[key] == file[key]
+    # The file has single precision.
+    assert abs(found["volume"] / file["volume"] - 1) < 1e-6 and abs(found["area"] / file["area"] - 1) < 1e-6
+    assert abs(found["volume"] / (0.3 * 512) - 1) < 3 * found["volume_error"] + 1e-5
+
+
 def test_measures_of_odd_meshes(tmp_path):
     """Inside out, touching in a vertex or an edge, open: said in words."""
     corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]

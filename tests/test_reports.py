@@ -28,11 +28,17 @@ def test_attributes_keys_and_plain_data(cube):
 def test_the_command_prints_the_same(tmp_path, cube):
     """`--json` has the keys and numbers of the report, its words are the report's."""
     solid = lt.load(cube).build()
-    assert json.loads(run("check", cube, "--json", cwd=tmp_path).stdout) == solid.report()
-    assert run("check", cube, cwd=tmp_path).stdout == f"{solid.report()}\n"
+    error = solid.volume_error()
+    told = json.loads(run("check", cube, "--json", cwd=tmp_path).stdout)
+    assert told == solid.report().to_dict() | {"volume_error": error}
+    words = run("check", cube, cwd=tmp_path).stdout
+    assert words.startswith(f"{solid.report()}\n") and f"{error:.1g}" in words.splitlines()[-1]
     measured = json.loads(run("measure", cube, "--edge", "0.5", "--json", cwd=tmp_path).stdout)
-    made = solid.mesh(edge=0.5).measure()
+    made = solid.measure(edge=0.5)
     assert {key: measured[key] for key in made} == made
+    # The same sums in another order.
+    held = solid.mesh(edge=0.5).measure()
+    assert made.euler == held.euler and abs(made.volume / held.volume - 1) < 1e-12
 
 
 @pytest.mark.parametrize("name", lt.reports.__all__)

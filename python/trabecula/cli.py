@@ -256,7 +256,8 @@ COMMANDS = {
     ),
     "measure": (
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
-        "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
+        "A design is measured while it is meshed, tile by tile; with --region or --thickness it is held in memory.\n"
+        "A mesh file has a solid fraction and pores only against a region.\n"
         "For a design with a blend the transitions are printed too: pieces, loose and weakly attached components, necks.\n"
         "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"

@@ -53,15 +53,17 @@ def check(args) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
+    error = solid.volume_error() if report.chord is None else None
     found = transitions(solid, args.transitions, tell=not args.json)
     draw(found, args.transitions)
     if args.json:
-        figures = report.to_dict()
+        figures = report.to_dict() | {"volume_error": error}
         if report.blend:
             figures["blend"]["transitions"] = [t.to_dict() for t in found]
             figures["warnings"] += found.warnings
         return put_json(figures)
-    print("\n".join(map(str, [report, *found])))
+    expect = [] if error is None else [f"        volume error to expect of a mesh at that spacing {error:.1g}"]
+    print("\n".join(map(str, [report, *expect, *found])))
 
 
 def mesh(args) -> None:
@@ -249,18 +251,26 @@ def measure(args) -> None:
     if solid is None and args.transitions is not None:
         raise Refused("--transitions is for designs with a blend; this is a mesh")
     found = () if solid is None else transitions(solid, args.transitions, args.file)
-    made = surface(args) if solid is None else meshed(solid, args)
-    if args.region:
-        made = made.within(args.region)
-    figures = made.measure().to_dict()
-    warn_measured("the design" if args.file == STDIN else args.file, made)
-    inverted = figures["closed"] and figures["volume"] < 0
-    if figures["closed"] and not inverted and made.voids:
-        warn(voids(made.voids))
-    figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
+    held, figures = None, None
+    if solid is None or args.region or args.thickness or closely(solid, args):
+        held = surface(args) if solid is None else meshed(solid, args)
+        if args.region:
+            held = held.within(args.region)
+        figures = held.measure().to_dict()
+        figures |= {"self_intersections": held.self_intersections, "quality": held.quality, "defects": held.defects}
+    else:
+        with Progress("measuring", args.progress) as progress:
+            made, quality = solid._measured(args.edge, args.per_cell, args.threads, progress)
+        figures = made.to_dict() | {"self_intersections": 0, "quality": quality, "defects": []}
+        # What the method excludes is not looked for.
+        figures["by_construction"] = ["self_intersections", "defects"]
+    warn_measured("the design" if args.file == STDIN else args.file, figures)
     if solid is not None:
-        off = made.chord_error
-        figures |= {"edge": solid.spacing(args.edge, args.per_cell)} if off is None else {"edge": None, "chord_error": off}
+        off = None if held is None else held.chord_error
+        edge = solid.spacing(args.edge, args.per_cell)
+        figures |= (
+            {"edge": edge, "volume_error": solid.volume_error(edge)} if off is None else {"edge": None, "chord_error": off}
+        )
     if args.dangling:
         with Progress("looking for fragments", args.progress) as progress:
             figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
@@ -268,7 +278,7 @@ def measure(args) -> None:
     draw(found, args.transitions)
     if args.thickness:
         with Progress("fitting balls", args.progress) as progress:
-            balls = made.thickness(args.step, args.threads, progress)
+            balls = held.thickness(args.step, args.threads, progress)
         figures |= balls.measure()
         if args.histogram is not None:
             balls.render(args.histogram)
@@ -277,6 +287,7 @@ def measure(args) -> None:
     if args.json:
         return put_json(figures | {"warnings": warned()})
     bare = solid is None and not args.region
+    inverted = figures["closed"] and figures["volume"] < 0
     shown = figures | ({"closed": "yes, but inside out"} if inverted else {})
     print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
     for transition in found:
@@ -295,24 +306,31 @@ def check_measure(args) -> None:
             raise Refused(f"{args.histogram} is read by this command; name another picture")
 
 
-def warn_measured(name: str, made: Mesh) -> None:
-    """Warns of a mesh whose figures may mislead."""
-    if (made.solid_fraction or 0) > 1.01:
+def closely(solid: Solid, args) -> bool:
+    """Whether a design is beams alone that are meshed without a grid."""
+    return solid._chord_of(None, args.edge, args.per_cell, "drop-small") is not None
+
+
+def warn_measured(name: str, figures: dict) -> None:
+    """Warns of figures that may mislead, and of closed voids."""
+    if (figures["solid_fraction"] or 0) > 1.01:
         warn(f"{name} holds more than the region does; they may not be in the same place or unit")
-    if not made.closed:
-        flaws = [d for d in made.defects if d.split(" ", 1)[1].startswith("edge")]
+    if not figures["closed"]:
+        flaws = [d for d in figures["defects"] if d.split(" ", 1)[1].startswith("edge")]
         why = ", ".join(flaws) or "triangles with a corner twice"
         return warn(f"{name} is not closed ({why}), so its volume and what follows from it mean little")
-    if made.volume < 0:
+    if figures["volume"] < 0:
         warn(
             f"{name} is closed but inside out (its triangles run clockwise seen from outside), so its volume "
             "is negative and its solids count as cavities"
         )
-    if made.self_intersections:
+    if figures["self_intersections"]:
         warn(
             f"the surface of {name} crosses itself, so volume in several of its bodies is counted "
             "several times; taken as a region (region.mesh) they are united"
         )
+    if figures["volume"] >= 0 and figures["voids"]:
+        warn(voids(figures["voids"]))
 
 
 def slice(args) -> None:

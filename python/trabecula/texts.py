@@ -218,7 +218,12 @@ UNITS = {
     "edge": " mm",
 }
 #: What stands for a figure that is missing.
-ABSENT = {"dangling.largest": "none", "quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
+ABSENT = {
+    "dangling.largest": "none",
+    "quality": "no triangles",
+    "quality.largest_aspect": "a triangle has no area",
+    "volume_error": "not known: no lattice on a grid",
+}
 
 
 def table(figures: Mapping[str, Any], absent: str = "needs a region") -> str:
@@ -253,10 +258,10 @@ LISTED = 20
 
 def voids(found: list) -> str:
     """What is warned of closed voids: powder and resin stay in them."""
-    total = figure(sum(v.volume for v in found))
+    total = figure(sum(v["volume"] for v in found))
     if len(found) == 1:
-        return f"one closed void of {total} mm³ at {point(found[0].point)} mm: powder or resin cannot drain from it"
-    listed = ", ".join(f"{figure(v.volume)} mm³ at {point(v.point)} mm" for v in found[:LISTED])
+        return f"one closed void of {total} mm³ at {point(found[0]['point'])} mm: powder or resin cannot drain from it"
+    listed = ", ".join(f"{figure(v['volume'])} mm³ at {point(v['point'])} mm" for v in found[:LISTED])
     more = f", and {len(found) - LISTED} smaller ones" if len(found) > LISTED else ""
     return (
         f"{len(found)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "

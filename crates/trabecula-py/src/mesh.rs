@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use trabecula::analysis;
 use trabecula::report::{MeshReport, QualityReport, SimplifyReport, SmoothReport, ThicknessReport, ThicknessSpread};
+use trabecula::surface_maker::Figures;
 
 use crate::error;
 use crate::file;
@@ -216,7 +217,7 @@ impl Mesh {
     /// The figures, against a region of this volume (mm³) if one is known, as `reports.MeshReport`.
     #[pyo3(signature = (region=None))]
     fn measure<'py>(&self, py: Python<'py>, region: Option<f64>) -> PyResult<Bound<'py, PyAny>> {
-        let made = run(py, None, None, |_| MeshReport::of(&self.surface, self.split, region))?;
+        let made = run(py, None, None, |_| MeshReport::of(&Figures::of(&self.surface), self.split, region))?;
         report(py, "MeshReport", &made)
     }
 
@@ -241,12 +242,7 @@ impl Mesh {
     /// How well shaped the triangles are, as `reports.QualityReport`; None without triangles.
     fn quality<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let found = run(py, None, None, |_| measure::quality(&self.surface.mesh))?;
-        let told = |q: measure::Quality| QualityReport {
-            smallest_angle: q.smallest_angle,
-            smallest_angle_p05: q.smallest_angle_p05,
-            largest_aspect: q.largest_aspect.is_finite().then_some(q.largest_aspect),
-        };
-        found.map(|q| report(py, "QualityReport", &told(q))).transpose()
+        found.map(|q| report(py, "QualityReport", &QualityReport::from(q))).transpose()
     }
 
     /// Duplicate triangles, triangles without area, vertices where surfaces touch.

@@ -12,7 +12,9 @@ use trabecula::analysis;
 use trabecula::design::Built;
 use trabecula::extract::{self, SpaceMade};
 use trabecula::map::Misfit;
-use trabecula::report::{DanglingReport, EstimateReport, IslandsReport, RepairReport, SurfaceReport};
+use trabecula::report::{
+    DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
+};
 use trabecula::solid::Space;
 use trabecula::surface_maker::{Islands, Options, SurfaceMaker};
 use trabecula::truss::Beams;
@@ -42,6 +44,9 @@ impl Solid {
 
 /// Name, centres (n, 3), radii (n,), ends (m, 2).
 type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
+
+/// Reports of a surface, the quality of its triangles, and its other connected components.
+type Measured<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>);
 
 /// What is to become of the connected components other than the largest.
 fn islands_word(word: &str) -> PyResult<Islands> {
@@ -126,6 +131,11 @@ impl Solid {
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
     fn expected(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
         run(py, None, None, |_| self.built.expected())
+    }
+
+    /// The relative error to expect of the volume of lattices in a mesh at grid spacing `edge` (mm), if any is meshed on a grid.
+    fn volume_error(slf: Py<Self>, py: Python<'_>, edge: f64) -> PyResult<Option<f64>> {
+        run_apart(py, None, move || slf.get().built.volume_error(edge))
     }
 
     /// What is wrong with a surface made in steps of `edge` (mm) that encloses `volume` (mm³) and has this number of `pieces`, for a lattice
@@ -233,6 +243,27 @@ impl Solid {
         let made = run(py, threads, progress, |p| self.built.surface().mesh(&options, p))?.map_err(error::stopped)?;
         let others = report(py, "IslandsReport", &IslandsReport::from(&made.components))?;
         Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
+    }
+
+    /// The figures of the surface at grid spacing `edge` (mm), in a region of this volume (mm³), taken while it is made:
+    /// `reports.MeshReport`, `reports.QualityReport`; its other connected components as `reports.IslandsReport`.
+    #[pyo3(signature = (edge, region, threads=None, progress=None))]
+    fn measure<'py>(
+        &self,
+        py: Python<'py>,
+        edge: f64,
+        region: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Measured<'py>> {
+        let made = run(py, threads, progress, |p| self.built.surface().measure(&Options::new(edge), p))?;
+        let made = made.map_err(error::stopped)?;
+        let quality = made.quality.map(|q| report(py, "QualityReport", &QualityReport::from(q)));
+        Ok((
+            report(py, "MeshReport", &MeshReport::of(&made.figures, true, Some(region)))?,
+            quality.transpose()?,
+            report(py, "IslandsReport", &IslandsReport::from(&made.components))?,
+        ))
     }
 
     /// The chord error at which a mesh is made unless another resolution is asked for, mm; None on a grid.

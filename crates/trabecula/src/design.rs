@@ -21,6 +21,7 @@ mod joins;
 mod sample;
 #[cfg(test)]
 mod tests;
+mod volume_error;
 mod warn;
 
 use std::sync::Arc;
@@ -286,6 +287,12 @@ impl Built {
     /// The transitions between the lattices of a blend; empty without one.
     pub fn transitions(&self) -> Vec<TransitionReport> {
         built_report::transitions(self)
+    }
+
+    /// The relative error to expect of the volume of lattices in a mesh at grid spacing `edge` (mm); `None` where none is meshed on
+    /// a grid.
+    pub fn volume_error(&self, edge: f64) -> Option<f64> {
+        volume_error::volume_error(self, edge)
     }
 
     /// The solid share of the region, by sampling at some ten thousand points, and the region's volume (mm³), exact where

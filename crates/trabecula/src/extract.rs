@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::solid::Solid;
 use crate::surface_maker::{
-    self, Estimate, Islands, Made, Options, StlStream, Store, Summary, SurfaceMaker, not_empty,
+    self, Estimate, Islands, Made, Measured, Options, StlStream, Store, Summary, SurfaceMaker, not_empty,
 };
 
 mod cube_table;
@@ -26,6 +26,7 @@ mod spaces;
 mod stitched;
 mod tile;
 mod tile_components;
+mod tile_figures;
 mod tile_queue;
 mod vertex_id;
 mod voxelize;
@@ -35,6 +36,7 @@ pub use spaces::{SpaceMade, spaces};
 use stitched::Stitched;
 use tile::{Scratch, View};
 use tile_components::{TileComponents, TileSweep};
+use tile_figures::{FigureSums, TileFigures};
 use tile_queue::{borrow, each_tile, give_back};
 pub use voxelize::voxels;
 
@@ -107,6 +109,25 @@ impl SurfaceMaker for GridSurface<'_> {
         not_empty(triangles, options.resolution)?;
         let found = sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         stream.finish(found, triangles)
+    }
+
+    /// Measured tile by tile: memory is bounded as when an STL is streamed.
+    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
+        let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+        let middle = self.0.region.bounds().center();
+        let (mut sweep, mut sums, mut triangles) = (TileSweep::default(), FigureSums::default(), 0);
+        each_tile(
+            &grid,
+            progress,
+            |view: View| TileFigures::of(&view, middle),
+            |tile| {
+                let components = sums.add(tile);
+                triangles += components.totals.iter().map(|t| t.triangles).sum::<u64>();
+                sweep.add(components).map_err(Stopped::Refused)
+            },
+        )?;
+        not_empty(triangles, options.resolution)?;
+        Ok(sums.finish(sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?))
     }
 
     /// Estimated from tiles that are spread evenly over the grid, until enough of them may hold a surface or enough triangles

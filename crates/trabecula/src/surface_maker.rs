@@ -12,10 +12,12 @@ use geometry::surface_mesh::SurfaceMesh;
 
 mod compact;
 mod components;
+mod measured;
 
 pub use compact::Store;
 pub use components::{Component, Components, Islands, SMALL};
 pub(crate) use components::{ComponentGraph, NONE, Resolved, Totals};
+pub use measured::{Figures, Measured};
 
 /// A method of meshing one solid.
 pub trait SurfaceMaker {
@@ -32,6 +34,14 @@ pub trait SurfaceMaker {
     /// # Errors
     /// As `mesh`; failures of `out`; more triangles than the format can count (2³²).
     fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped>;
+
+    /// The figures of the surface that `mesh` makes.
+    ///
+    /// # Errors
+    /// As `mesh`.
+    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
+        Ok(Measured::of(&self.mesh(options, progress)?))
+    }
 
     /// The work and memory that a resolution (mm) requires, estimated.
     ///

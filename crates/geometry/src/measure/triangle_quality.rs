@@ -17,6 +17,65 @@ pub struct Quality {
     pub largest_aspect: f64,
 }
 
+/// Intervals of angles in a degree by which shapes are counted.
+const INTERVALS: f64 = 1000.0;
+
+/// The shapes of some triangles, for [`ShapeCounts`]; two bytes for each.
+#[derive(Clone, Debug)]
+pub struct Shapes {
+    smallest_angle: f64,
+    largest_aspect: f64,
+    /// For each triangle the interval of its smallest angle.
+    intervals: Vec<u16>,
+}
+
+impl Default for Shapes {
+    fn default() -> Shapes {
+        Shapes { smallest_angle: f64::INFINITY, largest_aspect: 1.0, intervals: Vec::new() }
+    }
+}
+
+impl Shapes {
+    /// Adds the triangle with these corners.
+    pub fn push(&mut self, corners: [Vec3; 3]) {
+        let (angle, aspect) = shape(corners);
+        self.smallest_angle = self.smallest_angle.min(angle);
+        self.largest_aspect = self.largest_aspect.max(aspect);
+        // At most 60 degrees: 60 000 intervals.
+        self.intervals.push((angle * INTERVALS) as u16);
+    }
+}
+
+/// The shapes of triangles that come in parts, counted: the quality of a mesh that is not held.
+#[derive(Clone, Debug, Default)]
+pub struct ShapeCounts {
+    all: Shapes,
+    counts: Vec<u64>,
+}
+
+impl ShapeCounts {
+    /// Adds the triangles of a part.
+    pub fn add(&mut self, part: &Shapes) {
+        self.all.smallest_angle = self.all.smallest_angle.min(part.smallest_angle);
+        self.all.largest_aspect = self.all.largest_aspect.max(part.largest_aspect);
+        self.counts.resize(1 << 16, 0);
+        part.intervals.iter().for_each(|i| self.counts[usize::from(*i)] += 1);
+    }
+
+    /// The quality of all triangles; `None` without triangles. The percentile is exact to a thousandth of a degree.
+    pub fn quality(&self) -> Option<Quality> {
+        let total: u64 = self.counts.iter().sum();
+        let mut below = 0;
+        let place = self.counts.iter().position(|n| {
+            below += n;
+            below > total / 20
+        })?;
+        let smallest_angle_p05 = ((place as f64 + 0.5) / INTERVALS).max(self.all.smallest_angle);
+        let Shapes { smallest_angle, largest_aspect, .. } = self.all;
+        Some(Quality { smallest_angle, smallest_angle_p05, largest_aspect })
+    }
+}
+
 /// The quality of a mesh; `None` without triangles. Exact to rounding.
 pub fn quality(mesh: &Mesh) -> Option<Quality> {
     let shapes: Vec<(f64, f64)> = (0..mesh.triangles.len()).into_par_iter().map(|i| shape(mesh.corners(i))).collect();
@@ -49,7 +108,7 @@ fn shape([a, b, c]: [Vec3; 3]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::samples::cube;
+    use crate::mesh::samples::{cube, torus};
 
     #[test]
     fn known_triangles() {
@@ -70,5 +129,24 @@ mod tests {
         let aspect = 2f64.sqrt() / (12f64.sqrt() * (1.0 - 0.5f64.sqrt()));
         assert!((q.largest_aspect - aspect).abs() < 1e-12);
         assert_eq!(quality(&Mesh::default()), None);
+    }
+
+    #[test]
+    fn counted_shapes_have_the_quality_of_their_mesh() {
+        // Angles from 0.2 degrees up.
+        let mesh = torus(200, 7);
+        let whole = quality(&mesh).expect("triangles");
+        let mut counts = ShapeCounts::default();
+        for part in mesh.triangles.chunks(100) {
+            let mut shapes = Shapes::default();
+            part.iter().for_each(|t| shapes.push(t.map(|v| mesh.vertices[v as usize])));
+            counts.add(&shapes);
+        }
+        let counted = counts.quality().expect("triangles");
+        assert_eq!(counted.smallest_angle, whole.smallest_angle);
+        assert_eq!(counted.largest_aspect, whole.largest_aspect);
+        // Half an interval.
+        assert!((counted.smallest_angle_p05 - whole.smallest_angle_p05).abs() <= 0.5 / INTERVALS);
+        assert_eq!(ShapeCounts::default().quality(), None);
     }
 }

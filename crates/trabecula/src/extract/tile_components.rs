@@ -42,7 +42,12 @@ pub(super) struct TileComponents {
     /// Pairs of components with an interval of solid between them.
     pub adjacent: Vec<(u32, u32)>,
     pub lines: Vec<Line>,
+    /// For each component, the longest interval of void adjacent to it that was met on a line: length (mm) and middle.
+    pub gaps: Vec<Gap>,
 }
+
+/// An interval of void: length, mm, and middle; of no length where there is none.
+pub(super) type Gap = (f64, Vec3);
 
 impl TileComponents {
     /// Finds the components of the surface of a part of the solid in a tile and calls `take` for its triangles, component by component, so that what is
@@ -84,8 +89,9 @@ impl TileComponents {
             }
         }
         let border = border(view, &component, &mut totals);
-        let (lines, adjacent) = lines(view, part, &component);
-        TileComponents { tile: view.tile(), border, adjacent, lines, totals }
+        let mut gaps = vec![(0.0, [0.0; 3]); totals.len()];
+        let (lines, adjacent) = lines(view, part, &component, &mut gaps);
+        TileComponents { tile: view.tile(), border, adjacent, lines, gaps, totals }
     }
 }
 
@@ -215,22 +221,33 @@ fn sorted(view: &View, part: usize, component: &[u32], count: usize) -> Vec<Vec<
     of
 }
 
-/// The components that grid lines in x cross, and the pairs of components with an interval of solid between them.
-fn lines(view: &View, part: usize, component: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
-    // Row, position, whether the solid begins there, component: in parts that are in order already.
-    let mut met: Vec<(u32, f64, bool, u32)> = Vec::new();
+/// The components that grid lines in x cross, and the pairs of components with an interval of solid between them. In `gaps` go
+/// the intervals of void.
+fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<Line>, Vec<(u32, u32)>) {
+    // Row, position, whether the solid begins there, component, vertex: in parts that are in order already.
+    let mut met: Vec<(u32, f64, bool, u32, u32)> = Vec::new();
     view.each_crossing(part, &mut |row, v, x, enters| {
         let component = component[v as usize];
         if component != NONE {
-            met.push((row, x, enters, component));
+            met.push((row, x, enters, component, v));
         }
     });
     met.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let ends = [view.own[0].start, view.own[0].end].map(|i| view.nodes.axes[0][i]);
     let (mut lines, mut adjacent) = (Vec::new(), Vec::new());
     for on_row in met.chunk_by(|a, b| a.0 == b.0) {
         let row = on_row[0].0;
         let (mut first, mut open) = (NONE, NONE);
-        for (n, &(_, _, enters, component)) in on_row.iter().enumerate() {
+        for (n, &(_, x, enters, component, v)) in on_row.iter().enumerate() {
+            let (low, high) = match (enters, n.checked_sub(1), on_row.get(n + 1)) {
+                (true, before, _) => (before.map_or(ends[0], |b| on_row[b].1), x),
+                (false, _, next) => (x, next.map_or(ends[1], |n| n.1)),
+            };
+            let gap = &mut gaps[component as usize];
+            if high - low > gap.0 {
+                let [_, y, z] = view.positions()[v as usize];
+                *gap = (high - low, [(low + high) / 2.0, y, z]);
+            }
             if enters {
                 open = component;
                 continue;

@@ -1,5 +1,6 @@
 //! Figures of a mesh, and of what was done to it.
 
+use geometry::measure;
 use geometry::repair::Repaired;
 use geometry::simplify;
 use geometry::smooth;
@@ -7,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::analysis::{Dangling, Spread};
-use crate::surface_maker::{Component, Components, Estimate, Summary};
+use crate::surface_maker::{Component, Components, Estimate, Figures, Summary};
 
 /// The figures of a triangle mesh. Those that need a region are None for a mesh without one.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -66,35 +67,24 @@ pub struct VoidReport {
 
 impl MeshReport {
     /// The figures of a surface; `split` says whether it is known which triangles are cut, `region` the region's volume (mm³).
-    pub fn of(surface: &geometry::surface_mesh::SurfaceMesh, split: bool, region: Option<f64>) -> MeshReport {
-        use geometry::math::{cross, norm, sub};
-        let size = geometry::measure::size(&surface.mesh);
-        let area = |i: usize| {
-            let [a, b, c] = surface.mesh.corners(i);
-            norm(cross(sub(b, a), sub(c, a))) / 2.0
-        };
-        let cut: f64 = (0..surface.cut.len()).filter(|i| surface.cut[*i]).map(area).sum();
-        let lattice = split.then_some(size.area - cut);
+    pub fn of(found: &Figures, split: bool, region: Option<f64>) -> MeshReport {
+        let size = &found.size;
+        let lattice = split.then_some(size.area - found.area_cut);
         let share = region.map(|v| size.volume / v);
         let over = |area: f64, volume: f64| (volume != 0.0).then(|| area / volume);
-        let voids = if size.cavities > 0 { geometry::measure::cavities(&surface.mesh) } else { Vec::new() };
-        let void = |c: &geometry::measure::Cavity| VoidReport {
-            volume: c.volume,
-            point: c.point,
-            bounds: [c.bounds.min, c.bounds.max],
-        };
+        let void =
+            |c: &measure::Cavity| VoidReport { volume: c.volume, point: c.point, bounds: [c.bounds.min, c.bounds.max] };
         MeshReport {
             volume: size.volume,
             area: size.area,
             area_lattice: lattice,
-            // Of nothing the sum is −0.
-            area_cut: split.then_some(cut + 0.0),
+            area_cut: split.then_some(found.area_cut),
             solid_fraction: share,
             porosity: share.map(|s| 1.0 - s),
             euler: size.euler,
             pieces: size.pieces,
             cavities: size.cavities,
-            voids: voids.iter().map(void).collect(),
+            voids: found.voids.iter().map(void).collect(),
             closed: size.closed,
             bounds: [size.bounds.min, size.bounds.max],
             specific_surface: SpecificSurface {
@@ -119,6 +109,16 @@ pub struct QualityReport {
     pub smallest_angle_p05: f64,
     /// Longest edge over 2√3 times the inscribed circle's radius, 1 at best; None for a triangle without area.
     pub largest_aspect: Option<f64>,
+}
+
+impl From<measure::Quality> for QualityReport {
+    fn from(q: measure::Quality) -> Self {
+        QualityReport {
+            smallest_angle: q.smallest_angle,
+            smallest_angle_p05: q.smallest_angle_p05,
+            largest_aspect: q.largest_aspect.is_finite().then_some(q.largest_aspect),
+        }
+    }
 }
 
 /// The figures of a surface that was made, streamed or held in memory.

@@ -168,6 +168,10 @@ pub(crate) struct ComponentGraph {
 pub(crate) struct Resolved {
     /// For each component of each part, in order, its number of triangles and whether it stays.
     pub parts: Vec<(u64, bool)>,
+    /// For each of them, the first of its surface component.
+    pub first: Vec<u32>,
+    /// The walls of cavities that stay, by the first of each, with their totals.
+    pub walls: Vec<(u32, Totals)>,
     /// Totals of what stays.
     pub totals: Totals,
     pub components: Components,
@@ -262,18 +266,20 @@ impl ComponentGraph {
             NONE => found.dropped == 0,
             o => !drops[o as usize],
         };
-        let (mut sum, mut solids, mut cavities) = (Totals::ZERO, 0, 0);
+        let (mut sum, mut solids, mut walls) = (Totals::ZERO, 0, Vec::new());
         for &i in roots.iter().filter(|i| stays(**i)) {
             sum.add(&whole[i]);
             solids += u64::from(whole[i].volume > 0.0);
-            cavities += u64::from(whole[i].volume < 0.0);
+            if whole[i].volume < 0.0 {
+                walls.push((i as u32, whole[i]));
+            }
         }
         // Closed and made of triangles: three edges for two of them.
         let euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
         let part = |i: usize| (self.totals[i].triangles, stays(self.surface[i] as usize));
         let parts = (0..count).map(part).collect();
-        let components = Components { count: solids, cavities, euler, ..found };
-        Ok(Resolved { parts, totals: sum, components })
+        let components = Components { count: solids, cavities: walls.len() as u64, euler, ..found };
+        Ok(Resolved { parts, first: self.surface, walls, totals: sum, components })
     }
 }
 

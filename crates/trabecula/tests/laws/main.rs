@@ -10,6 +10,7 @@ mod fields;
 mod flush;
 mod islands;
 mod local_thickness;
+mod measured;
 mod phase;
 mod simplify;
 mod skin;
