@@ -89,6 +89,8 @@ def mesh(args) -> None:
         if args.islands == "drop-small":
             small = "at the region's boundary, smaller than eight grid cells and a thousandth of the largest, "
         say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
+    if others and others["filled"]:
+        say(f"{counted(others['filled'], 'closed void')} smaller than a grid cell filled: {others['filled_volume']:.3g} mm³ in all")
     if args.json:
         return put_json(made | {"warnings": warned()})
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"

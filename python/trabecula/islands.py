@@ -28,8 +28,8 @@ def check_islands(islands: object) -> None:
 
 
 def left_out(islands: IslandsReport) -> float:
-    """Volume of what was dropped, mm³."""
-    return islands.dropped_volume
+    """Volume of what was dropped less that of the voids that were filled, mm³."""
+    return islands.dropped_volume - islands.filled_volume
 
 
 def warn_islands(islands: IslandsReport, words: str) -> None:

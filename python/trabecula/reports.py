@@ -351,6 +351,10 @@ class IslandsReport(Report):
     """Number of those that were left out."""
     dropped_volume: float
     """The volume of these in all, mm³."""
+    filled: int
+    """Number of closed voids smaller than a grid cell that were filled."""
+    filled_volume: float
+    """The volume of these in all, mm³."""
     found: int
     """Their number."""
     largest: LargestIsland | None

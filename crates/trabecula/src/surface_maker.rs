@@ -15,7 +15,7 @@ mod components;
 mod measured;
 
 pub use compact::Store;
-pub use components::{Component, Components, Islands, SMALL};
+pub use components::{CRUMB, Component, Components, DUST, Islands, SMALL};
 pub(crate) use components::{ComponentGraph, NONE, Resolved, Totals};
 pub use measured::{Figures, Measured};
 
@@ -127,9 +127,9 @@ pub(crate) fn check_count(triangles: u64) -> Result<(), Stopped> {
     Err(Stopped::Refused(Fault::new("edge", message)))
 }
 
-/// The components of a mesh that stay: the mesh without those that were dropped.
+/// The components of a mesh that stay: the mesh without those that were dropped or filled.
 pub(crate) fn kept(surface: SurfaceMesh, found: &Resolved) -> SurfaceMesh {
-    if found.components.dropped == 0 {
+    if found.components.unchanged() {
         return surface;
     }
     surface.select(&compact::ranges(&found.parts))
@@ -164,7 +164,7 @@ impl<'a> StlStream<'a> {
     /// Removes dropped components and writes the header.
     pub fn finish(self, found: Resolved, triangles: u64) -> Result<Summary, Stopped> {
         let moved = |share: f64| !self.compacts || compacted(self.progress, share);
-        if found.components.dropped > 0 {
+        if !found.components.unchanged() {
             let ranges = compact::ranges(&found.parts);
             let go_on = |record: u64| moved(record as f64 / triangles as f64);
             let (head, size) = (stl::HEADER as u64, stl::RECORD as u64);

@@ -156,6 +156,10 @@ pub struct IslandsReport {
     pub dropped: u64,
     /// The volume of these in all, mm³.
     pub dropped_volume: f64,
+    /// Number of closed voids smaller than a grid cell that were filled.
+    pub filled: u64,
+    /// The volume of these in all, mm³.
+    pub filled_volume: f64,
     /// Number of those with surface on the region's boundary: mostly fragments that it cuts off.
     pub border: u64,
     /// Their volume in all, mm³.
@@ -203,6 +207,8 @@ impl From<&Components> for IslandsReport {
             found: p.others,
             dropped: p.dropped,
             dropped_volume: p.dropped_volume,
+            filled: p.filled,
+            filled_volume: p.filled_volume,
             border: p.border,
             volume: p.volume,
             share: p.share(),

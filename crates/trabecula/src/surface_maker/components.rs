@@ -13,6 +13,10 @@ use geometry::union_find::{find, unite};
 
 /// Grid cells: a component with less volume is under two grid steps across.
 pub const SMALL: f64 = 8.0;
+/// Grid cells: a component with less volume is no part of the design, but of its sampling.
+pub const DUST: f64 = 0.01;
+/// Grid cells: a cavity with less volume is not resolved.
+pub const CRUMB: f64 = 1.0;
 /// A share of the largest component's volume: less is no loss.
 pub const NEGLIGIBLE: f64 = 1e-3;
 
@@ -22,10 +26,11 @@ pub enum Islands {
     /// They are kept.
     Keep,
     /// Those at the region's boundary with less than the volume of `SMALL` grid cells and `NEGLIGIBLE` of the largest are
-    /// removed: what the boundary cuts off that the grid cannot resolve.
+    /// removed: what the boundary cuts off that the grid cannot resolve. So are those of less than `DUST` grid cells anywhere,
+    /// and cavities of less than `CRUMB` are filled: what surfaces that nearly touch leave between them.
     #[default]
     DropSmall,
-    /// They are removed.
+    /// They are removed, and such cavities are filled.
     Drop,
     /// They are an error.
     Error,
@@ -78,6 +83,10 @@ pub struct Components {
     pub dropped: u64,
     /// The total volume of those, mm³.
     pub dropped_volume: f64,
+    /// How many cavities were filled.
+    pub filled: u64,
+    /// The total volume of those, mm³.
+    pub filled_volume: f64,
     /// How many of them touch the region's boundary: mostly fragments of walls and struts that it cuts off. The rest lie
     /// inside.
     pub border: u64,
@@ -88,6 +97,11 @@ pub struct Components {
 }
 
 impl Components {
+    /// Whether all that was found is in the result.
+    pub fn unchanged(&self) -> bool {
+        self.dropped == 0 && self.filled == 0
+    }
+
     /// The largest component's share of the total volume.
     pub fn share(&self) -> f64 {
         self.largest / (self.largest + self.volume)
@@ -232,9 +246,22 @@ impl ComponentGraph {
         }
         let outer = || roots.iter().copied().filter(|&i| whole[i].volume > 0.0);
         let largest = outer().reduce(|a, b| if net[b] > net[a] { b } else { a });
-        let small = largest.map_or(0.0, |l| (SMALL * spacing.powi(3)).min(NEGLIGIBLE * net[l]));
+        let cells = |n: f64| largest.map_or(0.0, |l| (n * spacing.powi(3)).min(NEGLIGIBLE * net[l]));
+        let [small, dust, crumb] = [SMALL, DUST, CRUMB].map(cells);
         let mut found = Components::default();
         let mut drops = vec![false; count];
+        let fills = match islands {
+            Islands::DropSmall | Islands::Drop => crumbs(&whole, &roots, crumb),
+            Islands::Keep | Islands::Error => Vec::new(),
+        };
+        for &i in &fills {
+            drops[i] = true;
+            found.filled += 1;
+            found.filled_volume -= whole[i].volume;
+            if owner[i] != NONE {
+                net[owner[i] as usize] -= whole[i].volume;
+            }
+        }
         for i in outer() {
             if Some(i) == largest {
                 found.largest = net[i];
@@ -246,7 +273,7 @@ impl ComponentGraph {
             found.volume += net[i];
             drops[i] = match islands {
                 Islands::Drop => true,
-                Islands::DropSmall => border && net[i] < small,
+                Islands::DropSmall => net[i] < if border { small } else { dust },
                 Islands::Keep | Islands::Error => false,
             };
             if drops[i] {
@@ -263,8 +290,8 @@ impl ComponentGraph {
         }
         // A cavity goes with its solid.
         let stays = |i: usize| match owner[i] {
-            NONE => found.dropped == 0,
-            o => !drops[o as usize],
+            NONE => found.dropped == 0 && !drops[i],
+            o => !drops[o as usize] && !drops[i],
         };
         let (mut sum, mut solids, mut walls) = (Totals::ZERO, 0, Vec::new());
         for &i in roots.iter().filter(|i| stays(**i)) {
@@ -281,6 +308,18 @@ impl ComponentGraph {
         let components = Components { count: solids, cavities: walls.len() as u64, euler, ..found };
         Ok(Resolved { parts, first: self.surface, walls, totals: sum, components })
     }
+}
+
+/// The cavities of less than a volume that can be filled: with nothing in them, and without a part of the region's boundary.
+fn crumbs(whole: &[Totals], roots: &[usize], limit: f64) -> Vec<usize> {
+    let within = |inner: &Aabb, b: &Aabb| (0..3).all(|a| inner.min[a] >= b.min[a] && inner.max[a] <= b.max[a]);
+    let least = roots.iter().filter(|i| whole[**i].volume > 0.0 && whole[**i].volume < limit);
+    let least: Vec<&Aabb> = least.map(|i| &whole[*i].bounds).collect();
+    let tiny = |i: &usize| {
+        let Totals { volume, area, bounds, .. } = &whole[*i];
+        *volume < 0.0 && -volume < limit && area[1] == 0.0 && !least.iter().any(|inner| within(inner, bounds))
+    };
+    roots.iter().copied().filter(tiny).collect()
 }
 
 /// Why a solid in several pieces is refused.
