@@ -154,14 +154,14 @@ class CleanedReport(Report):
 
 
 class Creases(Report):
-    """Angles between walls at the faces of tetrahedra, degrees, before smoothing by overlap."""
+    """Angles between walls at the faces of tetrahedra, degrees."""
 
     max: float
-    """Maximum."""
+    """Maximum, before smoothing by overlap."""
     mean: float
-    """Mean along all traces."""
+    """Mean along all traces, before smoothing by overlap."""
     smoothed: float | None
-    """Maximum after smoothing, at sampled points of the faces; None without overlap."""
+    """Maximum after smoothing by overlap, at sampled points of the faces; None without overlap."""
 
 
 class DanglingReport(Report):
@@ -770,8 +770,8 @@ class TilingReport(Report):
     overlap: float
     """Overlap of tetrahedra, 0 to 0.2 of their size."""
     pieces: int | None
-    """Number of connected components, predicted from the ports; None where that is not known, as with an overlap: the mesh
-    tells it then."""
+    """Number of connected components, predicted from values at small steps; None with a skin or kept zones, and where more
+    than 20 000 tetrahedra differ (4 000 with an overlap): the mesh tells it then."""
     ports: int | None
     """Number of ports on each face of a tetrahedron; None for zones."""
     solid_fraction: float
@@ -838,18 +838,18 @@ class VoidReport(Report):
 
 
 class WallSpread(Report):
-    """Wall thickness over a tetrahedral mesh, mm."""
+    """Wall thickness over a tetrahedral mesh, along normals of the mid-surface and weighted by its area, mm."""
 
     high: float
     """95th percentile."""
     low: float
     """5th percentile."""
     max: float
-    """Maximum."""
+    """Maximum of some thousand."""
     mean: float
-    """Mean."""
+    """Mean: volume of walls over area of their mid-surface."""
     min: float
-    """Minimum."""
+    """Minimum of some thousand."""
 
 
 class WarningReport(Report):

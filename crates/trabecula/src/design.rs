@@ -110,6 +110,8 @@ pub struct Tiled {
     pub zones: Vec<CellZone>,
     /// What is known of the mesh.
     pub mesh: TetReport,
+    /// Whether nothing else is in the part: no skin, no kept zone.
+    pub alone: bool,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
     /// Which zones join, where zones have cells of their own and it can be predicted.

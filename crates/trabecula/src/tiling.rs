@@ -12,6 +12,7 @@ mod crease;
 mod mixture;
 mod node_levels;
 mod surface;
+mod walls;
 
 use std::sync::Arc;
 
@@ -23,8 +24,9 @@ use crate::map::Tets;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
-pub use node_levels::{Amount, Spread};
+pub use node_levels::Amount;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
+pub use walls::Spread;
 
 /// A cell of a tiling, with its scale and weights.
 #[derive(Clone)]

@@ -149,8 +149,9 @@ fn tiled(
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Tiled, DesignError> {
-    let build_tiling::Made { tiling, explicit, zones, joins } = build_tiling::lattice(&domain, environment, warnings)?;
-    Ok(Tiled { name: domain.name.to_string(), tiling, zones, mesh: domain.report, explicit, joins })
+    let build_tiling::Made { tiling, alone, explicit, zones, joins } =
+        build_tiling::lattice(&domain, environment, warnings)?;
+    Ok(Tiled { name: domain.name.to_string(), tiling, zones, mesh: domain.report, alone, explicit, joins })
 }
 
 /// A lattice, with warnings of likely mistakes.

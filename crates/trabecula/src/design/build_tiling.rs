@@ -178,6 +178,8 @@ fn series_cell(spec: &TetSeriesSpec, path: &str) -> Result<TetCell, DesignError>
 /// A lattice over a mesh.
 pub(super) struct Made {
     pub tiling: Arc<Tiling>,
+    /// Whether nothing else is in the part: no skin, no kept zone.
+    pub alone: bool,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
     /// The zones, if they have cells of their own.
@@ -244,18 +246,23 @@ pub(super) fn lattice(
     if amount == Amount::Thickness && cell.iso(Part::Sheet, 0.5) <= 0.0 {
         return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
     }
-    let fractions = (amount == Amount::Fraction).then(|| values.clone());
-    let level = Level::of(&domain.map, &cell, part, amount, values);
-    let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level).meeting(fractions.as_deref());
+    let level = Level::of(&domain.map, &cell, part, amount, values.clone());
+    let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level);
+    let tiling = match amount {
+        Amount::Iso => tiling.meeting(None),
+        Amount::Fraction => tiling.meeting(Some(&values)),
+        Amount::Thickness => tiling.walled(&values).meeting(None),
+    };
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, environment), zones: Vec::new(), joins: None })
+    Ok(made(tiling, domain, environment))
 }
 
-/// Whether the surface is made without a grid.
-fn explicit(domain: &Domain, environment: &Environment) -> bool {
-    let joined = domain.joined;
-    joined.method == Method::Explicit && joined.overlap == 0.0 && environment.filled.is_empty()
+/// A lattice of one cell.
+fn made(tiling: Tiling, domain: &Domain, environment: &Environment) -> Made {
+    let alone = environment.filled.is_empty();
+    let explicit = alone && domain.joined.method == Method::Explicit;
+    Made { tiling: Arc::new(tiling), alone, explicit, zones: Vec::new(), joins: None }
 }
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
@@ -297,13 +304,13 @@ fn zoned(
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level).meeting(Some(&values));
-    let explicit = explicit(domain, environment);
-    let joins = explicit.then(|| joins(&tiling, &zoned, 0.5 * (lo + hi)));
+    let made = made(tiling, domain, environment);
+    let joins = made.alone.then(|| joins(&made.tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
     if let Some(joins) = &joins {
         joins.warn(&given, &at, warnings);
     }
-    Ok(Made { tiling: Arc::new(tiling), explicit, zones: given, joins })
+    Ok(Made { zones: given, joins, ..made })
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.

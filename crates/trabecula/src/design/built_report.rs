@@ -262,7 +262,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let share = iso.map(|t| tiling.fraction(t));
     let spread = tiling.thickness();
     let tets = TilingReport {
-        pieces: it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
+        pieces: it.alone.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
         thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
         ports: Some(cell.count(part, 0.5 * (levels.lo + levels.hi)).ports),
         face_fraction: Some(iso.map(|t| cell.face_fraction(part, t)).varying()),

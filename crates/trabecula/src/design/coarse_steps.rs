@@ -5,7 +5,9 @@ use crate::tiling::{connectivity, steps_enough};
 use geometry::fault::{counted, number};
 
 /// Share of the solid's volume by which a surface may be off.
-const OFF: f64 = 0.05;
+const OFF: f64 = 0.01;
+/// Share of the mesh that may be solid or not: with an overlap the fraction is known by samples.
+const SAMPLED: f64 = 0.002;
 /// Fewest steps along the edge of a tetrahedron.
 const LEAST: f64 = 4.0;
 
@@ -23,13 +25,14 @@ impl Built {
         let off = found / share - 1.0;
         let predicted = if pieces > 1 { connectivity(tiling).map(|c| c.components) } else { None };
         let broken = predicted.filter(|p| pieces > *p);
-        if off.abs() <= OFF && broken.is_none() {
+        let most = if tiling.map.overlap() > 0.0 { OFF.max(SAMPLED / share) } else { OFF };
+        if off.abs() <= most && broken.is_none() {
             return None;
         }
         let mean = tiling.map.mean_edge();
         let steps = (mean / edge).round().max(LEAST);
         // The error of the volume falls with the square of the step.
-        let for_volume = (steps * (off.abs() / OFF).sqrt()).ceil();
+        let for_volume = (steps * (off.abs() / most).sqrt()).ceil();
         let for_pieces = broken.and_then(|_| steps_enough(tiling, steps as usize + 1)).unwrap_or(0);
         let enough = for_volume.max(for_pieces as f64);
         if enough <= steps {

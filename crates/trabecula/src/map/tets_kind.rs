@@ -85,7 +85,7 @@ pub struct Joined {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(noun = "method")]
 pub enum Method {
-    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones or overlap.
+    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin or keep zones.
     #[default]
     Explicit,
     /// On a grid over the part, like other lattices.

@@ -179,7 +179,7 @@ impl Tiling {
         if let (Level::Same(t), [_]) = (&self.level, &self.cells[..]) {
             return vec![self.fraction(*t); self.map.len()];
         }
-        if self.map.overlap() > 0.0 && self.cells.len() > 1 {
+        if self.map.overlap() > 0.0 {
             return self.sampled_shares();
         }
         let mixture = Mixture::new(&self.cells, self.part);
@@ -189,16 +189,13 @@ impl Tiling {
             let levels = core::array::from_fn(|i| self.level_at(t, corner(i)));
             let alike = only(&weights).and_then(|one| {
                 let c = &self.cells[one];
-                let fraction = |t: f64| match &self.blended {
-                    Some(table) => table.fraction(self.part, t),
-                    None => c.cell.fraction(self.part, t * c.scale),
-                };
+                let fraction = |t: f64| c.cell.fraction(self.part, t * c.scale);
                 let ends: [f64; 4] = levels.map(fraction);
                 let (lo, hi) = ends.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
                 // Corners and the middle: exact for what is quadratic in the level.
                 let middle = fraction(levels.iter().sum::<f64>() / 4.0);
                 let mean = (ends.iter().sum::<f64>() + 16.0 * middle) / 20.0;
-                (hi - lo < ALIKE || self.blended.is_some()).then_some(mean)
+                (hi - lo < ALIKE).then_some(mean)
             });
             alike.unwrap_or_else(|| mixture.share(&weights, levels))
         };

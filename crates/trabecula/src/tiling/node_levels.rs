@@ -1,17 +1,17 @@
-//! The level of a lattice over a tetrahedral mesh, from an iso, a fraction or a wall thickness.
+//! The level of a lattice over a tetrahedral mesh, from an iso, a fraction or a wall thickness: of this to first order.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Level, Tiling};
+use super::Level;
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes, Subdivision, TetCell};
 use crate::map::Tets;
 use geometry::math::{Vec3, add, cross, norm, scale};
 
 /// Steps along the edge on which the mid-surface is sampled.
-const STEPS: usize = 8;
+const STEPS: usize = 12;
 
 /// How much of a cell is solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,34 +24,32 @@ pub enum Amount {
     Thickness,
 }
 
-/// How a thickness (mm) spreads over the walls of all tetrahedra.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// The least.
-    pub min: f64,
-    /// A twentieth is below it.
-    pub low: f64,
-    /// The mean, weighted by area.
-    pub mean: f64,
-    /// A twentieth is above it.
-    pub high: f64,
-    /// The greatest.
-    pub max: f64,
-}
-
 /// A piece of the mid-surface f = 0, about a point.
-struct Piece {
-    at: Bary,
+pub(super) struct Piece {
+    pub at: Bary,
     /// ∂f/∂λ there.
-    slope: Bary,
+    pub slope: Bary,
     /// ∫ dA/|∂f/∂λ| over the piece. Volumes scale alike in all directions, so by the coarea formula the piece's area in a
     /// tetrahedron of volume V is in proportion to V |∇f| times this, whatever the tetrahedron's shape.
-    weight: f64,
+    pub weight: f64,
 }
 
-/// The mid-surface of a cell in small pieces.
-fn middle(cell: &TetCell) -> Vec<Piece> {
-    let nodes = Nodes::new(cell, Subdivision { n: STEPS });
+/// The mid-surface of a cell in small pieces. Their area falls short of the true one by the square of a step, which twice the steps
+/// show: all weights make up for it.
+pub(super) fn middle(cell: &TetCell) -> Vec<Piece> {
+    let area =
+        |pieces: &[Piece]| pieces.iter().map(|p| p.weight * norm([p.slope[0], p.slope[1], p.slope[2]])).sum::<f64>();
+    let (mut pieces, fine) = (middle_in(cell, STEPS), area(&middle_in(cell, 2 * STEPS)));
+    let coarse = area(&pieces);
+    if coarse > 0.0 {
+        let by = (fine + (fine - coarse) / 3.0) / coarse;
+        pieces.iter_mut().for_each(|p| p.weight *= by);
+    }
+    pieces
+}
+
+fn middle_in(cell: &TetCell, n: usize) -> Vec<Piece> {
+    let nodes = Nodes::new(cell, Subdivision { n });
     let mut triangles: Vec<[Bary; 3]> = Vec::new();
     nodes.grid.each_tet(|at, _| {
         let i = at.map(|[i, j, k]| Subdivision::index(i, j, k));
@@ -85,7 +83,7 @@ fn middle(cell: &TetCell) -> Vec<Piece> {
 }
 
 /// |∇f| (per mm) in a tetrahedron where ∂f/∂λ is `g`.
-fn steepness(map: &Tets, t: usize, g: &Bary) -> f64 {
+pub(super) fn steepness(map: &Tets, t: usize, g: &Bary) -> f64 {
     let m = map.slopes(t);
     let slope: Vec3 = (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], g[i])));
     norm(slope)
@@ -94,7 +92,7 @@ fn steepness(map: &Tets, t: usize, g: &Bary) -> f64 {
 impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in the tetrahedra about a
-    /// node, and all are scaled so that the mean wall over the whole mid-surface is as thick as asked.
+    /// node, and all are scaled so that the mean of that over the whole mid-surface is as asked.
     pub fn of(map: &Tets, cell: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
@@ -147,45 +145,4 @@ fn of_thickness(map: &Tets, pieces: &[Piece], half: &[f64]) -> Vec<f64> {
         levels.iter_mut().for_each(|v| *v *= asked / found);
     }
     levels
-}
-
-impl Tiling {
-    /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, each piece by its area, to first order:
-    /// 2t/|∇f|. `None` for other parts, for transitions, and where there is no mid-surface.
-    pub fn thickness(&self) -> Option<Spread> {
-        let [cell] = &self.cells[..] else { return None };
-        if self.part != Part::Sheet {
-            return None;
-        }
-        let pieces = middle(&cell.cell);
-        // Some hundred thousand samples are enough for a spread.
-        let step = (self.map.len() * pieces.len()).div_ceil(2_000_000).max(1);
-        let tets = (0..self.map.len()).into_par_iter().step_by(step);
-        let mut all: Vec<[f64; 2]> = tets
-            .flat_map_iter(|t| {
-                let one = move |p: &Piece| {
-                    let steep = steepness(&self.map, t, &p.slope) / cell.scale;
-                    [2.0 * self.level_at(t, p.at) / steep, self.map.volume(t) * p.weight * steep]
-                };
-                pieces.iter().map(one).collect::<Vec<[f64; 2]>>()
-            })
-            .collect();
-        all.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-        let area: f64 = all.iter().map(|v| v[1]).sum();
-        let share = |s: f64| {
-            let mut below = 0.0;
-            let at = all.iter().find(|v| {
-                below += v[1];
-                below >= s * area
-            });
-            at.map(|v| v[0])
-        };
-        Some(Spread {
-            min: all.first()?[0],
-            low: share(0.05)?,
-            mean: all.iter().map(|v| v[0] * v[1]).sum::<f64>() / area,
-            high: share(0.95)?,
-            max: all.last()?[0],
-        })
-    }
 }

@@ -1,7 +1,8 @@
 //! Direct surface extraction from a tiling: every tetrahedron of the mesh is cut by itself, without a grid.
 //!
 //! Every tetrahedron is divided into the same small ones, and `tet_surface` has the surface in it. Where the level and the cell
-//! are the same everywhere, that is done once and mapped to all tetrahedra.
+//! are the same everywhere, that is done once and mapped to all tetrahedra. Where tetrahedra overlap, the blended function is
+//! evaluated at the nodes of each.
 //!
 //! *Closed, oriented, manifold, embedded.* A tetrahedron takes its corners in the order of the mesh's nodes. On a common face
 //! two tetrahedra then have the same small triangles, values and derivatives in all bits, hence the same vertices of the
@@ -17,6 +18,7 @@ mod cubic_root;
 mod shared_vertices;
 mod small_simplices;
 mod tet_surface;
+mod volume_shift;
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -39,6 +41,7 @@ use geometry::tetmesh::TetMesh;
 use shared_vertices::SharedVertices;
 use small_simplices::Template;
 use tet_surface::{Core, Levels, MARGIN, Scratch, TetSurface};
+use volume_shift::Stencil;
 
 /// Tetrahedra that a thread takes at once.
 const CHUNK: usize = 128;
@@ -48,6 +51,8 @@ const STEPS: [usize; 2] = [4, 64];
 /// Data common to all tetrahedra.
 struct Work<'a> {
     tiling: &'a Tiling,
+    /// The levels of the surface: of one cell those that make up for the volume that chords cost.
+    level: Level,
     template: Template,
     /// For each cell, its values at nodes, divided by its scale, and its slopes along edges.
     cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)>,
@@ -138,13 +143,19 @@ impl<'a> Work<'a> {
             nodes.values = Vec::new();
             (nodes, values, slopes)
         });
-        Ok(Work {
-            tiling,
-            cells: cells.collect(),
-            template,
-            same: Default::default(),
-            middle: tiling.map.bounds().center(),
-        })
+        let cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)> = cells.collect();
+        let level = match &cells[..] {
+            [(nodes, values, slopes)] if tiling.map.overlap() <= 0.0 => {
+                Stencil { nodes, template: &template, values, slopes }.shifted(tiling)
+            }
+            _ => tiling.level.clone(),
+        };
+        Ok(Work { tiling, level, cells, template, same: Default::default(), middle: tiling.map.bounds().center() })
+    }
+
+    /// Whether all tetrahedra with the same capped faces have the same surface.
+    fn alike(&self) -> bool {
+        !self.tiling.varies() && self.tiling.map.overlap() <= 0.0
     }
 
     /// The faces on the boundary, one bit each.
@@ -155,11 +166,14 @@ impl<'a> Work<'a> {
 
     fn tet_surface(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
         let mask = self.mask(t);
+        if self.tiling.map.overlap() > 0.0 {
+            return TetSurfaceRef::Own(Box::new(self.blended(t, mask, scratch)));
+        }
         let (nodes, values, slopes) = &self.cells[0];
         let cut = |core: &Core, scratch: &mut Scratch| {
             TetSurface::new(nodes, &self.template, core, self.tiling.part, mask, scratch)
         };
-        if let (Level::Same(level), false) = (&self.tiling.level, self.tiling.varies()) {
+        if let (Level::Same(level), true) = (&self.level, self.alike()) {
             let levels = Levels::Same(*level);
             return TetSurfaceRef::Shared(self.same[mask as usize].get_or_init(|| {
                 let core = Core { values, slopes, levels };
@@ -175,7 +189,7 @@ impl<'a> Work<'a> {
             let at = |k: &[u16; 4]| (0..4).fold(0.0, |s, i| s + f64::from(k[i]) * v[i]) / n;
             nodes.whole.iter().map(at).collect()
         };
-        let levels = match &self.tiling.level {
+        let levels = match &self.level {
             Level::Same(v) => vec![*v; nodes.whole.len()],
             Level::Nodes(of) => linear(of),
         };
@@ -204,6 +218,29 @@ impl<'a> Work<'a> {
         }
         let core = Core { values: &sum, slopes: &turns, levels };
         TetSurfaceRef::Own(Box::new(cut(&core, scratch)))
+    }
+
+    /// The surface of the blended function in a tetrahedron. Nodes are placed and evaluated by position alone: on a common face
+    /// both tetrahedra find the same in all bits, since a corner that does not count adds a zero.
+    fn blended(&self, t: usize, mask: u8, scratch: &mut Scratch) -> TetSurface {
+        let nodes = &self.cells[0].0;
+        let (corners, n) = (self.tiling.map.corners(t), nodes.grid.n as f64);
+        let place = |k: &[u16; 4]| {
+            let sum = (0..4).fold([0.0; 3], |s, i| add(s, scale(corners[i], f64::from(k[i]))));
+            sum.map(|v| v / n)
+        };
+        let places: Vec<Vec3> = nodes.whole.iter().map(place).collect();
+        let known = self.tiling.known(&places);
+        let values: Vec<f64> = known.iter().map(|k| k.f).collect();
+        let levels: Vec<f64> = known.iter().map(|k| k.t).collect();
+        let slopes = self.template.edges.iter().map(|[a, b]| {
+            let (a, b) = (*a as usize, *b as usize);
+            let step = sub(places[b], places[a]);
+            [a, b].map(|i| dot(known[i].slope, step))
+        });
+        let slopes: Vec<[f64; 2]> = slopes.collect();
+        let core = Core { values: &values, slopes: &slopes, levels: Levels::Each(&levels) };
+        TetSurface::new(nodes, &self.template, &core, self.tiling.part, mask, scratch)
     }
 
     /// Cuts a range of tetrahedra and sums up the totals of their surface components.
@@ -361,7 +398,7 @@ impl SurfaceMaker for TilingSurface<'_> {
         const SAMPLES: usize = 64;
         let work = Work::new(self.0, edge)?;
         let total = self.0.map.len();
-        let step = if self.0.varies() { total.div_ceil(SAMPLES) } else { 1 };
+        let step = if work.alike() { 1 } else { total.div_ceil(SAMPLES) };
         let mut scratch = Scratch::default();
         let (mut count, mut sampled) = (0.0, 0.0);
         for t in (step / 2..total).step_by(step) {

@@ -21,6 +21,7 @@ mod surface;
 mod tets;
 mod thickness;
 mod tiling;
+mod tiling_amounts;
 mod tiling_fields;
 mod walls;
 mod wavelength;

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use super::common::{Random, check};
 use super::tiling::{cell, made, map, shaken};
 use geometry::math::{Aabb, dot, norm, sub};
-use trabecula::cell::Part;
 use trabecula::cell::tet::{Nodes, Subdivision, tet_catalogue};
 use trabecula::field::Field;
 use trabecula::implicit::Implicit;
 use trabecula::map::Tets;
-use trabecula::tiling::{Amount, Level, Share, Tiling};
+use trabecula::tiling::{Level, Tiling};
 
 #[test]
 fn fields_are_continuous_for_any_numbering() {
@@ -129,116 +128,4 @@ fn overlap_smooths_the_creases() {
     let surface = made(tiling, 10.0, false).0;
     check("smooth", &surface);
     assert!((surface.mesh.volume() / exact - 1.0).abs() < 0.1);
-}
-
-/// The fraction asked for is that of the solid with its tetrahedra overlapping, and so is the one told. By 60 000 points, whose
-/// standard error is below 0.0021; that of the levels is below 0.001.
-#[test]
-fn overlap_keeps_the_fraction() {
-    let mut some = Random(21);
-    let mesh = shaken(3, 0.15, 4.0, &mut some);
-    let ready = |name: &str| {
-        let cell = trabecula::cell::tet::named_tet_cell(name).expect(name).cell().expect(name);
-        Arc::new(cell)
-    };
-    let (x, size) = (|p: &[f64; 3]| p[0], 4.0);
-    for overlap in [0.05, 0.2] {
-        let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
-        let one = |name: &str, part, fraction: f64| {
-            let cell = ready(name);
-            let level = Level::Same(cell.iso(part, fraction));
-            Tiling::new(map.clone(), cell, part, level).meeting(Some(&[fraction]))
-        };
-        let graded: Vec<f64> = map.nodes().iter().map(|p| 0.3 + 0.2 * (x(p) / size).clamp(-1.0, 1.0)).collect();
-        let primitive = ready("primitive");
-        let level = Level::Nodes(Arc::new(graded.iter().map(|f| primitive.iso(Part::Lower, *f)).collect()));
-        let mean = |of: &dyn Fn(u32) -> f64| {
-            let all = (0..map.len()).map(|t| (map.volume(t), map.tet(t).map(of).iter().sum::<f64>() / 4.0));
-            let (v, s) = all.fold((0.0, 0.0), |(v, s), (w, f)| (v + w, s + w * f));
-            s / v
-        };
-        let asked = mean(&|n| graded[n as usize]);
-        let share = |towards: bool| -> Option<Arc<Vec<f64>>> {
-            let at = |p: &[f64; 3]| if (x(p) > 0.0) == towards { 1.0 } else { 0.0 };
-            Some(Arc::new(map.nodes().iter().map(at).collect()))
-        };
-        let pair = [("primitive", true), ("diamond", false)].map(|(name, towards)| {
-            let cell = ready(name);
-            let range = cell.range();
-            Share { cell, scale: 0.5 * (range.hi - range.lo), weights: share(towards) }
-        });
-        let mixed = Level::mixed(&map, &pair, Part::Lower, &[0.4]);
-        let rows = [
-            ("primitive", 0.5, one("primitive", Part::Lower, 0.5)),
-            ("diamond", 0.3, one("diamond", Part::Upper, 0.3)),
-            ("diamond_sheet", 0.25, one("diamond_sheet", Part::Sheet, 0.25)),
-            ("graded", asked, Tiling::new(map.clone(), primitive, Part::Lower, level).meeting(Some(&graded))),
-            ("two", 0.4, Tiling::of(map.clone(), pair.to_vec(), Part::Lower, mixed).meeting(Some(&[0.4]))),
-        ];
-        let (mut points, volumes): (Vec<[f64; 3]>, Vec<f64>) =
-            (Vec::new(), (0..map.len()).map(|t| map.volume(t)).collect());
-        let all: f64 = volumes.iter().sum();
-        for (t, v) in volumes.iter().enumerate() {
-            let c = map.corners(t);
-            for _ in 0..(60_000.0 * v / all).round() as usize {
-                // Uniform in the tetrahedron: gaps between sorted numbers.
-                let mut cuts = [some.share(), some.share(), some.share()];
-                cuts.sort_unstable_by(f64::total_cmp);
-                let l = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
-                points.push([0, 1, 2].map(|a| (0..4).map(|i| l[i] * c[i][a]).sum()));
-            }
-        }
-        for (name, fraction, tiling) in rows {
-            let mut values = vec![0.0; points.len()];
-            tiling.values(&points, &mut values);
-            let found = values.iter().filter(|v| **v < 0.0).count() as f64 / points.len() as f64;
-            assert!((found - fraction).abs() < 0.008, "{name} {overlap}: {found} of {fraction}");
-            let (whole, solid) = tiling.volumes();
-            assert!((solid / whole - found).abs() < 0.008, "{name} {overlap}: told {}, {found}", solid / whole);
-        }
-    }
-}
-
-/// Walls over a mesh are as thick on average as asked, each by the area of its mid-surface. By the coarea formula that mean of
-/// 2t/|∇f| is ∫ 2t δ(f) dV / ∫ |∇f| δ(f) dV: by points near f = 0, some 8 000, whose standard error is below 0.5 %; the pieces
-/// of the mid-surface are of second order in an eighth of an edge, and within 1 %.
-#[test]
-fn walls_are_as_thick_as_asked_on_average() {
-    let mut some = Random(22);
-    let mesh = shaken(2, 0.2, 5.0, &mut some);
-    let map = map(&mesh);
-    let own = |p: &[f64; 3]| 0.5 + 0.02 * p[0];
-    for name in ["diamond_sheet", "primitive_sheet"] {
-        let (cell, part, _) = cell(name);
-        let graded: Vec<f64> = map.nodes().iter().map(own).collect();
-        for asked in [vec![0.6], graded] {
-            let level = Level::of(&map, &cell, part, Amount::Thickness, asked.clone());
-            let tiling = Tiling::new(map.clone(), cell.clone(), part, level);
-            // f alone has its gradient in the field of a level that does not vary.
-            let plain = Tiling::new(map.clone(), cell.clone(), part, Level::Same(1.0));
-            let near = 0.03 * cell.range().hi;
-            let (mut wanted, mut found, mut area) = (0.0, 0.0, 0.0);
-            for t in 0..map.len() {
-                let c = map.corners(t);
-                for _ in 0..(60_000.0 * map.volume(t) / 1000.0).round() as usize {
-                    let mut cuts = [some.share(), some.share(), some.share()];
-                    cuts.sort_unstable_by(f64::total_cmp);
-                    let l = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
-                    let p = [0, 1, 2].map(|a| (0..4).map(|i| l[i] * c[i][a]).sum());
-                    let (mut f, mut level) = ([0.0], [0.0]);
-                    tiling.cores(&[p], &mut f, &mut level);
-                    if f[0].abs() < near {
-                        let (mut v, mut g) = ([0.0], [[0.0; 3]]);
-                        plain.gradients(&[p], &mut v, &mut g);
-                        wanted += norm(g[0]) * if asked.len() == 1 { asked[0] } else { own(&p) };
-                        found += 2.0 * level[0];
-                        area += norm(g[0]);
-                    }
-                }
-            }
-            assert!((found / wanted - 1.0).abs() < 0.02, "{name}: {} of {}", found / area, wanted / area);
-            let told = tiling.thickness().expect("a sheet").mean;
-            assert!((told / (wanted / area) - 1.0).abs() < 0.01, "{name}: {told} of {}", wanted / area);
-        }
-    }
 }

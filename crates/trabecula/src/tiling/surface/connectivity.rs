@@ -15,14 +15,19 @@ use crate::map::tet_map::NONE;
 use crate::surface_maker::Totals;
 use crate::tiling::{Level, Tiling};
 
-/// Steps along the edge of a tetrahedron.
+/// Steps along the edge of a tetrahedron, and finer ones at which pieces are counted again: necks thinner than a step part.
 const STEPS: usize = 16;
-/// Greatest number of tetrahedra with different values at their nodes.
-const MOST: usize = 20_000;
+const FINER: [usize; 2] = [32, 48];
+/// Greatest number of small tetrahedra in those with different values at their nodes: 20 000 of 16 steps.
+const MOST: usize = 20_000 * STEPS.pow(3);
+/// The same where tetrahedra overlap, and values are dearer.
+const MOST_BLENDED: usize = MOST / 5;
 
 /// Predicted connected components.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connectivity {
+    /// Steps along the edge of a tetrahedron that show it.
+    pub steps: usize,
     /// Number of connected components of the solid.
     pub components: usize,
     /// All pairs of zones that have faces in common, by their numbers.
@@ -42,23 +47,37 @@ pub struct ZonePair {
     pub joined: bool,
 }
 
-/// The connectivity of a lattice on a subdivision of 16 steps; `None` if more than 20 000 tetrahedra differ in their levels
-/// or cells, or the mesh is one that no surface is made for.
+/// The connectivity of a lattice on a subdivision of 16 steps; of several pieces on finer ones, until two of them have as many.
+/// `None` if more than 20 000 tetrahedra differ in their levels or cells, 4 000 where they overlap, or the mesh is one that no
+/// surface is made for.
 pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
-    in_steps(tiling, STEPS)
+    let mut found = in_steps(tiling, STEPS)?;
+    for n in FINER {
+        if found.components == 1 {
+            break;
+        }
+        let Some(finer) = in_steps(tiling, n) else { break };
+        let settled = finer.components == found.components;
+        found = finer;
+        if settled {
+            break;
+        }
+    }
+    Some(found)
 }
 
 /// The fewest steps along the edge of a tetrahedron, from `least` on, such that the surface has as many components as
-/// [`connectivity`] predicts in them and in all finer ones up to 16; `None` where that predicts nothing.
+/// [`connectivity`] predicts in them and in all finer ones up to those that show it; `None` where that predicts nothing.
 pub fn steps_enough(tiling: &Tiling, least: usize) -> Option<usize> {
-    let wanted = connectivity(tiling)?.components;
-    let mut finer = (least..STEPS).rev();
-    let broken = finer.find(|n| in_steps(tiling, *n).is_none_or(|c| c.components != wanted));
-    Some(broken.map_or(least.min(STEPS), |n| n + 1))
+    let Connectivity { steps, components, .. } = connectivity(tiling)?;
+    let mut finer = (least..steps).rev();
+    let broken = finer.find(|n| in_steps(tiling, *n).is_none_or(|c| c.components != components));
+    Some(broken.map_or(least.min(steps), |n| n + 1))
 }
 
 /// The connectivity on a subdivision of `n` steps.
 fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
+    let most = if tiling.map.overlap() > 0.0 { MOST_BLENDED } else { MOST } / n.pow(3);
     let work = Work::in_steps(tiling, n).ok()?;
     let map = &tiling.map;
     // The first tetrahedron of each kind, and the kind of each.
@@ -69,7 +88,7 @@ fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
             firsts.len() - 1
         });
         kinds.push(kind);
-        if firsts.len() > MOST {
+        if firsts.len() > most {
             return None;
         }
     }
@@ -129,7 +148,7 @@ fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
             pair.open += usize::from(!surfaces[kinds[t]].faces[face].is_empty());
         }
     }
-    Some(Connectivity { components: names.len(), pairs: pairs.into_values().collect() })
+    Some(Connectivity { steps: n, components: names.len(), pairs: pairs.into_values().collect() })
 }
 
 /// The values that determine the surface in a tetrahedron: levels and weights at its nodes.
@@ -137,6 +156,11 @@ fn numbers(tiling: &Tiling, t: usize) -> Vec<u64> {
     let ids = tiling.map.tet(t);
     let at = |of: &[f64]| ids.map(|n| of[n as usize].to_bits());
     let mut out = Vec::new();
+    if tiling.map.overlap() > 0.0 {
+        // Of the neighbours too.
+        out.push(t as u64);
+        return out;
+    }
     if let Level::Nodes(of) = &tiling.level {
         out.extend(at(of));
     }

@@ -1,0 +1,225 @@
+//! How thick the walls of a sheet over a tetrahedral mesh are, and levels at which they are as thick as asked.
+//!
+//! The mean thickness is the volume of walls over the area of their mid-surface f = 0. To first order a wall is 2t/|∇f| thick, which
+//! is known all over the mid-surface: its mean, times the ratio of both means in some hundred tetrahedra, which varies little.
+//! How walls spread is measured in these along normals of the mid-surface, both ways to the faces |f| = t: past creases, and where
+//! tetrahedra overlap.
+
+use rayon::prelude::*;
+
+use super::mixture::{Mixture, weights};
+use super::node_levels::{Piece, middle, steepness};
+use super::{Level, Tiling};
+use crate::cell::Part;
+use geometry::math::{Vec3, add, dot, norm, scale};
+use geometry::progress::checkpoint;
+
+/// The most tetrahedra whose walls are measured, and the most normals in each.
+const TETS: usize = 128;
+const NORMALS: usize = 32;
+/// Steps along a normal for half the wall to first order, of which a wall is followed for four times as many.
+const STEPS: usize = 24;
+/// Points in each where tetrahedra overlap, and how near the mid-surface they count as on it, in levels.
+const POINTS: usize = 2000;
+const ON: f64 = 0.3;
+/// The most pieces of the mid-surface: some hundred thousand are enough for a mean.
+const PIECES: usize = 2_000_000;
+/// The most times that levels are scaled, and the share of the thickness that is close enough.
+const ROUNDS: usize = 8;
+const NEAR: f64 = 1e-3;
+
+/// How a thickness (mm) spreads over the walls of all tetrahedra.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// The least of some thousand.
+    pub min: f64,
+    /// A twentieth of the area is below it.
+    pub low: f64,
+    /// The volume of walls over the area of their mid-surface.
+    pub mean: f64,
+    /// A twentieth of the area is above it.
+    pub high: f64,
+    /// The greatest of some thousand.
+    pub max: f64,
+}
+
+/// Something weighted by area (mm²), and that area.
+fn sums(of: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    of.fold([0.0; 2], |[sum, area], [v, a]| [sum + v * a, area + a])
+}
+
+fn mean(of: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let [sum, area] = sums(of);
+    sum / area
+}
+
+impl Tiling {
+    /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, by its area. `None` for other parts, for
+    /// transitions, and where there is no mid-surface.
+    pub fn thickness(&self) -> Option<Spread> {
+        let [cell] = &self.cells[..] else { return None };
+        if self.part != Part::Sheet {
+            return None;
+        }
+        let pieces = middle(&cell.cell);
+        let tet = |(i, t): (usize, usize)| {
+            // Other ones in every tetrahedron.
+            let every = pieces.len().div_ceil(NORMALS).max(1);
+            let some: Vec<&Piece> = pieces.iter().skip(i % every).step_by(every).collect();
+            self.along_normals(t, &some)
+        };
+        let all: Vec<Vec<[f64; 2]>> = self.some().into_par_iter().enumerate().map(tet).collect();
+        let mut all = all.concat();
+        all.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        let area: f64 = all.iter().map(|v| v[1]).sum();
+        let share = |s: f64| {
+            let mut below = 0.0;
+            let at = all.iter().find(|v| {
+                below += v[1];
+                below >= s * area
+            });
+            at.map(|v| v[0])
+        };
+        Some(Spread {
+            min: all.first()?[0],
+            low: share(0.05)?,
+            mean: self.mean_wall(&pieces),
+            high: share(0.95)?,
+            max: all.last()?[0],
+        })
+    }
+
+    /// The volume of walls over the area of their mid-surface, mm.
+    fn mean_wall(&self, pieces: &[Piece]) -> f64 {
+        let step = (self.map.len() * pieces.len()).div_ceil(PIECES).max(1);
+        let first_order = |tets: Vec<usize>| {
+            let found = tets.par_iter().map(|t| sums(pieces.iter().map(|p| self.first_order(*t, p))));
+            let found: Vec<[f64; 2]> = found.collect();
+            let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
+            sum / area
+        };
+        let everywhere = first_order((0..self.map.len()).step_by(step).collect());
+        self.realised(pieces) * everywhere / first_order(self.some())
+    }
+
+    /// The sheet whose walls are on average as thick as asked (mm; one number, or one for each node, of which the mean over the
+    /// mid-surface counts): all its levels are scaled alike.
+    #[must_use]
+    pub fn walled(mut self, asked: &[f64]) -> Tiling {
+        let pieces = middle(&self.cells[0].cell);
+        let at = |t: usize, p: &Piece| {
+            let n = self.map.tet(t).map(|n| asked[(n as usize).min(asked.len() - 1)]);
+            [(0..4).map(|i| p.at[i] * n[i]).sum::<f64>(), self.first_order(t, p)[1]]
+        };
+        let all = (0..self.map.len()).flat_map(|t| pieces.iter().map(move |p| (t, p)));
+        let wanted = if let [one] = asked { *one } else { mean(all.map(|(t, p)| at(t, p))) };
+        for _ in 0..ROUNDS {
+            checkpoint();
+            let by = wanted / self.mean_wall(&pieces);
+            if !by.is_finite() {
+                break;
+            }
+            self.level = match &self.level {
+                Level::Same(t) => Level::Same(by * t),
+                Level::Nodes(of) => Level::Nodes(of.iter().map(|t| by * t).collect::<Vec<f64>>().into()),
+            };
+            if (by - 1.0).abs() < NEAR {
+                break;
+            }
+        }
+        self
+    }
+
+    /// The thickness 2t/|∇f| (mm) of a piece in a tetrahedron, and its area (mm²).
+    fn first_order(&self, t: usize, p: &Piece) -> [f64; 2] {
+        let steep = steepness(&self.map, t, &p.slope);
+        let thickness = 2.0 * self.level_at(t, p.at) * self.cells[0].scale / steep;
+        // Six times the volume is the determinant of the map from barycentric coordinates.
+        [thickness, 6.0 * self.map.volume(t) * p.weight * steep]
+    }
+
+    /// Some tetrahedra, evenly spread over the mesh.
+    fn some(&self) -> Vec<usize> {
+        let count = self.map.len().min(TETS);
+        (0..count).map(|i| i * self.map.len() / count).collect()
+    }
+
+    /// The volume of walls in some tetrahedra over the area of the mid-surface there, mm.
+    fn realised(&self, pieces: &[Piece]) -> f64 {
+        let some = self.some();
+        let mixture = Mixture::new(&self.cells, self.part);
+        let one = |t: &usize| {
+            let volume = self.map.volume(*t);
+            if self.map.overlap() > 0.0 {
+                let [share, area] = self.sampled_walls(*t);
+                return [volume * share, volume * area];
+            }
+            let corner = |i: usize| core::array::from_fn(|k| f64::from(u8::from(k == i)));
+            let levels = core::array::from_fn(|i| self.level_at(*t, corner(i)));
+            let share = mixture.share(&weights(&self.map, &self.cells, *t), levels);
+            [volume * share, pieces.iter().map(|p| self.first_order(*t, p)[1]).sum()]
+        };
+        let found: Vec<[f64; 2]> = some.par_iter().map(one).collect();
+        let [volume, area] = found.into_iter().fold([0.0; 2], |[v, a], [w, b]| [v + w, a + b]);
+        volume / area
+    }
+
+    /// The share of a tetrahedron in walls, and the area of the mid-surface in it over its volume, ∫ |∇f| δ(f) dV / V.
+    fn sampled_walls(&self, t: usize) -> [f64; 2] {
+        let known = self.known(&self.points_in(t, POINTS));
+        let mut found = [0.0; 2];
+        for k in &known {
+            let near = ON * k.t;
+            found[0] += f64::from(u8::from(k.f.abs() < k.t));
+            found[1] += if k.f.abs() < near { norm(k.slope) / (2.0 * near) } else { 0.0 };
+        }
+        found.map(|v| v / known.len() as f64)
+    }
+
+    /// The walls (mm) of a tetrahedron along the normals of these pieces of the mid-surface, each with the piece's area.
+    fn along_normals(&self, t: usize, pieces: &[&Piece]) -> Vec<[f64; 2]> {
+        let corners = self.map.corners(t);
+        let place = |p: &&Piece| (0..4).fold([0.0; 3], |s, i| add(s, scale(corners[i], p.at[i])));
+        let mut places: Vec<Vec3> = pieces.iter().map(place).collect();
+        // On to the mid-surface, where overlap has moved it too.
+        let mut known = self.known(&places);
+        for _ in 0..3 {
+            for (p, k) in places.iter_mut().zip(&known) {
+                *p = add(*p, scale(k.slope, -k.f / dot(k.slope, k.slope)));
+            }
+            known = self.known(&places);
+        }
+        let on = |i: &usize| known[*i].t > 0.0 && known[*i].f.abs() < 0.01 * known[*i].t;
+        let found: Vec<usize> = (0..places.len()).filter(on).collect();
+        let mut walls = vec![0.0; places.len()];
+        for side in [1.0, -1.0] {
+            let mut open = found.clone();
+            // f and t − f at the last step.
+            let mut last: Vec<[f64; 2]> = known.iter().map(|k| [0.0, k.t]).collect();
+            for step in 1..=4 * STEPS {
+                let h = |i: usize| known[i].t / norm(known[i].slope) / STEPS as f64;
+                let at = |i: &usize| {
+                    let normal = scale(known[*i].slope, side / norm(known[*i].slope));
+                    add(places[*i], scale(normal, h(*i) * step as f64))
+                };
+                let beyond = self.known(&open.iter().map(at).collect::<Vec<Vec3>>());
+                let mut left = Vec::with_capacity(open.len());
+                for (i, k) in open.into_iter().zip(beyond) {
+                    let (f, short) = (side * k.f, k.t - side * k.f);
+                    let before = last[i][1];
+                    if short <= 0.0 {
+                        walls[i] += h(i) * ((step - 1) as f64 + before / (before - short));
+                    } else if f < last[i][0] || step == 4 * STEPS {
+                        // A wall that runs into the next one ends half way.
+                        walls[i] += h(i) * (step - 1) as f64;
+                    } else {
+                        last[i] = [f, short];
+                        left.push(i);
+                    }
+                }
+                open = left;
+            }
+        }
+        found.into_iter().map(|i| [walls[i], self.first_order(t, pieces[i])[1]]).collect()
+    }
+}
