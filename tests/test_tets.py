@@ -472,4 +472,4 @@ def test_coarse_steps_are_warned_of_with_the_step_that_suffices():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fine = solid.mesh(edge=enough)
-    assert fine.islands.found == 0 and abs(fine.volume / whole / 0.25 - 1) < 0.05
+    assert fine.islands.found == 0 and abs(fine.volume / whole / 0.25 - 1) < 0.01
