@@ -11,17 +11,39 @@ pub enum Boundary {
 }
 
 /// The weights of four coefficients in the value at the share t of an interval.
-#[inline]
+#[inline(always)]
 pub fn weights(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [s * s * s / 6.0, (4.0 + t * t * (3.0 * t - 6.0)) / 6.0, (4.0 + s * s * (3.0 * s - 6.0)) / 6.0, t * t * t / 6.0]
+    const BY_POWER: [[f64; 4]; 4] = [
+        [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0],
+        [-0.5, 0.0, 0.5, 0.0],
+        [0.5, -1.0, 0.5, 0.0],
+        [-1.0 / 6.0, 0.5, -0.5, 1.0 / 6.0],
+    ];
+    polynomials(t, BY_POWER)
 }
 
 /// The derivatives of [`weights`].
-#[inline]
+#[inline(always)]
 pub fn slopes(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, s * (4.0 - 3.0 * s) / 2.0, t * t / 2.0]
+    polynomials(t, [[-0.5, 0.0, 0.5, 0.0], [1.0, -2.0, 1.0, 0.0], [-0.5, 1.5, -1.5, 0.5]])
+}
+
+/// The second derivatives of [`weights`].
+#[inline(always)]
+pub fn bends(t: f64) -> [f64; 4] {
+    polynomials(t, [[1.0, -2.0, 1.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
+}
+
+/// Four polynomials by their coefficients, those of a power side by side: a vector has all four.
+#[inline(always)]
+fn polynomials<const N: usize>(t: f64, by_power: [[f64; 4]; N]) -> [f64; 4] {
+    let mut sum = [0.0; 4];
+    for of in by_power.iter().rev() {
+        for i in 0..4 {
+            sum[i] = sum[i] * t + of[i];
+        }
+    }
+    sum
 }
 
 /// The coefficients of the spline through `values` (x fastest), axis by axis.

@@ -157,17 +157,24 @@ impl Lattice {
         };
         let mut second = vec![[[0.0; 3]; 3]; n];
         d.second(&u, values, gradients, &mut second);
+        // Maps give no second derivatives; central differences along the gradient are as accurate.
         let step = 1e-5 * self.map.wavelength();
-        let each = values.iter_mut().zip(gradients).zip(points).zip(j.iter().zip(&second));
-        for (((f, g), p), (j, second)) in each {
+        let mut ends = Vec::with_capacity(2 * n);
+        for ((p, g), j) in points.iter().zip(&*gradients).zip(&j) {
+            let w = apply(&transpose(j), *g);
+            let to = scale(w, step / norm(w).max(f64::MIN_POSITIVE));
+            ends.extend([sub(*p, to), add(*p, to)]);
+        }
+        let mut j_ends = vec![[[0.0; 3]; 3]; 2 * n];
+        self.map.phases_and_jacobians(&ends, &mut vec![[0.0; 3]; 2 * n], &mut j_ends);
+        let each = values.iter_mut().zip(gradients).zip(j.iter().zip(&second)).zip(j_ends.as_chunks::<2>().0);
+        for (((f, g), (j, second)), j_ends) in each {
             let (back, (ratio, a, b)) = (transpose(j), d.ratio_slopes(*g, j));
             let w = apply(&back, *g);
             let long = norm(w);
             let mut slope = scale(w, ratio.min(STRETCHED));
             if ratio < STRETCHED && long > 0.0 {
-                // Maps give no second derivatives; central differences are as accurate.
-                let to = scale(w, step / long);
-                let [lo, hi] = [sub(*p, to), add(*p, to)].map(|q| apply(&transpose(&self.map.jacobian(q)), *g));
+                let [lo, hi] = [0, 1].map(|e: usize| apply(&transpose(&j_ends[e]), *g));
                 let turned = scale(sub(hi, lo), b * long / (2.0 * step));
                 slope = add(slope, scale(add(apply(&back, apply(second, a)), turned), *f));
             }

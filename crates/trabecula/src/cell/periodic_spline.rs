@@ -6,7 +6,7 @@
 
 use multiversion::multiversion;
 
-use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
+use geometry::cubic_spline::{Boundary, bends, coefficients, slopes, weights};
 use geometry::math::{Interval, Mat3, Vec3, apply, norm, transpose};
 
 /// Coefficients per axis, besides that of its own node, on which the spline in a knot interval depends.
@@ -126,34 +126,36 @@ impl Spline {
         fill_second(self, u, values, gradients, second);
     }
 
-    /// Sums over the coefficients that count from entry `first` on: for each pair, y and z, of lists of weights, four numbers
-    /// along x.
+    /// Fills sums over the coefficients that count from entry `first` on: for each pair of lists of weights, y and z, four
+    /// numbers along x.
     #[inline(always)]
     fn sums<const Y: usize, const N: usize>(
         &self,
         first: usize,
-        y: [[f64; 4]; Y],
-        z: [[f64; 4]; Y],
+        [y, z]: [[[f64; 4]; Y]; 2],
         pairs: [(usize, usize); N],
-    ) -> [[f64; 4]; N] {
-        let mut sums = [[0.0; 4]; N];
+        out: &mut [[f64; 4]; N],
+    ) {
+        *out = [[0.0; 4]; N];
         for k in 0..4 {
             let mut plane = [[0.0; 4]; Y];
             for j in 0..4 {
-                let row: [f64; 4] = self.row(first, j, k).first_chunk().map_or([0.0; 4], |r| r.map(f64::from));
+                let mut row = [0.0; 4];
+                for (r, c) in row.iter_mut().zip(self.row(first, j, k)) {
+                    *r = f64::from(*c);
+                }
                 for (plane, y) in plane.iter_mut().zip(&y) {
                     for i in 0..4 {
                         plane[i] += y[j] * row[i];
                     }
                 }
             }
-            for (sum, (b, c)) in sums.iter_mut().zip(pairs) {
+            for (sum, (b, c)) in out.iter_mut().zip(pairs) {
                 for i in 0..4 {
                     sum[i] += z[c][k] * plane[b][i];
                 }
             }
         }
-        sums
     }
 
     /// Values at the phases `base + x · along`, one for each of `xs`, in single precision.
@@ -219,47 +221,116 @@ fn along(c: &[f64; 4], w: &[f64; 4]) -> f64 {
     (c[0] * w[0] + c[1] * w[1]) + (c[2] * w[2] + c[3] * w[3])
 }
 
-/// The second derivatives of [`weights`].
+/// A small whole number as an integer, in vectors too.
 #[inline(always)]
-fn bends(t: f64) -> [f64; 4] {
-    [1.0 - t, 3.0 * t - 2.0, 1.0 - 3.0 * t, t]
+fn whole(v: f64) -> i32 {
+    (v + 6755399441055744.0).to_bits() as i32
+}
+
+/// Where points lie: the first of the coefficients that count, and weights of derivatives up to an order along each axis.
+struct Spots<const D: usize> {
+    first: [i32; LANES],
+    /// By axis, derivative, coefficient, point.
+    weights: [[[[f64; LANES]; 4]; D]; 3],
+}
+
+impl<const D: usize> Spots<D> {
+    #[inline(always)]
+    fn new(spline: &Spline, u: &[Vec3]) -> Self {
+        let steps = [1, spline.stride[0] as i32, spline.stride[1] as i32];
+        let mut spots = Spots { first: [0; LANES], weights: [[[[0.0; LANES]; 4]; D]; 3] };
+        for a in 0..3 {
+            let n = spline.shape[a] as f64;
+            let mut at = [0.0; LANES];
+            for (at, u) in at.iter_mut().zip(u) {
+                *at = u[a];
+            }
+            for l in 0..LANES {
+                // A phase just below a whole number may round up to it.
+                let s = (at[l] - at[l].floor()) * n;
+                let i = s.min(n - 1.0).floor();
+                spots.first[l] += whole(i) * steps[a];
+                let t = s - i;
+                let of = [weights(t), slopes(t), bends(t)];
+                for d in 0..D {
+                    for k in 0..4 {
+                        spots.weights[a][d][k][l] = of[d][k];
+                    }
+                }
+            }
+        }
+        spots
+    }
+
+    /// The weights along an axis at one point.
+    #[inline(always)]
+    fn of(&self, a: usize, l: usize) -> [[f64; 4]; D] {
+        let mut of = [[0.0; 4]; D];
+        for d in 0..D {
+            for k in 0..4 {
+                of[d][k] = self.weights[a][d][k][l];
+            }
+        }
+        of
+    }
+
+    #[inline(always)]
+    fn sums<const N: usize>(
+        &self,
+        spline: &Spline,
+        count: usize,
+        pairs: [(usize, usize); N],
+    ) -> [[[f64; 4]; N]; LANES] {
+        let mut sums = [[[0.0; 4]; N]; LANES];
+        for l in 0..count.min(LANES) {
+            spline.sums(self.first[l] as usize, [self.of(1, l), self.of(2, l)], pairs, &mut sums[l]);
+        }
+        sums
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn values(spline: &Spline, u: &[Vec3], out: &mut [f64]) {
-    for (o, u) in out.iter_mut().zip(u) {
-        let (first, t) = spline.interval(*u);
-        let [x, y, z] = t.map(weights);
-        let [v] = spline.sums(first, [y], [z], [(0, 0)]);
-        *o = along(&v, &x);
+    for (u, out) in u.chunks(LANES).zip(out.chunks_mut(LANES)) {
+        let spots = Spots::<1>::new(spline, u);
+        let sums = spots.sums(spline, u.len(), [(0, 0)]);
+        for (l, o) in out.iter_mut().enumerate() {
+            *o = along(&sums[l][0], &spots.of(0, l)[0]);
+        }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn fill_gradients(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
     let n = spline.shape.map(|n| n as f64);
-    for ((o, g), u) in values.iter_mut().zip(gradients).zip(u) {
-        let (first, t) = spline.interval(*u);
-        let ([x, y, z], [dx, dy, dz]) = (t.map(weights), t.map(slopes));
-        let [v, vy, vz] = spline.sums(first, [y, dy], [z, dz], [(0, 0), (1, 0), (0, 1)]);
-        *o = along(&v, &x);
-        *g = [along(&v, &dx) * n[0], along(&vy, &x) * n[1], along(&vz, &x) * n[2]];
+    let batches = u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES));
+    for ((u, values), gradients) in batches {
+        let spots = Spots::<2>::new(spline, u);
+        let sums = spots.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1)]);
+        for (l, (o, g)) in values.iter_mut().zip(gradients).enumerate() {
+            let ([v, vy, vz], [x, dx]) = (&sums[l], spots.of(0, l));
+            *o = along(v, &x);
+            *g = [along(v, &dx) * n[0], along(vy, &x) * n[1], along(vz, &x) * n[2]];
+        }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn fill_second(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
     let [nx, ny, nz] = spline.shape.map(|n| n as f64);
-    for (((o, g), h), u) in values.iter_mut().zip(gradients).zip(second).zip(u) {
-        let (first, t) = spline.interval(*u);
-        let ([x, y, z], [dx, dy, dz], [bx, by, bz]) = (t.map(weights), t.map(slopes), t.map(bends));
-        let pairs = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
-        let [v, vy, vz, vyy, vyz, vzz] = spline.sums(first, [y, dy, by], [z, dz, bz], pairs);
-        *o = along(&v, &x);
-        *g = [along(&v, &dx) * nx, along(&vy, &x) * ny, along(&vz, &x) * nz];
-        let [xy, xz, yz] = [along(&vy, &dx) * nx * ny, along(&vz, &dx) * nx * nz, along(&vyz, &x) * ny * nz];
-        let [xx, yy, zz] = [along(&v, &bx) * nx * nx, along(&vyy, &x) * ny * ny, along(&vzz, &x) * nz * nz];
-        *h = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let batches =
+        u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES).zip(second.chunks_mut(LANES)));
+    for ((u, values), (gradients, second)) in batches {
+        let spots = Spots::<3>::new(spline, u);
+        let sums = spots.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]);
+        for (l, ((o, g), h)) in values.iter_mut().zip(gradients).zip(second).enumerate() {
+            let ([v, vy, vz, vyy, vyz, vzz], [x, dx, bx]) = (&sums[l], spots.of(0, l));
+            *o = along(v, &x);
+            *g = [along(v, &dx) * nx, along(vy, &x) * ny, along(vz, &x) * nz];
+            let [xy, xz, yz] = [along(vy, &dx) * nx * ny, along(vz, &dx) * nx * nz, along(vyz, &x) * ny * nz];
+            let [xx, yy, zz] = [along(v, &bx) * nx * nx, along(vyy, &x) * ny * ny, along(vzz, &x) * nz * nz];
+            *h = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use super::Mapping;
 use super::inverse::{corners, listed, whole};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, product, scale, sub, unit};
+use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, scale, sub, unit};
 
 /// A lattice wrapped round an axis or about a centre. Phases are (r/λ, n θ/2π, z/λ) on a cylinder and (r/λ, n φ/2π,
 /// n θ/2π) on a sphere: φ round the axis, θ from it, n cells around and half as many from pole to pole.
@@ -117,18 +117,20 @@ impl Round {
     #[inline(always)]
     fn slopes(&self, (l, r): (Vec3, f64)) -> Mat3 {
         let r = r.max(1e-9 * self.wavelength[0]);
-        let out = [l[0] / r, l[1] / r, 0.0];
+        let per = 1.0 / r;
+        let [x, y, n] = self.frame;
+        let out = add(scale(x, l[0] * per), scale(y, l[1] * per));
+        let around = sub(scale(y, l[0] * per), scale(x, l[1] * per));
         let turn = self.around / core::f64::consts::TAU;
-        let round = [-out[1] * turn / r, out[0] * turn / r, 0.0];
-        let local = if self.sphere {
-            let s = long(r, l[2]);
-            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
-            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
-            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
-        } else {
-            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
-        };
-        product(&local, &self.frame)
+        let round = scale(around, turn * per);
+        if !self.sphere {
+            return [scale(out, 1.0 / self.wavelength[0]), round, scale(n, 1.0 / self.wavelength[1])];
+        }
+        let per = 1.0 / long(r, l[2]);
+        let (c, s) = (l[2] * per, r * per);
+        let away = add(scale(out, s), scale(n, c));
+        let down = sub(scale(out, c), scale(n, s));
+        [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn * per)]
     }
 
     /// How many cells there are round the axis.

@@ -78,7 +78,8 @@ impl Spline {
         for (v, d) in value.iter_mut().zip(slope) {
             *v += beyond * d;
         }
-        Spot { first, value, slope: slope.map(|d| d / h) }
+        let per = 1.0 / h;
+        Spot { first, value, slope: slope.map(|d| d * per) }
     }
 
     /// u at points.
@@ -98,27 +99,32 @@ impl Spline {
         jacobians(self, points, u, m);
     }
 
-    /// For each function the sums over its coefficients about a point: for each pair of weights along y and z, four numbers
+    /// For each function the sums over its coefficients about a point: for each pair of lists of weights, y and z, four numbers
     /// along x.
     #[inline(always)]
-    fn sums<const N: usize>(&self, first: [usize; 3], pairs: [[&[f64; 4]; 2]; N]) -> [[[f64; 4]; N]; 3] {
+    fn sums<const Y: usize, const N: usize>(
+        &self,
+        first: [usize; 3],
+        [y, z]: [[&[f64; 4]; Y]; 2],
+        pairs: [(usize, usize); N],
+    ) -> [[[f64; 4]; N]; 3] {
         let [_, sy, sz] = self.strides();
         let base = first[0] + first[1] * sy + first[2] * sz;
         let mut sums = [[[0.0; 4]; N]; 3];
         for (sums, c) in sums.iter_mut().zip(&self.coefficients) {
             for k in 0..4 {
-                let mut planes = [[0.0; 4]; N];
+                let mut planes = [[0.0; 4]; Y];
                 for j in 0..4 {
                     let row = c[base + j * sy + k * sz..].first_chunk::<4>().unwrap_or(&[0.0; 4]);
-                    for (plane, [y, _]) in planes.iter_mut().zip(&pairs) {
+                    for (plane, y) in planes.iter_mut().zip(y) {
                         for i in 0..4 {
                             plane[i] += y[j] * row[i];
                         }
                     }
                 }
-                for ((sum, plane), [_, z]) in sums.iter_mut().zip(&planes).zip(&pairs) {
+                for (sum, (b, c)) in sums.iter_mut().zip(pairs) {
                     for i in 0..4 {
-                        sum[i] += z[k] * plane[i];
+                        sum[i] += z[c][k] * planes[b][i];
                     }
                 }
             }
@@ -336,7 +342,7 @@ fn along(row: &[f64; 4], w: &[f64; 4]) -> f64 {
 fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
     for (o, p) in out.iter_mut().zip(points) {
         let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
-        let sums = spline.sums([x.first, y.first, z.first], [[&y.value, &z.value]]);
+        let sums = spline.sums([x.first, y.first, z.first], [[&y.value], [&z.value]], [(0, 0)]);
         *o = sums.map(|[s]| along(&s, &x.value));
     }
 }
@@ -345,8 +351,8 @@ fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
 fn jacobians(spline: &Spline, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
     for ((u, m), p) in u.iter_mut().zip(m).zip(points) {
         let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
-        let pairs = [[&y.value, &z.value], [&y.slope, &z.value], [&y.value, &z.slope]];
-        let sums = spline.sums([x.first, y.first, z.first], pairs);
+        let weights = [[&y.value, &y.slope], [&z.value, &z.slope]];
+        let sums = spline.sums([x.first, y.first, z.first], weights, [(0, 0), (1, 0), (0, 1)]);
         *u = sums.map(|[s, ..]| along(&s, &x.value));
         *m = sums.map(|[s, sy, sz]| [along(&s, &x.slope), along(&sy, &x.value), along(&sz, &x.value)]);
     }
