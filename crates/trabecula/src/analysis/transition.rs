@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::grid_depth::depths;
 use crate::blend::Blend;
-use crate::field::Field;
+use crate::field::{Block, Field};
 use crate::solid::Solid;
 use geometry::math::Vec3;
 use geometry::union_find::{find, singles, unite};
@@ -110,12 +110,21 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
 fn sample(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -> Vec3 + Sync)) -> Points {
     let n = blend.weights().len();
     let row = shape[0];
+    let axes = [[0, 1], [1, row], [2, row * shape[1]]]
+        .map(|[a, stride]| -> Vec<f64> { (0..shape[a]).map(|i| at(i * stride)[a]).collect() });
+    // Signs alone count: a region fills them faster than distances.
+    let layers = axes[2].par_iter().map(|z| {
+        let mut region = vec![0f32; row * shape[1]];
+        let layer = Block { axes: [&axes[0], &axes[1], std::slice::from_ref(z)] };
+        solid.region.fill_level(&layer, 0.0, &mut region);
+        region
+    });
+    let region: Vec<f32> = layers.collect::<Vec<_>>().concat();
     let rows: Vec<Vec<Option<Point>>> = (0..shape[1] * shape[2])
         .into_par_iter()
         .map(|r| {
             let places: Vec<Vec3> = (r * row..(r + 1) * row).map(at).collect();
-            let mut region = vec![0.0; row];
-            solid.region.values(&places, &mut region);
+            let region = &region[r * row..(r + 1) * row];
             let inside: Vec<usize> = (0..row).filter(|i| region[*i] <= 0.0).collect();
             let places: Vec<Vec3> = inside.iter().map(|i| places[*i]).collect();
             let zeros = || vec![0.0; places.len()];

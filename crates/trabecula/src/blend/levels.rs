@@ -31,7 +31,7 @@ const BOUND_WINDOWS: usize = 64;
 
 /// What is tabulated of one window.
 pub(super) struct WindowTables {
-    /// The quantiles of each summand's ends, from its samples.
+    /// The quantiles of each summand's ends, from its samples; zeros of lattices, whose quantiles are known.
     own: Vec<[f64; 2]>,
     /// At the nodes that the shares near the window need.
     near: NodeTable,
@@ -124,7 +124,10 @@ impl Levels {
     fn tables(&self, window: usize, summands: &[Summand]) -> &WindowTables {
         self.tables[window].get_or_init(|| {
             let (positions, samples) = self.samples(window, summands);
-            let of = |(s, of): (&Summand, &Vec<f32>)| s.empirical_quantiles(&positions, of);
+            let of = |(s, of): (&Summand, &Vec<f32>)| match s.lattice() {
+                Some(_) => [0.0; 2],
+                None => s.empirical_quantiles(&positions, of),
+            };
             let own: Vec<[f64; 2]> = summands.iter().zip(&samples).map(of).collect();
             WindowTables {
                 near: self.tabulate(summands, &samples, &own, &self.nodes_within(&self.shares_about(window))),
