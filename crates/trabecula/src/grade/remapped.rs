@@ -35,7 +35,7 @@ pub(super) fn sampled(samples: Samples, remap: &Option<Stops>, of: &Quantity) ->
 impl Field for Remapped {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, p) in out.iter_mut().zip(points) {
-            *o = self.stops.at(self.of.at(*p).0).0;
+            *o = self.stops.at(self.of.value_at(*p)).0;
         }
     }
 

@@ -94,26 +94,40 @@ impl Samples {
         let last = (self.shape[a] - 1) as f64;
         let s = (x - self.origin[a]) / self.step[a];
         let inside = s.clamp(0.0, last);
-        let i = (inside as usize).min(self.shape[a].saturating_sub(2));
+        // Conversion through i32 is the fastest; a shape has fewer nodes than that.
+        let i = (inside as i32 as usize).min(self.shape[a].saturating_sub(2));
         (i, inside - i as f64, s == inside && last > 0.0)
+    }
+
+    /// The four edges along x of the cell of a point, each by the numbers at its ends, and the fractions of the cell at the point.
+    #[inline]
+    fn edges(&self, p: Vec3) -> ([[f64; 2]; 4], [(f64, bool); 3]) {
+        let [(i, x, inx), (j, y, iny), (k, z, inz)] =
+            [self.interval(p[0], 0), self.interval(p[1], 1), self.interval(p[2], 2)];
+        let [nx, ny, nz] = self.shape;
+        let edge = |dj: usize, dk: usize| {
+            let (j, k) = ((j + dj).min(ny - 1), (k + dk).min(nz - 1));
+            let row = &self.values[(k * ny + j) * nx..][..nx];
+            [row[i], row[(i + 1).min(nx - 1)]]
+        };
+        ([edge(0, 0), edge(1, 0), edge(0, 1), edge(1, 1)], [(x, inx), (y, iny), (z, inz)])
+    }
+
+    /// The value at a point.
+    #[inline]
+    pub fn value_at(&self, p: Vec3) -> f64 {
+        let (edges, [x, y, z]) = self.edges(p);
+        let on = edges.map(|[a, b]| mix(a, b, x.0));
+        mix(mix(on[0], on[1], y.0), mix(on[2], on[3], y.0), z.0)
     }
 
     /// Value and gradient (per mm) at a point.
     #[inline]
     pub fn at(&self, p: Vec3) -> (f64, Vec3) {
-        let [(i, x, inx), (j, y, iny), (k, z, inz)] =
-            [self.interval(p[0], 0), self.interval(p[1], 1), self.interval(p[2], 2)];
-        let [nx, ny, nz] = self.shape;
-        let v = |di: usize, dj: usize, dk: usize| {
-            let (i, j, k) = ((i + di).min(nx - 1), (j + dj).min(ny - 1), (k + dk).min(nz - 1));
-            self.values[(k * ny + j) * nx + i]
-        };
-        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-        let row = |dj, dk| (v(0, dj, dk), v(1, dj, dk));
-        let rows = [row(0, 0), row(1, 0), row(0, 1), row(1, 1)];
-        let on = rows.map(|(a, b)| mix(a, b, x));
+        let (edges, [(x, inx), (y, iny), (z, inz)]) = self.edges(p);
+        let on = edges.map(|[a, b]| mix(a, b, x));
         let (front, back) = (mix(on[0], on[1], y), mix(on[2], on[3], y));
-        let dx = rows.map(|(a, b)| b - a);
+        let dx = edges.map(|[a, b]| b - a);
         let slope = [
             if inx { mix(mix(dx[0], dx[1], y), mix(dx[2], dx[3], y), z) / self.step[0] } else { 0.0 },
             if iny { mix(on[1] - on[0], on[3] - on[2], z) / self.step[1] } else { 0.0 },
@@ -264,10 +278,15 @@ impl Samples {
     }
 }
 
+#[inline]
+fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
 impl Field for Samples {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, p) in out.iter_mut().zip(points) {
-            *o = self.at(*p).0;
+            *o = self.value_at(*p);
         }
     }
 
