@@ -97,9 +97,10 @@ impl MeshDistance {
         self.tree.nearest(p, seed)
     }
 
-    /// Finds the triangles of which one is nearest to any point of the ball about `center`, whose nearest triangle is `hit`.
-    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, found: &mut Candidates) {
-        self.tree.candidates(center, hit, radius, found);
+    /// Finds the triangles of which one is nearest to any point of the ball about `center`, whose nearest triangle is `hit`;
+    /// false if there are more than `most`.
+    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, most: usize, found: &mut Candidates) -> bool {
+        self.tree.candidates(center, hit, radius, most, found)
     }
 
     /// The nearest triangle to a point of the candidates' ball.
@@ -150,10 +151,9 @@ impl MeshDistance {
 
     /// Fills signed distances (mm) of points; fastest for points that follow each other closely.
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let (mut seed, mut known) = (0, UNKNOWN);
+        let (mut recent, mut known) = (Recent::default(), UNKNOWN);
         for (o, p) in out.iter_mut().zip(points) {
-            let hit = self.tree.nearest(*p, seed);
-            seed = hit.triangle;
+            let hit = recent.nearest(&self.tree, *p);
             *o = self.signed(&hit, *p, known);
             known = (*p, *o);
         }
@@ -161,14 +161,32 @@ impl MeshDistance {
 
     /// Fills signed distances (mm) and their gradients; on the surface the outward normal.
     pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let (mut seed, mut known) = (0, UNKNOWN);
+        let (mut recent, mut known) = (Recent::default(), UNKNOWN);
         for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-            let hit = self.tree.nearest(*p, seed);
-            seed = hit.triangle;
+            let hit = recent.nearest(&self.tree, *p);
             *v = self.signed(&hit, *p, known);
             *g = self.gradient(&hit, *v);
             known = (*p, *v);
         }
+    }
+}
+
+/// The triangles that were found last, the latest first: where rows of points run through a part, from one side of it to the
+/// other, the next point is mostly near one of them.
+#[derive(Default)]
+struct Recent([u32; 4]);
+
+impl Recent {
+    fn nearest(&mut self, tree: &TriangleBvh, p: Vec3) -> Nearest {
+        let square = |t: u32| tree.triangles()[t as usize].nearest(p).0;
+        let each = self.0.map(|t| (square(t), t));
+        let seed = each.into_iter().fold(each[0], |least, one| if one.0 < least.0 { one } else { least }).1;
+        let hit = tree.nearest(p, seed);
+        if !self.0.contains(&hit.triangle) {
+            self.0.rotate_right(1);
+            self.0[0] = hit.triangle;
+        }
+        hit
     }
 }
 

@@ -242,6 +242,7 @@ impl Aabb {
     pub const ALL: Aabb = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
 
     /// The smallest box that holds this one and `p`.
+    #[inline]
     pub fn with(mut self, p: Vec3) -> Aabb {
         for a in 0..3 {
             self.min[a] = self.min[a].min(p[a]);

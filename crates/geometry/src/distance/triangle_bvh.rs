@@ -101,20 +101,22 @@ impl TriangleBvh {
         d * (1.0 + 1e-12) + self.rounding + 1e-14 * largest
     }
 
-    /// Finds the candidates of the ball about `center`, whose nearest triangle is `hit`: those at most twice the radius farther off.
-    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, found: &mut Candidates) {
+    /// Finds the candidates of the ball about `center`, whose nearest triangle is `hit`: those at most twice the radius farther
+    /// off. Gives up, and says so by false, if there are more than `most`.
+    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, most: usize, found: &mut Candidates) -> bool {
         found.center = center;
         found.of.clear();
-        let most = self.at_most(center, hit.square.sqrt() + 2.0 * radius);
-        let limit = most * most;
+        let reach = self.at_most(center, hit.square.sqrt() + 2.0 * radius);
+        let limit = reach * reach;
         self.wide.nearest(center, limit, |k| {
             let square = self.triangles[k].nearest(center).0;
             if square <= limit {
                 found.of.push((square.sqrt(), k as u32));
             }
-            limit
+            if found.of.len() > most { -1.0 } else { limit }
         });
         found.of.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        found.of.len() <= most
     }
 
     /// As `nearest`, of a point in the ball of the candidates.
@@ -133,17 +135,5 @@ impl TriangleBvh {
             }
         }
         best
-    }
-}
-
-impl Candidates {
-    /// Their number.
-    pub fn len(&self) -> usize {
-        self.of.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.of.is_empty()
     }
 }

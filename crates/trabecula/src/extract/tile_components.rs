@@ -61,9 +61,7 @@ impl TileComponents {
     ) -> TileComponents {
         let positions = view.positions();
         let mut root = vec![NONE; positions.len()];
-        for (t, _) in view.triangles(part) {
-            join(&mut root, t);
-        }
+        view.triangles(part).for_each(|(t, _)| join(&mut root, t));
         let (component, mut totals) = number(root, positions);
         let mut add = |sum: &mut Totals, t: [u32; 3], cut: bool| {
             let [a, b, c] = t.map(|v| positions[v as usize]);
@@ -215,9 +213,7 @@ fn border(view: &View, component: &[u32], totals: &mut [Totals]) -> Vec<(u128, u
 /// The triangles of each component, in their order.
 fn sorted(view: &View, part: usize, component: &[u32], count: usize) -> Vec<Vec<([u32; 3], bool)>> {
     let mut of = vec![Vec::new(); count];
-    for (t, cut) in view.triangles(part) {
-        of[component[t[0] as usize] as usize].push((t, cut));
-    }
+    view.triangles(part).for_each(|(t, cut)| of[component[t[0] as usize] as usize].push((t, cut)));
     of
 }
 

@@ -54,6 +54,8 @@ static OUTSIDE: [[f64; 4]; node([1; 3]) + 1] = [[0.0; 4]; node([1; 3]) + 1];
 struct InCell<'a> {
     nodes: &'a [[f64; 4]],
     first: usize,
+    /// Number of the cell along x; not a number outside the region's bounds.
+    number: f64,
     /// Position in the cell as shares of its edges.
     at: Vec3,
 }
@@ -70,15 +72,21 @@ impl DistanceTable {
         DistanceTable { of, range, bounds, step, bricks, made }
     }
 
+    /// A coordinate in cells.
+    #[inline]
+    fn along(&self, axis: usize, x: f64) -> f64 {
+        (x - self.bounds.min[axis]) / self.step
+    }
+
     /// The cell of a point, if it is interpolated there.
     #[inline]
     fn cell(&self, p: Vec3) -> Option<InCell<'_>> {
         if self.range.hi <= 0.0 && (0..3).any(|a| p[a] < self.bounds.min[a] || p[a] > self.bounds.max[a]) {
-            return Some(InCell { nodes: &OUTSIDE, first: 0, at: [0.0; 3] });
+            return Some(InCell { nodes: &OUTSIDE, first: 0, number: f64::NAN, at: [0.0; 3] });
         }
         let (mut brick, mut cell, mut at) = ([0; 3], [0; 3], [0.0; 3]);
         for a in 0..3 {
-            let u = (p[a] - self.bounds.min[a]) / self.step;
+            let u = self.along(a, p[a]);
             // Neither is NaN.
             if !(u >= 0.0 && u < (self.bricks[a] * CELLS) as f64) {
                 return None;
@@ -89,7 +97,8 @@ impl DistanceTable {
         let index = brick[0] + self.bricks[0] * (brick[1] + self.bricks[1] * brick[2]);
         let made = self.made[index].get_or_init(|| Box::new(self.brick(brick)));
         let interpolated = made.interpolated[cell[0] + CELLS * (cell[1] + CELLS * cell[2])];
-        interpolated.then(|| InCell { nodes: &made.nodes, first: node(cell), at })
+        let number = (brick[0] * CELLS + cell[0]) as f64;
+        interpolated.then(|| InCell { nodes: &made.nodes, first: node(cell), number, at })
     }
 
     fn brick(&self, brick: [usize; 3]) -> Brick {
@@ -114,7 +123,7 @@ impl DistanceTable {
         self.of.values(&tested, &mut exact);
         for ((good, cell), exact) in interpolated.iter_mut().zip(each(CELLS)).zip(exact.chunks_exact(TESTED.len())) {
             let near = |(at, exact): (Vec3, &f64)| {
-                let here = InCell { nodes: &nodes, first: node(cell), at }.value();
+                let here = InCell { nodes: &nodes, first: node(cell), number: 0.0, at }.gradient(self.step).0;
                 (self.clamped(here) - self.clamped(*exact)).abs() <= TOLERANCE * self.step
             };
             *good = TESTED.into_iter().zip(exact).all(near);
@@ -131,9 +140,18 @@ impl DistanceTable {
 impl Field for DistanceTable {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         let (mut rest, mut at) = (Vec::new(), Vec::new());
+        let mut line = Line::NONE;
         for (n, (p, o)) in points.iter().zip(out.iter_mut()).enumerate() {
+            let x = self.along(0, p[0]) - line.cell;
+            if p[1..] == line.yz && (0.0..1.0).contains(&x) && p[0] <= self.bounds.max[0] {
+                *o = line.value(x);
+                continue;
+            }
             match self.cell(*p) {
-                Some(cell) => *o = cell.value(),
+                Some(cell) => {
+                    line = Line { yz: [p[1], p[2]], cell: cell.number, ends: cell.line() };
+                    *o = line.value(cell.at[0]);
+                }
                 None => {
                     rest.push(*p);
                     at.push(n);
@@ -183,41 +201,84 @@ const fn node([i, j, k]: [usize; 3]) -> usize {
     i + PLANES * (j + PLANES * k)
 }
 
+/// Numbers at a place between two whose numbers are these, at a share `t` of the way along an axis: Σ wᵢ (dᵢ + ½ ∇dᵢ · (x − xᵢ))
+/// is linear interpolation of all numbers, and for the distance t (1 − t) times the difference of its slopes besides. Axis by
+/// axis it is the sum over the corners of a cell.
+#[inline(always)]
+fn between(axis: usize, t: f64, a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
+    let mut sum = *a;
+    for i in 0..4 {
+        sum[i] += t * (b[i] - a[i]);
+    }
+    sum[0] += t * (1.0 - t) * (a[1 + axis] - b[1 + axis]);
+    sum
+}
+
+/// How fast these numbers change with `t`.
+#[inline(always)]
+fn change(axis: usize, t: f64, a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
+    let mut slope = *b;
+    for i in 0..4 {
+        slope[i] -= a[i];
+    }
+    slope[0] += (1.0 - 2.0 * t) * (a[1 + axis] - b[1 + axis]);
+    slope
+}
+
 impl InCell<'_> {
-    /// Corner i (bit a: whether it is at the far end of axis a): its numbers, and the way from it to the point.
     #[inline(always)]
-    fn corner(&self, i: usize) -> ([f64; 4], Vec3) {
-        let far = [0, 1, 2].map(|a| i >> a & 1);
-        (self.nodes[self.first + node(far)], [0, 1, 2].map(|a| self.at[a] - far[a] as f64))
+    fn node(&self, x: usize, y: usize, z: usize) -> &[f64; 4] {
+        &self.nodes[self.first + node([x, y, z])]
     }
 
+    /// The numbers at both ends of the line along x through the point.
     #[inline]
-    fn value(&self) -> f64 {
-        let mut sum = 0.0;
-        for i in 0..8 {
-            let ([d, gx, gy, gz], [x, y, z]) = self.corner(i);
-            let weight = (1.0 - x.abs()) * (1.0 - y.abs()) * (1.0 - z.abs());
-            sum += weight * (d + gx * x + gy * y + gz * z);
+    fn line(&self) -> [[f64; 4]; 2] {
+        let [_, y, z] = self.at;
+        let mut ends = [[0.0; 4]; 2];
+        for (x, end) in ends.iter_mut().enumerate() {
+            let near = between(2, z, self.node(x, 0, 0), self.node(x, 0, 1));
+            let far = between(2, z, self.node(x, 1, 0), self.node(x, 1, 1));
+            *end = between(1, y, &near, &far);
         }
-        sum
+        ends
     }
 
     /// The value and its gradient, per mm.
     #[inline]
     fn gradient(&self, step: f64) -> (f64, Vec3) {
-        let (mut sum, mut slope) = (0.0, [0.0; 3]);
-        for i in 0..8 {
-            let ([d, gx, gy, gz], r) = self.corner(i);
-            let value = d + gx * r[0] + gy * r[1] + gz * r[2];
-            let [x, y, z] = r.map(|r| 1.0 - r.abs());
-            // The weight of a far corner grows along its axis, that of a near one falls.
-            let up = [0, 1, 2].map(|a| if i >> a & 1 == 1 { value } else { -value });
-            sum += x * y * z * value;
-            slope[0] += y * z * (up[0] + x * gx);
-            slope[1] += z * x * (up[1] + y * gy);
-            slope[2] += x * y * (up[2] + z * gz);
+        let [x, y, z] = self.at;
+        // At both ends of the line along x: the numbers, and how they change along y and z.
+        let (mut ends, mut along_y, mut along_z) = ([[0.0; 4]; 2], [[0.0; 4]; 2], [[0.0; 4]; 2]);
+        for i in 0..2 {
+            let [a, b] = [self.node(i, 0, 0), self.node(i, 0, 1)];
+            let [c, d] = [self.node(i, 1, 0), self.node(i, 1, 1)];
+            let (near, far) = (between(2, z, a, b), between(2, z, c, d));
+            ends[i] = between(1, y, &near, &far);
+            along_y[i] = change(1, y, &near, &far);
+            along_z[i] = between(1, y, &change(2, z, a, b), &change(2, z, c, d));
         }
-        (sum, slope.map(|s| s / step))
+        let [[a, b], [ay, by], [az, bz]] = [ends, along_y, along_z];
+        let slope = [change(0, x, &a, &b)[0], between(0, x, &ay, &by)[0], between(0, x, &az, &bz)[0]];
+        (between(0, x, &a, &b)[0], [slope[0] / step, slope[1] / step, slope[2] / step])
+    }
+}
+
+/// A line along x through a cell: points that follow each other on it share all but the last step.
+struct Line {
+    yz: [f64; 2],
+    /// Number of the cell along x; not a number for none.
+    cell: f64,
+    ends: [[f64; 4]; 2],
+}
+
+impl Line {
+    const NONE: Line = Line { yz: [0.0; 2], cell: f64::NAN, ends: [[0.0; 4]; 2] };
+
+    /// The value at a share of the cell.
+    #[inline]
+    fn value(&self, x: f64) -> f64 {
+        between(0, x, &self.ends[0], &self.ends[1])[0]
     }
 }
 

@@ -7,7 +7,7 @@ use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use geometry::distance::triangle::Triangle;
-use geometry::distance::triangle_bvh::Candidates;
+use geometry::distance::triangle_bvh::{Candidates, Nearest};
 use geometry::distance::{MeshDistance, UNKNOWN};
 use geometry::fault::Fault;
 use geometry::feature_edges::{Creases, creases};
@@ -127,7 +127,7 @@ impl Shape for MeshRegion {
         let widest = |axis: &[f64]| axis.windows(2).fold(0.0f64, |m, w| m.max(w[1] - w[0]));
         let cell = norm(block.axes.map(widest));
         let shape = block.shape();
-        let mut fill = Fill { region: self, block, level, cell, out, candidates: Candidates::default() };
+        let mut fill = Fill { region: self, block, level, cell, out, candidates: Candidates::default(), few: false };
         fill.part([0; 3], shape, 0, UNKNOWN);
     }
 
@@ -166,11 +166,14 @@ struct Fill<'a> {
     /// Diagonal of the largest grid cell.
     cell: f64,
     out: &'a mut [f32],
-    /// A buffer.
+    /// The triangles of which one is nearest to any node of the part that is being filled, once they are few.
     candidates: Candidates,
+    few: bool,
 }
 
-/// Candidates beyond which each node is searched for by itself.
+/// Candidates are looked for in parts of at most this many nodes, and used if they are no more than these: else each node is
+/// searched for by itself.
+const PART: usize = 64;
 const MOST_CANDIDATES: usize = 32;
 
 impl Fill<'_> {
@@ -179,35 +182,45 @@ impl Fill<'_> {
         let ends = [0, 1, 2].map(|a| [self.block.axes[a][lo[a]], self.block.axes[a][hi[a] - 1]]);
         let center = ends.map(|[a, b]| a + (b - a) / 2.0);
         let size = ends.map(|[a, b]| b - a);
-        let hit = self.region.distance.nearest(center, seed);
+        let hit = self.nearest(center, seed);
         let known = (center, self.region.distance.signed(&hit, center, known));
         let d = known.1 - self.level;
         if d.abs() > (norm(size) / 2.0 + self.cell) * (1.0 + 1e-9) {
             self.each(lo, hi, |_, p| (d.abs() - norm(sub(p, center))).copysign(d));
             return;
         }
+        let count = (0..3).map(|a| hi[a] - lo[a]).product::<usize>();
+        let found = !self.few && count <= PART;
+        if found {
+            let radius = norm(size) / 2.0 * (1.0 + 1e-9);
+            let Fill { region, candidates, .. } = self;
+            self.few = region.distance.candidates(center, &hit, radius, MOST_CANDIDATES, candidates);
+        }
         let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
-        if (0..3).map(|a| hi[a] - lo[a]).product::<usize>() <= 8 || hi[longest] - lo[longest] < 2 {
+        if count <= 8 || hi[longest] - lo[longest] < 2 {
             let (mut seed, mut known) = (hit.triangle, known);
-            self.region.distance.candidates(center, &hit, norm(size) / 2.0 * (1.0 + 1e-9), &mut self.candidates);
-            let few = self.candidates.len() <= MOST_CANDIDATES;
             self.each(lo, hi, |fill, p| {
-                let hit = match few {
-                    true => fill.region.distance.nearest_of(&fill.candidates, p),
-                    false => fill.region.distance.nearest(p, seed),
-                };
+                let hit = fill.nearest(p, seed);
                 seed = hit.triangle;
                 known = (p, fill.region.distance.signed(&hit, p, known));
                 known.1 - fill.level
             });
-            return;
+        } else {
+            let middle = (lo[longest] + hi[longest]) / 2;
+            let (mut end, mut begin) = (hi, lo);
+            end[longest] = middle;
+            begin[longest] = middle;
+            self.part(lo, end, hit.triangle, known);
+            self.part(begin, hi, hit.triangle, known);
         }
-        let middle = (lo[longest] + hi[longest]) / 2;
-        let (mut end, mut begin) = (hi, lo);
-        end[longest] = middle;
-        begin[longest] = middle;
-        self.part(lo, end, hit.triangle, known);
-        self.part(begin, hi, hit.triangle, known);
+        self.few &= !found;
+    }
+
+    fn nearest(&self, p: Vec3, seed: u32) -> Nearest {
+        match self.few {
+            true => self.region.distance.nearest_of(&self.candidates, p),
+            false => self.region.distance.nearest(p, seed),
+        }
     }
 
     fn each(&mut self, lo: [usize; 3], hi: [usize; 3], mut value: impl FnMut(&Self, Vec3) -> f64) {

@@ -56,9 +56,10 @@ impl FeatureCells<'_> {
         }
         let id = self.local.live[surface];
         let scale = self.grid.surfaces[id].lipschitz * self.grid.step;
-        let (v, least) = (f64::from(self.samples[surface][node]), self.grid.margin * scale);
+        let (sample, least) = (self.samples[surface][node], self.grid.margin * scale);
+        let v = f64::from(sample);
         let v = if self.perturbed_nodes.contains(&node) { v + SHIFT * scale * self.noise(id, node) } else { v };
-        if self.signs.is_negative(surface, node) { v.min(-least) } else { v.max(least) }
+        if self.is_sample_negative(surface, sample) { v.min(-least) } else { v.max(least) }
     }
 
     /// A pseudo-random number between −1 and 1 that depends on the surface and the node alone.
@@ -220,11 +221,16 @@ impl FeatureCells<'_> {
         self.crossings(&edge).into_iter().map(name).collect()
     }
 
-    fn is_negative(&self, surface: usize, node: usize) -> bool {
+    pub(in crate::extract) fn is_negative(&self, surface: usize, node: usize) -> bool {
         match node.checked_sub(self.nodes.count()) {
             Some(point) => self.divided_faces.value(point, surface) <= 0.0,
-            None => self.signs.is_negative(surface, node),
+            None => self.is_sample_negative(surface, self.samples[surface][node]),
         }
+    }
+
+    /// Whether a sample counts as negative: what the words of signs say, without looking for the node's bit.
+    fn is_sample_negative(&self, surface: usize, sample: f32) -> bool {
+        sample < 0.0 || (sample == 0.0 && self.grid.surfaces[self.local.live[surface]].cut)
     }
 
     /// The surfaces that are negative at all corners, and those that change sign between them.

@@ -116,11 +116,9 @@ impl FeatureCells<'_> {
             boundary.push((corners.len(), None));
             corners.push(Corner { id: ring[i], code: i, key: VertexId::new(ring[i], &[], &[]) });
             let (node, along) = (ring[i].min(ring[(i + 1) % 4]), if i % 2 == 0 { u } else { v });
-            let mut points: Vec<_> = self.points_of(node, along, surface).into_iter().enumerate().collect();
-            if i > 1 {
-                points.reverse();
-            }
-            for (n, (key, position)) in points {
+            let points = self.points_of(node, along, surface);
+            let order = if i > 1 { [1, 0] } else { [0, 1] };
+            for (n, (key, position)) in order.into_iter().filter_map(|n| Some((n, points[n]?))) {
                 solid = !solid;
                 boundary.push((corners.len(), Some(solid)));
                 let id = self.point(key, position, |k| {

@@ -92,18 +92,17 @@ impl FeatureCells<'_> {
     }
 
     /// The crossings of the fitted surface with a grid edge, the lower one first.
-    pub(super) fn points_of(&self, node: usize, axis: usize, surface: usize) -> Vec<(VertexId, Vec3)> {
+    pub(super) fn points_of(&self, node: usize, axis: usize, surface: usize) -> [Option<(VertexId, Vec3)>; 2] {
         if let Some(points) = self.edges.double_crossings.get(&(surface, node, axis)) {
-            return (0..2).map(|i| (VertexId::crossing(node, axis, surface, i), points[i])).collect();
+            return [0, 1].map(|i| Some((VertexId::crossing(node, axis, surface, i), points[i])));
         }
-        let ends = [node, node + self.offset(1 << axis)];
-        let [p, q] = ends.map(|n| self.signs.is_negative(surface, n));
+        let [p, q] = [node, node + self.nodes.stride[axis]].map(|n| self.is_negative(surface, n));
+        if p == q {
+            return [None; 2];
+        }
         let key = VertexId::new(node, &[1 << axis], &[surface]);
-        match self.numbered(key) {
-            Some(v) if p != q => vec![(key, self.positions[v as usize])],
-            _ if p != q => vec![(key, self.position(key))],
-            _ => Vec::new(),
-        }
+        let position = self.numbered(key).map_or_else(|| self.position(key), |v| self.positions[v as usize]);
+        [Some((key, position)), None]
     }
 
     /// The crossing of another surface with a grid edge that the fitted surface crosses too: interpolated between the nodes,
@@ -147,8 +146,8 @@ impl FeatureCells<'_> {
     /// The crossings of the fitted surface with a grid edge, as shares of it; and those of the other surfaces in order: the
     /// number of fitted crossings before each, its interpolated share, and its surface.
     fn order_along(&self, node: usize, axis: usize, fitted: usize) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
-        let points = self.points_of(node, axis, fitted);
-        let at: Vec<f64> = points.iter().map(|p| self.share_of(node, axis, p.1)).collect();
+        let points = self.points_of(node, axis, fitted).into_iter().flatten();
+        let at: Vec<f64> = points.map(|p| self.share_of(node, axis, p.1)).collect();
         if at.is_empty() {
             return (at, Vec::new());
         }

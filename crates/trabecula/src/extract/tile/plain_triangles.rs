@@ -26,7 +26,11 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, o
     }
 }
 
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+avx512vpopcntdq+bmi1+bmi2+popcnt+lzcnt",
+    "x86_64+avx2+bmi1+bmi2+popcnt+lzcnt",
+    "aarch64+neon"
+))]
 fn list_patches(
     signs: &Signs,
     local: &LocalSolid,
@@ -61,8 +65,15 @@ fn list_patches(
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
-            let crossed = EDGES.map(|(corner, axis)| numbers.crossed[axis][rows[corner >> 1]]);
-            let first = EDGES.map(|(corner, axis)| numbers.offset[axis][rows[corner >> 1]]);
+            // Of edges at the cell's upper nodes along x one step on, so that of each the same crossings come before.
+            let mut crossed = EDGES.map(|(corner, axis)| numbers.crossed[axis][rows[corner >> 1]]);
+            let mut first = EDGES.map(|(corner, axis)| numbers.offset[axis][rows[corner >> 1]]);
+            for (e, (corner, _)) in EDGES.iter().enumerate() {
+                if corner & 1 == 1 {
+                    first[e] += (crossed[e] & 1) as u32;
+                    crossed[e] >>= 1;
+                }
+            }
             let negative = rows.map(|r| signs.negative[surface][r]);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize;
@@ -73,10 +84,10 @@ fn list_patches(
                 let case = &cases[corners];
                 // All edges, crossed or not, and room for the most triangles: to count them takes longer. Sixteen
                 // names, so that four bits never lead outside.
-                let below = [(1u64 << i) - 1, (2u64 << i) - 1];
+                let below = (1u64 << i) - 1;
                 let mut names = [0u32; 16];
-                for (e, &(corner, _)) in EDGES.iter().enumerate() {
-                    names[e] = first[e] + (crossed[e] & below[corner & 1]).count_ones();
+                for e in 0..EDGES.len() {
+                    names[e] = first[e] + (crossed[e] & below).count_ones();
                 }
                 let mut kind = if mine >> i & 1 == 1 { kind } else { Kind::Neighbour };
                 if fill_edge_cell[row] >> i & 1 == 1 {
