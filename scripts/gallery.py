@@ -13,7 +13,7 @@ STAMP = "<!-- Made by scripts/gallery.py; do not edit. -->"
 SIZE = (640, 520)
 #: Example, samples on the smallest wavelength, azimuth and elevation of the camera (degrees).
 SHOWN = (
-    ("hybrid_stem", 24, 70, 12),
+    ("hybrid_stem", 20, 70, 12),
     ("kelvin_stem", 32, 240, 12),
     ("stress_bracket", 20, 300, 20),
     ("heat_exchanger", 24, 30, 35),
@@ -35,7 +35,7 @@ SHOWN = (
 def about(path):
     """The comment at the head of a design, in one paragraph."""
     lines = []
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in path.read_text(encoding="utf-8").removeprefix("#:schema ../schema/design.json\n\n").splitlines():
         words = line.removeprefix("#").strip()
         if not line.startswith("#") or not words:
             break
