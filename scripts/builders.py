@@ -9,7 +9,7 @@ import json
 import sys
 import textwrap
 
-from kinds import ROOT, SCHEMA, alternatives, keys, limits, resolved, words
+from kinds import ROOT, SCHEMA, alternatives, keys, kinds, limits, resolved, types, words
 
 STAMP = "# Made by scripts/builders.py from schema/design.json; do not edit."
 
@@ -26,15 +26,11 @@ FAMILIES = {
 def annotation(schema):
     """The Python type of a value."""
     of = resolved(schema)
-    for join in ("anyOf", "oneOf"):
-        if join in of:
-            return " | ".join(dict.fromkeys(annotation(s) for s in of[join]))
-    if "const" in of or "enum" in of:
-        return "str"
-    kinds = {"number": "float", "integer": "int", "boolean": "bool", "string": "str", "object": "dict"}
-    if of.get("type") == "array":
-        return f"Sequence[{annotation(of['items'])}]"
-    return kinds[of["type"]]
+    if "type" not in of and "anyOf" in of:
+        return " | ".join(dict.fromkeys(annotation(s) for s in of["anyOf"]))
+    names = {"number": "float", "integer": "int", "boolean": "bool", "string": "str", "object": "dict"}
+    items = f"Sequence[{annotation(of['items'])}]" if "items" in of else ""
+    return " | ".join(names.get(kind, items) for kind in types(of))
 
 
 def literal(schema):
@@ -58,7 +54,7 @@ def sentence(name, schema, required):
 def arguments(table):
     """The keys of a table as arguments: name, schema, whether it is required, whether a keyword. Of alternatives none is."""
     out, keyword, several = {}, {}, len(alternatives(table)) > 1
-    control = [list(part["properties"]) for part in alternatives(table)] == [["points"], ["path"]]
+    control = [part["keys"] for part in alternatives(table)] == [["points"], ["path"]]
     for name, schema, required, number in keys(table):
         if control and name == "path":
             continue
@@ -117,7 +113,7 @@ def wrapped(head, items, tail, indent=""):
 
 def builder(name, schema):
     """The lines of one function."""
-    of = resolved(schema["properties"][name])
+    of = resolved(schema)
     if of.get("type") == "array":
         least = of.get("minItems", 0)
         first = ["first: dict, "] if least == 2 else []
@@ -147,21 +143,18 @@ def builder(name, schema):
 
 def module(definition, text):
     """The text of a module."""
-    parts = []
-    for choice in SCHEMA["$defs"][definition]["oneOf"]:
-        (name,) = choice["properties"]
-        parts.append((name, builder(name, choice)))
+    parts = [(name, builder(name, schema)) for name, schema in kinds(SCHEMA["$defs"][definition])]
     body = "\n".join(line for _, lines in parts for line in lines)
     lines = [STAMP, f'"""{text}"""', "", "from __future__ import annotations", ""]
     used = ["import os"] * ("os." in body)
     used.append("from collections.abc import " + ", ".join(n for n in ("Mapping", "Sequence") if f"{n}[" in body))
     used += ["from typing import Literal"] * ("Literal[" in body)
     helpers = ["Points", "Stops", "control", "numbered", "pairs", "settings"]
-    given = [n for n in helpers if (f": {n}" if n[0].isupper() else f"{n}(") in body]
+    given = sorted(["named", *(n for n in helpers if (f": {n}" if n[0].isupper() else f"{n}(") in body)])
     lines += [*used, "", f"from .given import {', '.join(given)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")
     for _, function in parts:
-        lines += ["", "", *function]
+        lines += ["", "", "@named", *function]
     return "\n".join(lines) + "\n"
 
 

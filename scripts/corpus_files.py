@@ -62,6 +62,31 @@ def open_box(size):
     return np.array([[corner[i] for i in t] for a, b, c, d in sides for t in ((a, b, c), (a, c, d))], dtype=float)
 
 
+def tiff(pictures):
+    """A TIFF of grey pictures of eight bits, one above the other: an array of layers, rows, columns."""
+    data, out = np.asarray(pictures, "u1"), bytearray(b"II*\0\0\0\0\0")
+    last = 4
+    for layer in data:
+        place = len(out)
+        out += layer.tobytes()
+        out += bytes(len(out) % 2)
+        out[last : last + 4] = np.uint32(len(out)).tobytes()
+        rows, columns = layer.shape
+        # Width, height, bits, no compression, black is 0, where the rows are, one sample, rows in the strip, bytes in it.
+        tags = {256: columns, 257: rows, 258: 8, 259: 1, 262: 1, 273: place, 277: 1, 278: rows, 279: layer.size}
+        out += np.uint16(len(tags)).tobytes()
+        out += b"".join(np.array([tag, 4], "<u2").tobytes() + np.array([1, v], "<u4").tobytes() for tag, v in tags.items())
+        last = len(out)
+        out += bytes(4)
+    return bytes(out)
+
+
+def scan():
+    """The grey values of scan.tif: bright in the middle half of sixteen layers."""
+    layer = np.arange(16)
+    return np.broadcast_to(np.where((layer >= 4) & (layer < 12), 200, 50)[:, None, None], (16, 4, 4))
+
+
 def stl(triangles):
     """A binary STL."""
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("mark", "<u2")])
@@ -124,6 +149,7 @@ def main():
     np.save(FILES / "slab.npy", plate(y, z).astype(float))
     t = np.arange(8) / 8
     np.save(FILES / "rods.npy", np.broadcast_to(rods(t[:, None, None], t[None, :, None]), (8, 8, 8)).copy())
+    (FILES / "scan.tif").write_bytes(tiff(scan()))
     rows = [f"{x:g},{y:g},{z:g},{v:g}" for x in (0, 8) for y, z, v in SCATTER]
     (FILES / "scatter.csv").write_text("\n".join(["x,y,z,value", *rows]) + "\n", encoding="utf-8")
     nodes, tets = blocks((4, 3, 2), 2.0)

@@ -4,7 +4,7 @@
 import json
 import sys
 
-from kinds import ROOT, SCHEMA, alternatives, keys, limits, resolved, words
+from kinds import ROOT, SCHEMA, alternatives, keys, kinds, limits, listed, resolved, types
 
 PAGE = ROOT / "docs" / "reference" / "design-file.md"
 MARK = "<!-- Below: made by scripts/design_page.py from schema/design.json; do not edit. -->\n"
@@ -19,18 +19,24 @@ def form(schema):
     """What a value is."""
     if "$ref" in schema:
         return anchor(schema["$ref"].rsplit("/", 1)[-1])
-    for join in ("anyOf", "oneOf", "allOf"):
-        if join in schema:
-            return " or ".join(dict.fromkeys(form(s) for s in schema[join] if s.get("type") != "null"))
-    if "const" in schema or "enum" in schema:
-        return ", ".join(f"`{v}`" for v in schema.get("enum", [schema.get("const")]))
-    if schema.get("type") == "array":
+    if "items" not in schema and "anyOf" in schema and "then" not in schema:
+        return " or ".join(dict.fromkeys(form(s) for s in schema["anyOf"]))
+    return " or ".join(dict.fromkeys(form_of(kind, schema) for kind in types(schema)))
+
+
+def form_of(kind, schema):
+    """What a value of a JSON type is."""
+    if kind == "string" and ("enum" in schema or (len(types(schema)) > 1 and "then" in schema)):
+        words = schema if "enum" in schema else schema["then"]
+        return form(words) if "$ref" in words else ", ".join(f"`{v}`" for v in words["enum"])
+    if kind == "array":
         count = str(schema["minItems"]) + " × " if schema.get("minItems") == schema.get("maxItems", 0) else "list of "
         return count + form(schema["items"]) if "items" in schema else "list"
-    if isinstance(schema.get("additionalProperties"), dict):
+    if kind == "object" and "x-kind" in schema:
+        return anchor(schema["x-kind"])
+    if kind == "object" and isinstance(schema.get("additionalProperties"), dict):
         return f"names, each {form(schema['additionalProperties'])}"
-    kind = schema.get("type", "anything")
-    return kind if isinstance(kind, str) else " or ".join(w for w in kind if w != "null")
+    return kind
 
 
 def cell(text):
@@ -38,37 +44,39 @@ def cell(text):
     return " ".join(str(text).split()).replace("|", "\\|")
 
 
-def row(name, schema, required, number, several):
-    """A key."""
-    needed = "yes" if required else ""
-    if number and several:
-        needed = f"yes ({number})" if required else f"({number})"
-    if "default" in schema:
-        needed = f"`{json.dumps(schema['default'])}`"
+def row(name, schema, needed, numbers):
+    """A key; ``numbers`` are those of the alternatives that have it, ``needed`` of those that need it (0 is the table)."""
+    alone = [n for n in numbers if n not in needed]
+    told = [f"yes ({', '.join(map(str, needed))})" if numbers else "yes"] if needed else []
+    told += [f"({', '.join(map(str, alone))})"] if alone else []
+    told = f"`{json.dumps(schema['default'])}`" if "default" in schema else ", ".join(told)
     unit = " ".join(w for w in (schema.get("x-unit", ""), limits(schema)) if w)
-    return f"| `{name}` | {form(schema)} | {cell(unit)} | {needed} | {cell(schema.get('description', ''))} |"
+    return f"| `{name}` | {form(schema)} | {cell(unit)} | {told} | {cell(schema.get('description', ''))} |"
+
+
+def rows(of):
+    """The keys of a table, each once."""
+    found = {}
+    for name, schema, required, number in keys(of):
+        _, needed, numbers = found.setdefault(name, (schema, [], []))
+        needed += [number] * required
+        numbers += [number] * bool(number)
+    return [row(name, schema, needed, numbers) for name, (schema, needed, numbers) in found.items()]
 
 
 def section(name, of):
     """A definition: its keys, its kinds, or its words."""
     lines = [f'<a id="{name.lower()}"></a>', "", f"### {name}", "", cell(of.get("description", "")).replace("\\|", "|"), ""]
-    tables = [p for p in of.get("oneOf", []) if "properties" in p]
-    if "properties" in of or alternatives(of):
-        several = len(alternatives(of)) > 1
-        if several:
+    if kinds(of) or listed(of):
+        lines += ["| kind | is | |", "|---|---|---|"]
+        lines += [f'| `"{word}"` | | {cell(meaning)} |' for word, meaning in listed(of)]
+        lines += [f"| `{key}` | {form(value)} | {cell(value.get('description', ''))} |" for key, value in kinds(of)]
+        return [*lines, ""]
+    if "properties" in of:
+        if alternatives(of):
             lines += ["Of the keys with a number, those of one number are given.", ""]
         lines += ["| key | is | unit, range | needed or default | |", "|---|---|---|---|---|"]
-        return [*lines, *(row(*key, several) for key in keys(of)), ""]
-    if tables or words(of):
-        lines += ["| kind | is | |", "|---|---|---|"]
-        for part in of["oneOf"]:
-            if "properties" in part:
-                ((key, value),) = part["properties"].items()
-                lines.append(f"| `{key}` | {form(value)} | {cell(part.get('description', ''))} |")
-            else:
-                known = ", ".join(f'`"{w}"`' for w in part.get("enum", [part.get("const")]))
-                lines.append(f"| {known} | | {cell(part.get('description', ''))} |")
-        return [*lines, ""]
+        return [*lines, *rows(of), ""]
     return [*lines, form(of) + ".", ""]
 
 

@@ -42,6 +42,26 @@ def test_builders_return_plain_data():
         lt.cell.gyriod()
 
 
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: lt.map.affine(wavelenght=4), "affine has no argument wavelenght; did you mean wavelength? It takes"),
+        (lambda: lt.region.box(sise=[1, 1, 1]), "did you mean size?"),
+        (lambda: lt.grade.linear(along=[0, 0, 1], stop=[[0, 1]]), "did you mean stops?"),
+        (lambda: lt.cell.series(term=[]), "did you mean terms?"),
+        (lambda: lt.level.fraction(0.3, thicknes=1), "did you mean thickness?"),
+        (lambda: lt.blend.between("a", "b", wieght=0.5), "did you mean weight?"),
+        (lambda: lt.Lattice(cell="gyroid", prat="sheet"), "Lattice has no argument prat; did you mean part?"),
+        (lambda: lt.Beams(cell="octet", radius=1, filet="auto"), "did you mean fillet?"),
+        (lambda: lt.Design(region={}, latice={}), "did you mean lattice?"),
+        (lambda: lt.skin(zzz=1), r"skin has no argument zzz\. It takes thickness, open"),
+    ],
+)
+def test_a_misspelt_argument_names_the_nearest(call, words):
+    with pytest.raises(TypeError, match=words.replace("?", r"\?")):
+        call()
+
+
 def test_a_design_is_saved_and_loaded(tmp_path):
     """Same data through TOML and JSON, and the same solid."""
     design = cube(level=lt.level.fraction(lt.grade.linear([0, 0, 1], {-4: 0.2, 4: 0.4})))

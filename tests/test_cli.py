@@ -57,6 +57,12 @@ def test_starter_meshes_at_once(tmp_path):
     assert "exists" in run("new", "a.toml", cwd=tmp_path, status=1).stderr
     run("new", "a.toml", "--force", cwd=tmp_path)
     assert '"gyroid"' in run("new", "b.toml", "--cell", "gyriod", cwd=tmp_path, status=1).stderr
+    run("new", "c/c.toml", "--schema", cwd=tmp_path, status=1)
+    (tmp_path / "c").mkdir()
+    run("new", "c/c.toml", "--schema", cwd=tmp_path)
+    assert (tmp_path / "c" / "c.toml").read_text().startswith("#:schema ./design-schema.json\n")
+    assert (tmp_path / "c" / "design-schema.json").read_text() == run("schema", cwd=tmp_path).stdout
+    run("check", "c/c.toml", cwd=tmp_path)
     assert names(tmp_path) == ["a.STL", "a.toml"]
 
 

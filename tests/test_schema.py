@@ -63,6 +63,62 @@ def test_the_schema_refuses_what_the_reader_refuses(tmp_path, keys, value):
         _core.Design.from_data(data)
 
 
+@pytest.mark.parametrize(
+    ("keys", "word"),
+    [
+        (["regoin"], "regoin"),
+        (["region", "bocks"], "bocks"),
+        (["region", "box", "sise"], "sise"),
+        (["lattice", "core", "prat"], "prat"),
+        (["lattice", "core", "cell", "seres"], "seres"),
+        (["lattice", "core", "map", "afine"], "afine"),
+        (["lattice", "core", "map", "affine", "wavelenght"], "wavelenght"),
+        (["lattice", "core", "level", "fracton"], "fracton"),
+        (["lattice", "core", "level", "fraction", "liner"], "liner"),
+        (["lattice", "core", "level", "fraction", "linear", "alon"], "alon"),
+        (["skin", "opne"], "opne"),
+    ],
+)
+@pytest.mark.parametrize("draft", ["Draft202012Validator", "Draft7Validator"])
+def test_the_schema_names_a_misspelt_key(keys, word, draft):
+    """What an editor shows first is the key itself, whatever else is then missing; also where it knows draft 7 alone."""
+    jsonschema = pytest.importorskip("jsonschema")
+    data = {
+        "schema": 1,
+        "region": {"box": {"size": [8, 8, 8]}},
+        "lattice": {
+            "core": {"cell": "gyroid", "part": "sheet", "map": {"affine": {"wavelength": 4}}, "level": {"fraction": 0.3}}
+        },
+        "skin": {"thickness": 1},
+    }
+    place = data
+    for key in keys[:-1]:
+        if not isinstance(place.get(key), dict):
+            place[key] = {}
+        place = place[key]
+    place[keys[-1]] = 3
+    errors = getattr(jsonschema, draft)(json.loads(_core.schema())).iter_errors(data)
+    assert f"'{word}' was unexpected" in jsonschema.exceptions.best_match(errors).message
+
+
+def test_no_alternatives_hide_what_is_wrong():
+    """Kinds are optional keys of one table, and values of several types have the keywords of all: no `oneOf` is left, and
+    `anyOf` only where it offers words, tells lists of different lengths or what a design or a set of keys needs."""
+
+    def walk(node):
+        if isinstance(node, dict):
+            assert "oneOf" not in node
+            for choice in node.get("anyOf", []):
+                assert not choice or {"enum", "$ref", "required", "minItems"} & set(choice), choice
+            for below in node.values():
+                walk(below)
+        elif isinstance(node, list):
+            for below in node:
+                walk(below)
+
+    walk(json.loads(_core.schema()))
+
+
 def test_the_command_prints_the_schema(tmp_path):
     """What an installed package prints is the schema of the repository, without any file of it."""
     done = subprocess.run(

@@ -9,9 +9,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from .given import plain, settings
+from .given import named, plain, settings
 
 __all__ = ["file", "group", "names", "series", "term", "tet", "tet_facts", "tet_names"]
 
@@ -23,6 +24,7 @@ def names() -> list[str]:
     return [c[0] for c in _core.cells()]
 
 
+@named
 def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, component: str = "re") -> dict:
     """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``.
 
@@ -39,6 +41,7 @@ def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, compone
     return made
 
 
+@named
 def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
     """A cell as the sum of its terms; with ``group``, each of them summed over that space group.
 
@@ -52,13 +55,26 @@ def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
     return {"series": made}
 
 
-def file(path: str, terms: int | None = None) -> dict:
-    """A cell from a file: numbers over one period (npy), or a mesh of the solid in one cell; its largest ``terms`` waves.
+@named
+def file(
+    path: str | os.PathLike[str],
+    terms: int | None = None,
+    threshold: float | None = None,
+    step: float | Sequence[float] | None = None,
+    period: float | Sequence[float] | None = None,
+) -> dict:
+    """A cell from a file: numbers over one period (npy), grey pictures one above the other (png, tif; "scan/*.png" or the
+    folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves.
 
-    A mesh has the value 1 inside and 0 outside, so ``part="upper"`` with ``iso`` 0.5 is the solid itself, but for what the
-    waves leave out: ``truncation`` in a solid's report.
+    Of a mesh the function is the signed periodic distance, positive inside and in edges of the cell, so ``part="upper"`` with
+    ``iso`` 0 is the solid itself, but for what the waves leave out: ``truncation`` in a solid's report. ``period`` (mm, one
+    or three) is that of a mesh smaller than it, about its middle.
+
+    With ``threshold`` numbers above it are solid, and the function is their signed periodic distance too, numbers being
+    ``step`` (mm, one or three) apart; without it the function is the numbers.
     """
-    return {"file": {"path": path} | ({} if terms is None else {"terms": terms})}
+    more = settings(terms=terms, threshold=threshold, step=step, period=period)
+    return {"file": {"path": os.fspath(path), **more}}
 
 
 def tet_names() -> list[str]:
@@ -78,6 +94,7 @@ def tet_facts(name: str) -> dict:
     return json.loads(_core.tet_cell_facts(name))
 
 
+@named
 def tet(
     name: str | None = None,
     *,

@@ -159,6 +159,7 @@ COMMANDS = {
         ],
         file("--part", MESH_READS, "the part to fill, a closed mesh; without it a box", "PART"),
         option("--skin", type=LENGTH, metavar="MM", help="a skin of this thickness, mm"),
+        option("--schema", action="store_true", help="also write design-schema.json, by which editors complete and check keys"),
         option("--force", action="store_true", help="replace the file if it exists"),
     ),
     "check": (

@@ -29,6 +29,10 @@ from .texts import counted, intervals, table, voids
 __all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "tets", "voxels"]
 
 
+#: The JSON Schema beside a new design.
+SCHEMA_FILE = "design-schema.json"
+
+
 def new(args) -> None:
     """``trabecula new``."""
     known_cell(args.cell, cell.names())
@@ -37,15 +41,21 @@ def new(args) -> None:
     if os.path.exists(args.file) and not args.force and not os.path.isdir(args.file):
         raise Refused(f"{args.file} exists; choose another name, or replace it with --force")
     check_place(args.file)
+    beside = os.path.join(os.path.dirname(args.file), SCHEMA_FILE) if args.schema else None
+    if beside:
+        check_place(beside)
     part = None
     if args.part:
         low, high = region_of_file(args.part).bounds
         path = os.path.relpath(os.path.abspath(args.part), os.path.dirname(os.path.abspath(args.file)))
         part = (path.replace(os.sep, "/"), [b - a for a, b in zip(low, high, strict=True)])
     meshes = "/".join(MESH_READS).upper()
-    text = starter(os.path.basename(args.file), args.cell, args.beams, part, args.skin, meshes)
-    with whole_file(args.file) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write(text)
+    named = SCHEMA_FILE if args.schema else None
+    texts = [(args.file, starter(os.path.basename(args.file), args.cell, args.beams, part, args.skin, meshes, named))]
+    texts += [(beside, _core.schema())] if beside else []
+    for name, text in texts:
+        with whole_file(name) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+            out.write(text)
     say(f"{args.file} written; next: trabecula check {args.file}")
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from . import _core
 from .errors import DesignError, DesignWarning
 from .files import extension, read_text, whole_file
-from .given import copied, settings, three
+from .given import copied, named, settings, three
 
 if TYPE_CHECKING:
     from .solid import Solid
@@ -23,6 +23,7 @@ PATHS = ("path", "nodes", "struts")
 __all__ = ["Beams", "Design", "Lattice", "load", "skin", "spartan"]
 
 
+@named
 @dataclass(frozen=True)
 class Lattice:
     """A lattice: cell, map from position to phase, part, and level.
@@ -41,6 +42,7 @@ class Lattice:
         return {"cell": self.cell, "part": self.part, "map": self.map, "level": self.level}
 
 
+@named
 @dataclass(frozen=True)
 class Beams:
     """A graph of beams: a unit cell (``beams.names()``) on a ``map``, or ``nodes`` and ``struts`` of your own.
@@ -74,6 +76,7 @@ class Beams:
         return settings(**{f.name: getattr(self, f.name) for f in fields(self)})
 
 
+@named
 def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
     """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
 
@@ -88,6 +91,7 @@ def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> d
     return made
 
 
+@named
 @dataclass(frozen=True)
 class Design:
     """A lattice part, as data.
@@ -208,6 +212,7 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     return design
 
 
+@named
 def spartan(
     name: Literal["diamond", "gyroid"],
     wavelength: float | Sequence[float] = (4, 4, 4),

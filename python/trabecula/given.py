@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import operator
 import os
@@ -9,9 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from collections.abc import Callable
+    from typing import Any, TypeVar
 
     from numpy.typing import NDArray
+
+    Builder = TypeVar("Builder", bound=Callable[..., Any])
 
 __all__ = [
     "Points",
@@ -19,6 +23,7 @@ __all__ = [
     "control",
     "copied",
     "fixed",
+    "named",
     "number",
     "numbered",
     "pairs",
@@ -38,6 +43,29 @@ Points = Iterable[Sequence[float]] | str | os.PathLike[str]
 
 #: How deep a design may nest; the core has the same limit.
 DEPTH = 64
+
+
+def named(builder: Builder) -> Builder:
+    """The function or data class; a keyword that it does not have is refused with the nearest that it has."""
+    function = builder.__init__ if isinstance(builder, type) else builder
+    code = function.__code__
+    known = [name for name in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount] if name != "self"]
+
+    @functools.wraps(function)
+    def call(*args: Any, **given: Any) -> Any:
+        for name in given:
+            if name not in known:
+                import difflib  # where it is wanted only
+
+                near = difflib.get_close_matches(name, known, 1)
+                hint = f"; did you mean {near[0]}?" if near else "."
+                raise TypeError(f"{builder.__name__} has no argument {name}{hint} It takes {', '.join(known)}")
+        return function(*args, **given)
+
+    if isinstance(builder, type):
+        builder.__init__ = call
+        return builder
+    return call
 
 
 def number(name: str, value: Any) -> float:

@@ -7,11 +7,12 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
-from .given import Points, Stops, control, pairs, settings
+from .given import Points, Stops, control, named, pairs, settings
 
 __all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
 
 
+@named
 def linear(along: Sequence[float], stops: Stops) -> dict:
     """Along a direction: piecewise linear in s = along · x, constant beyond the ends.
 
@@ -21,6 +22,7 @@ def linear(along: Sequence[float], stops: Stops) -> dict:
     return {"linear": settings(along=along, stops=pairs(stops))}
 
 
+@named
 def steps(along: Sequence[float], stops: Stops) -> dict:
     """In steps along a direction: piecewise constant in s = along · x, the value of the last stop at or below s; before
     the first stop its value. Its gradient is 0 everywhere.
@@ -31,6 +33,7 @@ def steps(along: Sequence[float], stops: Stops) -> dict:
     return {"steps": settings(along=along, stops=pairs(stops))}
 
 
+@named
 def depth(stops: Stops) -> dict:
     """By depth below the region's surface: piecewise linear, constant beyond the ends.
 
@@ -39,6 +42,7 @@ def depth(stops: Stops) -> dict:
     return {"depth": settings(stops=pairs(stops))}
 
 
+@named
 def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
     """By the distance from a point or a line: piecewise linear, constant beyond the ends.
 
@@ -49,11 +53,13 @@ def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[f
     return {"radial": settings(stops=pairs(stops), center=center, axis=axis)}
 
 
+@named
 def formula(text: str) -> dict:
     """A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)"; parsed, never run as code."""
     return {"formula": text}
 
 
+@named
 def grid(
     path: str | os.PathLike[str],
     origin: Sequence[float] | None = None,
@@ -64,8 +70,8 @@ def grid(
     """Numbers on a grid, from a file; linear between them.
 
     path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
-        tif), where a * in the last part matches any text: "scan/*.png". Columns run along x, rows along y, pictures
-        along z.
+        tif): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns run along
+        x, rows along y, pictures along z.
     origin: Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it. [mm,
         optional]
     step: Distance between numbers, one or three. VTI and VTK files contain it. [mm, optional]
@@ -75,6 +81,7 @@ def grid(
     return {"grid": settings(path=os.fspath(path), origin=origin, step=step, array=array, remap=pairs(remap))}
 
 
+@named
 def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: Stops | None = None) -> dict:
     """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
     distance.
@@ -86,6 +93,7 @@ def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: S
     return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
 
 
+@named
 def field(
     path: str | os.PathLike[str],
     array: str,
@@ -104,6 +112,7 @@ def field(
     return {"field": settings(path=os.fspath(path), array=array, unit=unit, component=component, remap=pairs(remap))}
 
 
+@named
 def sigmoid(of: float | dict, width: float, at: float | None = None) -> dict:
     """A smooth step from 0 to 1 of another number: the logistic function, with ends.
 
@@ -114,6 +123,7 @@ def sigmoid(of: float | dict, width: float, at: float | None = None) -> dict:
     return {"sigmoid": settings(of=of, width=width, at=at)}
 
 
+@named
 def region(of: dict, width: float) -> dict:
     """1 inside a region and 0 outside, with a smooth step at its surface.
 
@@ -123,6 +133,7 @@ def region(of: dict, width: float) -> dict:
     return {"region": settings(of=of, width=width)}
 
 
+@named
 def distance(
     points: Points,
     closed: bool | None = None,
@@ -141,6 +152,7 @@ def distance(
     return {"distance": settings(**control(points), closed=closed, axis=axis, sharpness=sharpness)}
 
 
+@named
 def rbf(
     points: Points,
     values: Sequence[float] | None = None,

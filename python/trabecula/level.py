@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from .given import named
+
 __all__ = ["fraction", "iso", "porosity", "thickness"]
 
 Amount = float | dict
 
 
+@named
 def iso(value: Amount, mid: float = 0.0) -> dict:
     """The field value t: sheet |f| ≤ t, lower f ≤ t, upper f ≥ t.
 
@@ -15,6 +18,7 @@ def iso(value: Amount, mid: float = 0.0) -> dict:
     return _level("iso", value, mid=mid)
 
 
+@named
 def thickness(value: Amount, mid: float = 0.0) -> dict:
     """The thickness w of a sheet's wall in mm: solid is what lies within w/2 of the mid-surface f = ``mid``.
 
@@ -24,6 +28,7 @@ def thickness(value: Amount, mid: float = 0.0) -> dict:
     return _level("thickness", value, mid=mid)
 
 
+@named
 def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
     """The solid volume fraction, between 0 and 1, of the periodic cell (``of="cell"``) or of the finished part
     (``of="part"``, solved for).
@@ -37,6 +42,7 @@ def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0
     return _level("fraction", value, of, fit, mid, thickness)
 
 
+@named
 def porosity(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
     """One minus the solid fraction; see ``fraction``."""
     return _level("porosity", value, of, fit, mid, thickness)

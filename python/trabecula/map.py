@@ -7,11 +7,12 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from .given import Points, control, numbered, settings
+from .given import Points, control, named, numbered, settings
 
 __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
 
+@named
 def affine(
     wavelength: float | Sequence[float] | None = None,
     rotate: Sequence[float] | None = None,
@@ -29,6 +30,7 @@ def affine(
     return {"affine": settings(wavelength=wavelength, rotate=rotate, offset=offset, skew=skew)}
 
 
+@named
 def spartan(
     wavelength: float | Sequence[float] | None = None,
     rotate: Sequence[float] | None = None,
@@ -44,6 +46,7 @@ def spartan(
     return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}
 
 
+@named
 def phase(
     wavelength: float | dict | Sequence[float | dict],
     rotate: Sequence[float | dict] | None = None,
@@ -102,6 +105,7 @@ def phase(
     return {"phase": given}
 
 
+@named
 def cylinder(
     wavelength: float | Sequence[float],
     around: int,
@@ -118,6 +122,7 @@ def cylinder(
     return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
 
 
+@named
 def sphere(wavelength: float, around: int, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
     """Wrapped about a centre in shells, a whole number of cells round the equator and half as many from pole to pole.
 
@@ -129,6 +134,7 @@ def sphere(wavelength: float, around: int, center: Sequence[float] | None = None
     return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
 
 
+@named
 def sweep(
     wavelength: float | Sequence[float],
     points: Points,
@@ -148,6 +154,7 @@ def sweep(
     return {"sweep": settings(wavelength=wavelength, **control(points), closed=closed, normal=normal)}
 
 
+@named
 def tets(
     size: float | dict | None = None,
     mesher: Literal["background", "ftetwild"] | None = None,

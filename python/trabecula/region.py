@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
-from .given import settings
+from .given import named, settings
 
 __all__ = [
     "box",
@@ -24,6 +24,7 @@ __all__ = [
 ]
 
 
+@named
 def box(
     size: Sequence[float] | None = None,
     center: Sequence[float] | None = None,
@@ -41,6 +42,7 @@ def box(
     return {"box": settings(size=size, center=center, min=min, max=max)}
 
 
+@named
 def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence[float] | None = None) -> dict:
     """A straight round cylinder.
 
@@ -52,6 +54,7 @@ def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence
     return {"cylinder": settings(base=base, radius=radius, height=height, axis=axis)}
 
 
+@named
 def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
     """A ball.
 
@@ -61,6 +64,7 @@ def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
     return {"sphere": settings(radius=radius, center=center)}
 
 
+@named
 def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict:
     """A capsule: all points within a distance of a straight segment.
 
@@ -71,6 +75,7 @@ def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict
     return {"capsule": settings(start=start, end=end, radius=radius)}
 
 
+@named
 def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = None) -> dict:
     """A tetrahedron.
 
@@ -82,6 +87,7 @@ def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = No
     return {"tetrahedron": settings(corners=corners, sharpness=sharpness)}
 
 
+@named
 def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
     """One side of a plane; it bounds nothing alone, so combine it.
 
@@ -91,6 +97,7 @@ def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
     return {"halfspace": settings(point=point, normal=normal)}
 
 
+@named
 def mesh(
     path: str | os.PathLike[str],
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
@@ -111,21 +118,25 @@ def mesh(
     return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair, caps=caps)}
 
 
+@named
 def union(*regions: dict) -> dict:
     """Points in any of the regions."""
     return {"union": list(regions)}
 
 
+@named
 def intersection(*regions: dict) -> dict:
     """Points in all of the regions."""
     return {"intersection": list(regions)}
 
 
+@named
 def difference(first: dict, *others: dict) -> dict:
     """Points in the first region and in none of the others."""
     return {"difference": [first, *others]}
 
 
+@named
 def offset(of: dict, by: float) -> dict:
     """A region grown or shrunk by a distance.
 

@@ -7,13 +7,10 @@ import math
 __all__ = ["starter", "wavelength_for"]
 
 HEAD = """\
-# A lattice part. Lengths are mm, angles degrees.
+{directive}# A lattice part. Lengths are mm, angles degrees.
 #
 #   trabecula check {file}
 #   trabecula mesh {file} -o part.3mf
-#
-# In an editor that knows JSON Schema, `trabecula schema > design.schema.json` and a first line
-# `#:schema design.schema.json` complete and check keys.
 schema = 1
 units  = "mm"
 """
@@ -103,17 +100,26 @@ def starter(
     part: tuple[str, list[float]] | None = None,
     skin: float | None = None,
     meshes: str = "",
+    schema: str | None = None,
 ) -> str:
     """The text of a design ``file``: a lattice of the named ``cell``, or beams of the catalogue's cell ``beams``; in a box of
     20 mm, or in ``part``: the path of its file, from the design's folder, and its size (mm); with a skin of ``skin`` mm.
-    ``meshes`` names the formats of parts.
+    ``meshes`` names the formats of parts, ``schema`` the file of the JSON Schema for editors.
     """
     wavelength = wavelength_for(part[1]) if part else 5.0
     radius = float(f"{wavelength / SLENDERNESS:.1g}")
     texts = [HEAD, PART if part else BOX, BEAMS if beams else LATTICE, NO_SKIN if skin is None else SKIN, KEEP]
     path, size = (toml_string(part[0]), " × ".join(f"{v:.4g}" for v in part[1])) if part else ("", "")
     return "".join(texts).format(
-        **{"file": file, "cell": f'"{beams or cell}"', "meshes": meshes, "path": path, "size": size, "skin": skin},
+        **{
+            "directive": f"#:schema ./{schema}\n\n" if schema else "",
+            "file": file,
+            "cell": f'"{beams or cell}"',
+            "meshes": meshes,
+            "path": path,
+            "size": size,
+            "skin": skin,
+        },
         **{"wavelength": wavelength, "radius": radius, "half": radius / 2},
     )
 

@@ -58,6 +58,7 @@ pub mod formats;
 pub mod math;
 pub mod measure;
 pub mod mesh;
+pub mod periodic_voxels;
 pub mod progress;
 pub mod random;
 mod remesh;

@@ -22,7 +22,7 @@ fn boxed(ty: &Type) -> bool {
 /// A table named by its kind, or a word.
 pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
     let (mut choices, mut reads, mut writes, mut checks) = (vec![], vec![], vec![], vec![]);
-    let (mut schemas, mut parts, mut keys) = (vec![], vec![], vec![]);
+    let (mut parts, mut keys) = (vec![], vec![]);
     let (mut members, mut from) = (vec![], vec![]);
     for variant in &data.variants {
         let (v, inner) = (&variant.ident, Inner::of(&variant.attrs)?);
@@ -33,7 +33,6 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
             reads.push(quote! { #name => Ok(#ident::#v) });
             writes.push(quote! { #ident::#v => Value::Text(#name.into()).into() });
             checks.push(quote! { #ident::#v => Ok(()) });
-            schemas.push(quote! { choices.push(word_schema(&#key)); });
             keys.push(quote! { #ident::#v => #name });
             continue;
         }
@@ -48,8 +47,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
             quote! { &#key }
         };
         checks.push(quote! { #ident::#v(of) => Kind::check(of, #limits).map_err(|f| f.under(#name)) });
-        schemas.push(quote! { choices.push(named_schema::<#ty>(#key, defs)); });
-        parts.push(quote! { choices.push(named_part::<#ty>(#key, defs)); });
+        parts.push(quote! { Open::named::<#ty>(#key, defs) });
         keys.push(quote! { #ident::#v(_) => #name });
         members.push(if boxed(ty) {
             quote! { #ident::#v(of) => &**of }
@@ -98,9 +96,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
                     }
                 }
                 fn open(defs: &mut Defs, out: &mut Open) {
-                    let mut choices = Vec::new();
-                    #(#parts)*
-                    out.choices(choices);
+                    out.choices(vec![#(#parts),*]);
                 }
             }
         }
@@ -131,11 +127,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
                 Ok(())
             }
             fn schema(_: &Key, defs: &mut Defs) -> Node {
-                defs.named(#name, |defs| {
-                    let mut choices = Vec::new();
-                    #(#schemas)*
-                    choice_schema(#doc, choices)
-                })
+                defs.named(#name, |defs| choice_schema(#doc, CHOICES, vec![#(#parts),*]))
             }
         }
     })
@@ -212,8 +204,7 @@ pub fn alternatives(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Resul
                 match self { #(#ident::#names(of) => Table::put(of, out)),* }
             }
             fn open(defs: &mut Defs, out: &mut Open) {
-                let choices = vec![#(Open::of::<#types>(defs).part(#docs, <#types as Kind>::DOC)),*];
-                out.choices(choices);
+                out.choices(vec![#(Open::of::<#types>(defs).described(#docs)),*]);
             }
         }
         #kind

@@ -116,7 +116,7 @@ pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> Toke
                 Ok(())
             }
             fn schema(_: &Key, defs: &mut Defs) -> Node {
-                defs.named(#name, |defs| Open::of::<Self>(defs).closed(#doc))
+                defs.named(#name, |defs| Open::of::<Self>(defs).closed())
             }
         }
     }

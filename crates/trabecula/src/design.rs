@@ -63,16 +63,18 @@ pub struct Design {
     #[kind(default, always)]
     pub units: Units,
     /// Where the part may be, such as [region.box] with size = [20, 20, 20].
+    #[kind(hints("part", "domain", "body", "design_space"))]
     pub region: RegionKind,
     /// What fills the region: lattices under names of your own. Several need a blend.
-    #[kind(default)]
+    #[kind(default, hints("tpms", "infill", "fill"))]
     pub lattice: Lattices,
     /// Graphs of beams, under names of your own: instead of a lattice, or blended with others.
-    #[kind(default)]
+    #[kind(default, hints("strut", "struts", "truss"))]
     pub beams: BeamsSpecs,
     /// Which lattice is where, if there are several.
     pub blend: Option<BlendSpec>,
     /// What closes the region's surface.
+    #[kind(hints("shell", "wall", "hull"))]
     pub skin: Option<SkinSpec>,
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[kind(default)]
@@ -224,6 +226,7 @@ struct RegionFile {
     #[kind(rename = "units", default)]
     _units: Units,
     /// Where the part may be, such as [region.box] with size = [20, 20, 20].
+    #[kind(hints("part", "domain", "body", "design_space"))]
     region: RegionKind,
 }
 

@@ -1,5 +1,9 @@
 //! The environment in which a kind is built: its path in the design, the region, points inside it, and the design's files.
 
+mod picture_stack;
+
+pub(crate) use picture_stack::{names_pictures, picture_stack};
+
 use crate::csg_tree::CsgSolid;
 use crate::kind::DesignError;
 use crate::region::{Context, HalfSpace, HalfSpaceKind, Notes, Region, RegionKind};

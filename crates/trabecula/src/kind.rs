@@ -9,13 +9,14 @@ mod error;
 mod json;
 mod node;
 mod schema;
+mod schema_types;
 mod values;
 
 pub(crate) use at::{At, Fields};
 pub use error::{DesignError, Warning};
 pub use kind_derive::Kind;
 pub use node::{Lines, Node, Value};
-pub(crate) use schema::{Defs, Open, any_schema, choice_schema, named_part, named_schema, word_schema};
+pub(crate) use schema::{Defs, Open, any_schema, choice_schema};
 pub use values::{OneOrThree, OneOrTwo, Unit};
 
 pub use geometry::fault::Fault;

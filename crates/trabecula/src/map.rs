@@ -20,6 +20,7 @@ mod tets_kind;
 mod tilt;
 
 pub use affine::{Affine, Skew};
+pub use affine_kind::AffineKind;
 pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
@@ -41,10 +42,13 @@ use geometry::math::{Aabb, Mat3, Vec3};
 #[kind(name = "Map", noun = "map", family = BuildMap)]
 #[allow(missing_docs)] // The comment of each type says what it is.
 pub enum MapKind {
-    Affine(affine_kind::AffineKind),
+    #[kind(hints("cartesian", "rectangular", "uniform", "grid"))]
+    Affine(AffineKind),
     Spartan(affine_kind::SpartanKind),
     Phase(Box<phase_kind::PhaseKind>),
+    #[kind(hints("cylindrical", "polar", "tube"))]
     Cylinder(round_kind::CylinderMapKind),
+    #[kind(hints("spherical", "radial", "ball"))]
     Sphere(round_kind::SphereMapKind),
     Sweep(sweep_kind::SweepKind),
     Tets(TetsKind),

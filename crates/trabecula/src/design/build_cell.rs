@@ -5,15 +5,12 @@ use std::f64::consts::TAU;
 use super::Loader;
 use super::data::*;
 use crate::cell::{Cell, Series, Term, named};
-use crate::environment::extension;
-use crate::field::Field;
 use crate::kind::DesignError;
-use crate::region::{MeshRegion, Shape as _};
 use geometry::fault::Fault;
-use geometry::formats;
-use geometry::math::{Vec3, sin_cos_turns};
-use geometry::repair::Repair;
+use geometry::math::sin_cos_turns;
 use geometry::symmetry::{Group, Side};
+
+mod cell_file;
 
 /// The cell, and its name if it has one.
 pub(super) fn cell<'a>(
@@ -27,7 +24,7 @@ pub(super) fn cell<'a>(
             (Some(name.0.as_str()), known.terms(), path.to_string())
         }
         CellSpec::Kind(CellKind::File(f)) => {
-            return Ok((None, from_file(f, &format!("{path}.file"), loader)?));
+            return Ok((None, cell_file::cell(f, &format!("{path}.file"), loader)?));
         }
         CellSpec::Kind(CellKind::Tet(_)) => {
             let message = "a tetrahedral cell goes with a map over a tetrahedral mesh ([lattice.NAME.map.tets])";
@@ -88,41 +85,4 @@ pub(super) fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Faul
         return Err(Fault::new("hkl", message));
     }
     Ok(terms)
-}
-
-/// Nodes along an axis of the grid on which a mesh of one cell is sampled.
-const CELL: usize = 64;
-
-/// A cell from numbers or a mesh.
-fn from_file(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Result<Cell, DesignError> {
-    let at = format!("{path}.path");
-    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
-    let file = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
-    let kind = extension(&spec.path);
-    let (shape, values) = if kind == "npy" {
-        let (shape, values) = formats::read_npy(&file).map_err(wrong)?;
-        let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
-            let message = format!("the array has shape {shape:?}; a cell has three dimensions [x, y, z]");
-            wrong(Fault::new("", message))
-        })?;
-        (shape, values)
-    } else if formats::Format::of(&kind).is_some() {
-        let mesh = formats::read_mesh(&file, &kind).map_err(wrong)?.mesh;
-        let solid = MeshRegion::new(mesh, Repair::Auto).map_err(wrong)?;
-        let (b, size) = (solid.bounds(), solid.bounds().size());
-        let points: Vec<Vec3> = (0..CELL.pow(3))
-            .map(|n| [n % CELL, n / CELL % CELL, n / CELL / CELL])
-            .map(|i| core::array::from_fn(|a| b.min[a] + size[a] * (i[a] as f64 + 0.5) / CELL as f64))
-            .collect();
-        let mut values = vec![0.0; points.len()];
-        solid.values(&points, &mut values);
-        let inside = |v: &f64| if *v < 0.0 { 1.0 } else { 0.0 };
-        ([CELL; 3], values.iter().map(inside).collect())
-    } else {
-        let known = formats::Format::listed();
-        let message = format!("the name must end in npy, {known}; found \"{}\"", spec.path);
-        return Err(DesignError::new(at, message).found(&spec.path));
-    };
-    let (series, share) = Series::sampled(&values, shape, spec.terms as usize).map_err(wrong)?;
-    Ok(Cell::new(series).truncated(share))
 }

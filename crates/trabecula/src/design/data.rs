@@ -6,8 +6,8 @@ use crate::cell::tet::tet_catalogue;
 use crate::cell::{catalogue, named};
 pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
-pub use crate::map::{Joined, MadeTetsKind, MapKind, MesherKind, Method, TetFileKind, TetsKind};
+use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, OneOrThree, Table};
+pub use crate::map::{AffineKind, Joined, MadeTetsKind, MapKind, MesherKind, Method, TetFileKind, TetsKind};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::symmetry::Group;
 
@@ -67,31 +67,32 @@ pub use blend_kind::*;
 #[kind(name = "Lattice", noun = "a lattice", before = deeper)]
 pub struct LatticeSpec {
     /// The function on the torus, such as "gyroid".
+    #[kind(hints("tpms", "surface", "unit_cell", "type"))]
     pub cell: CellSpec,
     /// Which side of the level is solid: sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t).
     pub part: PartSpec,
     /// Position (mm) to phase (turns), such as map.affine with wavelength = 4.
+    #[kind(hints("mapping", "transform", "coordinates"))]
     pub map: MapKind,
     /// How much is solid: exactly one of iso, fraction, porosity, thickness.
     pub level: LevelSpec,
 }
 
-/// Keys that stand one level deeper, where beginners look for them: the key and its table.
-const DEEPER: [(&str, &str); 8] = [
-    ("iso", "level"),
-    ("fraction", "level"),
-    ("porosity", "level"),
-    ("thickness", "level"),
-    ("mid", "level"),
-    ("wavelength", "map.affine"),
-    ("rotate", "map.affine"),
-    ("offset", "map.affine"),
-];
-
+/// Explains that a key, or what others call it, stands one level deeper, where beginners do not look for it.
 fn deeper(at: &At) -> Result<(), DesignError> {
-    for (key, entry) in at.entries("a lattice").unwrap_or_default() {
-        if let Some((_, table)) = DEEPER.iter().find(|d| d.0 == key) {
-            return Err(entry.error(format!("{key} goes under [{}.{table}]", at.path)));
+    let own = LatticeSpec::keys();
+    let tables = [("level", LevelSpec::keys()), ("map.affine", AffineKind::keys())];
+    for (word, entry) in at.entries("a lattice").unwrap_or_default() {
+        let of_own = |k: &Key| k.name == word || entry.node.as_text().is_some() && k.hints.contains(&word);
+        if own.iter().any(of_own) {
+            continue;
+        }
+        for (table, keys) in &tables {
+            let Some(key) = keys.iter().find(|k| k.name == word || k.hints.contains(&word)).map(|k| k.name) else {
+                continue;
+            };
+            let called = if key == word { String::new() } else { format!(" is called {key} here and") };
+            return Err(entry.error(format!("{word}{called} goes under [{}.{table}]", at.path)));
         }
     }
     Ok(())
@@ -140,6 +141,9 @@ fn elsewhere(word: &str) -> Option<String> {
     let plain = word.to_lowercase().replace(['-', ' '], "_");
     if let Some((_, name)) = SYNONYMS.iter().find(|s| s.0 == plain) {
         return Some(format!("{word} is called {name} here"));
+    }
+    if ["strut", "struts", "truss", "beam", "beams"].contains(&plain.as_str()) {
+        return Some(format!("{word}: beams are written as [beams.NAME], with a cell such as \"octet\""));
     }
     let cell = ::beams::graph::named(word);
     cell.map(|_| format!("{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\""))
@@ -233,17 +237,28 @@ impl Kind for GroupSpec {
     }
 }
 
-/// Numbers or a mesh in a file: the largest waves of their Fourier transform. Numbers stand at the nodes of one period, without
-/// the repeated end; a mesh is the solid in one cell.
+/// Numbers, pictures or a mesh in a file: the largest waves of their Fourier transform. Numbers stand at the nodes of one period,
+/// without the repeated end; a mesh is the solid in one period.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "FileCell", noun = "a cell from a file")]
 pub struct FileCellSpec {
-    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, 3mf, ply, obj, off), whose bounds are the
-    /// cell and whose inside has the value 1, the outside 0.
+    /// Path of the file, relative to the design file: npy, grey pictures (png, tif) or a closed mesh (stl, 3mf, ply, obj, off).
+    /// Pictures lie one above the other: one file, "scan/*.png" with a * for any text, or their folder, "scan/". Of a mesh the
+    /// function is the signed distance, positive inside, in edges of the cell.
     pub path: String,
     /// Number of waves that are kept.
     #[kind(default = 200, min = 1.0, max = 2000.0)]
     pub terms: u32,
+    /// Numbers above it are solid, and the signed distance of these is the cell's function, as for a mesh; without it the numbers
+    /// are.
+    pub threshold: Option<f64>,
+    /// Distance between numbers, one or three, with a threshold: distances are measured with it.
+    #[kind(unit = "mm", above = 0.0)]
+    pub step: Option<OneOrThree>,
+    /// Edges of a mesh's period, one or three, about the middle of its bounds; the bounds unless given. Faces on them where the
+    /// solid goes on into the next cell are no boundary.
+    #[kind(unit = "mm", above = 0.0)]
+    pub period: Option<OneOrThree>,
 }
 
 /// A tetrahedral cell, for a map over a tetrahedral mesh: a ready one by its name, or what a regular tetrahedron cuts out of
@@ -309,10 +324,10 @@ fn no_sites(word: &str) -> Option<String> {
 #[kind(name = "Part", noun = "part")]
 pub enum PartSpec {
     /// |f| ≤ t.
-    #[kind(hints("wall", "shell", "surface", "double"))]
+    #[kind(hints("wall", "shell", "surface", "double", "sheet_network", "thickened"))]
     Sheet,
     /// f ≤ t.
-    #[kind(hints("network", "skeletal", "skeleton", "strut", "below", "negative"))]
+    #[kind(hints("network", "solid", "solid_network", "skeletal", "skeleton", "strut", "below", "negative"))]
     Lower,
     /// f ≥ t.
     #[kind(hints("above", "positive", "over"))]
@@ -354,8 +369,9 @@ pub enum AmountSpec {
 /// The thickness of a sheet's wall.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct ThicknessSpec {
-    /// Thickness of a sheet's wall: solid is what lies within half of it of the mid-surface.
-    #[kind(unit = "mm", above = 0.0)]
+    /// Thickness of a sheet's wall: solid is what lies within half of it of the mid-surface. With a fraction or porosity: of a
+    /// wall or of a network's narrowest neck, and the wavelength is solved for.
+    #[kind(unit = "mm", above = 0.0, hints("wall_thickness", "wall", "sheet_thickness"))]
     pub thickness: GradeSpec,
 }
 
@@ -363,7 +379,11 @@ pub struct ThicknessSpec {
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct FractionSpec {
     /// Solid volume fraction.
-    #[kind(above = 0.0, below = 1.0, hints("relative_density", "density", "volume_fraction", "vf"))]
+    #[kind(
+        above = 0.0,
+        below = 1.0,
+        hints("relative_density", "density", "volume_fraction", "solid_fraction", "infill", "vf")
+    )]
     pub fraction: GradeSpec,
     /// Thickness of a sheet's wall or narrowest neck of a network: the wavelength is solved for.
     #[kind(unit = "mm", above = 0.0)]
@@ -385,6 +405,7 @@ pub struct PorositySpec {
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct IsoSpec {
     /// The field value t; for a sheet the half-level.
+    #[kind(hints("isovalue", "iso_value", "isolevel", "threshold", "level_set"))]
     pub iso: GradeSpec,
 }
 

@@ -3,7 +3,7 @@
 use super::remapped::sampled;
 use super::result::{percent, pick};
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
-use crate::environment::{Environment, extension};
+use crate::environment::{Environment, extension, names_pictures, picture_stack};
 use crate::kind::{DesignError, Kind, OneOrThree};
 use geometry::fault::Fault;
 use geometry::formats::{self, Shape};
@@ -12,8 +12,9 @@ use geometry::formats::{self, Shape};
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Grid", noun = "a grade on a grid")]
 pub struct GridKind {
-    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif), where
-    /// a * in the last part matches any text: "scan/*.png". Columns run along x, rows along y, pictures along z.
+    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif): one
+    /// file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns run along x, rows along y,
+    /// pictures along z.
     path: String,
     /// Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it.
     #[kind(unit = "mm")]
@@ -36,10 +37,10 @@ impl BuildGrade for GridKind {
 fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let kind = extension(&spec.path);
-    let pictures = ["png", "tif", "tiff"].contains(&kind.as_str());
+    let pictures = names_pictures(&spec.path);
     let file = if pictures { Vec::new() } else { environment.load(&spec.path, &at)? };
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
-    let (origin, step, shape, values) = match extension(&spec.path).as_str() {
+    let (origin, step, shape, values) = match if pictures { "pictures" } else { kind.as_str() } {
         "npy" => {
             let (shape, values) = formats::read_npy(&file).map_err(wrong)?;
             let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
@@ -77,7 +78,7 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
             };
             (spec.origin.unwrap_or(origin), spec.step.map_or(step, OneOrThree::three), shape, array.values.clone())
         }
-        "png" | "tif" | "tiff" => {
+        "pictures" => {
             let need = |key: &str, what: &str| {
                 DesignError::new(
                     format!("{path}.{key}"),
@@ -88,7 +89,7 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
             let step = spec
                 .step
                 .ok_or_else(|| need("step", "the distance between pixels and pictures in mm, one or three"))?;
-            let (shape, values) = stack(spec, &at, environment)?;
+            let (shape, values) = picture_stack(&spec.path, &at, environment.loader)?;
             (origin, step.three(), shape, values)
         }
         _ => {
@@ -117,51 +118,4 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     Ok(samples)
-}
-
-/// A stack of grey images: the files that match the path in the order of their names, in which 10 comes after 9,
-/// each with one picture or more.
-fn stack(spec: &GridKind, at: &str, environment: &Environment) -> Result<([usize; 3], Vec<f64>), DesignError> {
-    let mut names = match spec.path.contains('*') {
-        true => environment.loader.list(&spec.path).map_err(|m| DesignError::new(at, m).found(&spec.path))?,
-        false => vec![spec.path.clone()],
-    };
-    names.sort_by_cached_key(|n| counted_name(n));
-    let (mut size, mut values, mut count) = (None, Vec::new(), 0);
-    for name in &names {
-        let wrong = |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
-        let file = environment.load(name, at)?;
-        for picture in formats::read_pictures(&file).map_err(|f| wrong(f.message))? {
-            let [w, h] = picture.size;
-            let first = *size.get_or_insert(picture.size);
-            if first != picture.size {
-                let message = format!("a picture of {w} × {h} pixels among those of {} × {}", first[0], first[1]);
-                return Err(wrong(message));
-            }
-            values.extend(picture.values);
-            count += 1;
-        }
-    }
-    let [w, h] = size.ok_or_else(|| DesignError::new(at, format!("{}: no pictures", spec.path)).found(&spec.path))?;
-    Ok(([w, h, count], values))
-}
-
-/// A name as its words and numbers, so that they sort as people count.
-fn counted_name(name: &str) -> Vec<(String, u64)> {
-    let mut parts: Vec<(String, u64)> = vec![(String::new(), 0)];
-    let mut digits = false;
-    for c in name.chars() {
-        match (c.to_digit(10), parts.last_mut()) {
-            (Some(d), Some(last)) => {
-                last.1 = last.1.saturating_mul(10).saturating_add(u64::from(d));
-                digits = true;
-            }
-            (None, Some(last)) if !digits => last.0.push(c),
-            _ => {
-                parts.push((c.to_string(), 0));
-                digits = false;
-            }
-        }
-    }
-    parts
 }

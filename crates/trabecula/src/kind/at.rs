@@ -4,7 +4,7 @@ use super::Key;
 use super::error::DesignError;
 use super::node::{Node, Value, describe};
 use super::{Choice, Kind};
-use geometry::fault::{counted, nearest};
+use geometry::fault::{counted, nearest, number};
 
 /// A node and the path that leads to it.
 #[derive(Clone)]
@@ -40,7 +40,18 @@ impl<'a> At<'a> {
     /// "expected X, found Y".
     pub fn expected(&self, what: &str) -> DesignError {
         let found = describe(self.node);
-        self.error(format!("expected {what}, found {found}"))
+        let hint = self.number_in_text().filter(|_| what.starts_with("a number")).unwrap_or_default();
+        self.error(format!("expected {what}, found {found}{hint}"))
+    }
+
+    /// How to write a number that stands here as text.
+    fn number_in_text(&self) -> Option<String> {
+        let text = self.node.as_text()?.trim();
+        let parsed = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        match text.strip_suffix('%') {
+            Some(share) => parsed(share).map(|v| format!("; for {} per cent write {}", number(v), number(v / 100.0))),
+            None => parsed(text).map(|v| format!("; write {} without quotes", number(v))),
+        }
     }
 
     /// The entries of a table with any keys.

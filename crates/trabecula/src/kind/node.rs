@@ -96,6 +96,16 @@ impl Node {
         entries.iter().map(|(key, _, node)| (key.as_str(), node))
     }
 
+    /// The value of a key of a table.
+    pub(crate) fn get(&self, key: &str) -> Option<&Node> {
+        self.entries().find(|e| e.0 == key).map(|e| e.1)
+    }
+
+    /// The text, if it is one.
+    pub(crate) fn as_text(&self) -> Option<&str> {
+        if let Value::Text(text) = &self.value { Some(text) } else { None }
+    }
+
     /// The same table with one more key, placed last; other nodes are left as they are.
     pub fn with(mut self, key: &str, node: Node) -> Node {
         if let Value::Table(entries) = &mut self.value {

@@ -1,9 +1,16 @@
 //! JSON Schemas (draft 2020-12) of kinds.
 //!
+//! Validators and editors say one clear thing where each keyword stands for one value, so there is no `oneOf`: a table of kinds
+//! has an optional key for each kind and exactly one of them; `if` decides which of several sets of keys is meant; and a
+//! value of one of several JSON types has the keywords of all (`one_of_types`). Editors that know draft 7 alone read the same.
+//!
 //! In addition to the standard's words: `x-unit`, the unit of a number; `x-type`, the name of a type that is written out in place;
-//! `x-keyword`, where the keyword arguments of the Python builder begin.
+//! `x-keyword`, where the keyword arguments of the Python builder begin; `x-alternatives`, the sets of keys of which one is given;
+//! `x-kind`, the definition whose keys a table written out in place has; `x-taplo`, the meaning of each word of `enum`, as Taplo
+//! shows it.
 
-use super::{Key, Kind, Node, Table, Value};
+use super::schema_types::{merged, one_of_types};
+use super::{Choice, Key, Kind, Node, Table, Value};
 
 /// The types that have names, in the order in which they are first met.
 #[derive(Default)]
@@ -17,28 +24,49 @@ impl Defs {
             self.0.push((name.to_string(), Value::Table(Vec::new()).into()));
             self.0[place].1 = make(self);
         }
-        Node::table([("$ref", format!("#/$defs/{name}").as_str().into())])
+        reference(name)
     }
 
     /// The value of `$defs`.
     pub fn into_node(self) -> Node {
-        Value::Table(self.0.into_iter().map(|(name, node)| (name, None, node)).collect()).into()
+        let all = self.0.iter().map(|(name, node)| (name.clone(), None, one_of_types(node, &self)));
+        Value::Table(all.collect()).into()
     }
+
+    /// The definition that a reference names, with its name.
+    pub(super) fn resolve<'a>(&'a self, reference: &'a Node) -> Option<(&'a str, &'a Node)> {
+        let name = reference.get("$ref")?.as_text()?.rsplit('/').next()?;
+        self.0.iter().find(|d| d.0 == name).map(|d| (name, &d.1))
+    }
+}
+
+/// A reference to a definition.
+pub(super) fn reference(name: &str) -> Node {
+    Node::table([("$ref", format!("#/$defs/{name}").as_str().into())])
 }
 
 /// A table whose keys are being collected.
 #[derive(Default)]
 pub(crate) struct Open {
+    doc: &'static str,
     properties: Vec<(String, Option<usize>, Node)>,
     required: Vec<Node>,
-    choices: Vec<Node>,
+    choices: Vec<Open>,
 }
 
 impl Open {
     /// The keys of `T`.
     pub fn of<T: Table>(defs: &mut Defs) -> Open {
-        let mut out = Open::default();
+        let mut out = Open { doc: T::DOC, ..Open::default() };
         T::open(defs, &mut out);
+        out
+    }
+
+    /// The one key of a kind in a choice.
+    pub fn named<T: Kind>(key: Key, defs: &mut Defs) -> Open {
+        let doc = if key.doc.is_empty() { T::DOC } else { key.doc };
+        let mut out = Open { doc, ..Open::default() };
+        out.property::<T>(Key { doc, required: true, ..key }, None, defs);
         out
     }
 
@@ -60,34 +88,75 @@ impl Open {
         self.properties.push((key.name.to_string(), None, node));
     }
 
-    /// Adds alternatives, of which one holds.
-    pub fn choices(&mut self, choices: Vec<Node>) {
+    /// Adds sets of keys, of which one is given.
+    pub fn choices(&mut self, choices: Vec<Open>) {
         self.choices.extend(choices);
     }
 
-    fn node(self) -> Node {
-        let mut node = Node::table([("type", "object".into())]);
+    /// The same with another description, if there is one to give.
+    pub fn described(self, doc: &'static str) -> Open {
+        if doc.is_empty() { self } else { Open { doc, ..self } }
+    }
+
+    /// The table: it has no other keys.
+    pub fn closed(mut self) -> Node {
+        for choice in &mut self.choices {
+            let new = |p: &&(String, _, _)| !self.properties.iter().any(|own| own.0 == p.0);
+            let added: Vec<_> = choice.properties.iter().filter(new).cloned().collect();
+            self.properties.extend(added);
+        }
+        let conditions = match &self.choices[..] {
+            [] => None,
+            [one] => {
+                self.required.extend(one.required.iter().cloned());
+                None
+            }
+            [first, others @ ..] => Some(self.told_apart(first, others)),
+        };
+        // A validator names the first of what is wrong, which is an unknown key rather than the one that it should have been.
+        let mut node =
+            Node::table([("type", "object".into())]).described(self.doc).with("additionalProperties", false.into());
         if !self.properties.is_empty() {
-            node = node.with("properties", Value::Table(self.properties).into());
+            let properties = self.properties.clone();
+            node = node.with("properties", Value::Table(properties).into());
         }
         if !self.required.is_empty() {
-            node = node.with("required", self.required.into());
+            node = node.with("required", self.required.clone().into());
         }
-        if !self.choices.is_empty() {
-            node = node.with("oneOf", exclusive(self.choices).into());
-        }
-        node
+        let Some(conditions) = conditions else { return node };
+        let alternatives: Vec<Node> = self.choices.iter().map(Open::alternative).collect();
+        let node = node.with("x-alternatives", alternatives.into());
+        conditions.entries().fold(node, |node, (key, of)| node.with(key, of.clone()))
     }
 
-    /// One of several alternatives.
-    pub fn part(self, doc: &str, own: &str) -> Node {
-        self.node().described(if doc.is_empty() { own } else { doc })
+    fn keys(&self) -> impl Iterator<Item = &str> {
+        self.properties.iter().map(|p| p.0.as_str())
     }
 
-    /// The table on its own: it has no other keys.
-    pub fn closed(self, doc: &str) -> Node {
-        let closed = if self.choices.is_empty() { "additionalProperties" } else { "unevaluatedProperties" };
-        self.node().described(doc).with(closed, false.into())
+    /// Its keys, as one of several sets.
+    fn alternative(&self) -> Node {
+        let keys = self.keys().map(Node::from).collect::<Vec<_>>();
+        Node::table([("keys", keys.into()), ("required", self.required.clone().into())]).described(self.doc)
+    }
+
+    /// The set of which a needed key is given is the one that is meant; if there is none, the first.
+    fn told_apart(&self, first: &Open, others: &[Open]) -> Node {
+        others.iter().rev().fold(self.only(first), |rest, other| {
+            let given = |key: &Node| Node::table([("required", vec![key.clone()].into())]);
+            let mut given: Vec<Node> = other.required.iter().map(given).collect();
+            let given = if given.len() == 1 { given.remove(0) } else { Node::table([("anyOf", given.into())]) };
+            Node::table([("if", given), ("then", self.only(other)), ("else", rest)])
+        })
+    }
+
+    /// What holds where one set is meant: its needed keys are there, and those of others are not.
+    fn only(&self, meant: &Open) -> Node {
+        let foreign =
+            |key: &&str| !meant.keys().any(|k| k == *key) && self.choices.iter().any(|c| c.keys().any(|k| k == *key));
+        let foreign = self.keys().filter(foreign).map(|key| (key.to_string(), None, false.into())).collect();
+        // It is a table anyway; jsonschema's `best_match` takes an error for less relevant where the type is not said.
+        let node = Node::table([("type", "object".into()), ("properties", Value::Table(foreign).into())]);
+        if meant.required.is_empty() { node } else { node.with("required", meant.required.clone().into()) }
     }
 }
 
@@ -98,39 +167,25 @@ impl Node {
     }
 }
 
-/// The alternatives, of which one without required keys is fulfilled only if no other is.
-fn exclusive(mut choices: Vec<Node>) -> Vec<Node> {
-    let required = |c: &Node| c.entries().find(|e| e.0 == "required").map(|e| e.1.clone());
-    let others: Vec<Node> = choices.iter().filter_map(required).map(|keys| Node::table([("required", keys)])).collect();
-    for free in choices.iter_mut().filter(|c| required(c).is_none()) {
-        let any = Node::table([("anyOf", others.clone().into())]);
-        *free = std::mem::replace(free, Value::Table(Vec::new()).into()).with("not", any);
+/// Words, each with its meaning.
+fn words_schema(words: &[Key]) -> Node {
+    let meanings: Vec<Node> = words.iter().map(|w| w.doc.into()).collect();
+    let docs = Node::table([("docs", Node::table([("enumValues", meanings.into())]))]);
+    Node::table([("enum", words.iter().map(|w| w.name.into()).collect::<Vec<Node>>().into()), ("x-taplo", docs)])
+}
+
+/// One of several kinds: a word, or a table with one of the keys of `tables`.
+pub(crate) fn choice_schema(doc: &str, choices: &[Choice], tables: Vec<Open>) -> Node {
+    let words: Vec<Key> = choices.iter().filter(|c| c.word).map(|c| c.key).collect();
+    if tables.is_empty() {
+        return words_schema(&words).with("type", "string".into()).described(doc);
     }
-    choices
-}
-
-/// One word of a choice.
-pub(crate) fn word_schema(key: &Key) -> Node {
-    Node::table([("const", key.name.into())]).described(key.doc)
-}
-
-/// One table of a choice.
-pub(crate) fn named_schema<T: Kind>(key: Key, defs: &mut Defs) -> Node {
-    let doc = if key.doc.is_empty() { T::DOC } else { key.doc };
-    let part = named_part::<T>(Key { doc: "", ..key }, defs);
-    part.described(doc).with("additionalProperties", false.into())
-}
-
-/// One key of a choice, in a table with other keys.
-pub(crate) fn named_part<T: Kind>(key: Key, defs: &mut Defs) -> Node {
-    let mut open = Open::default();
-    open.property::<T>(Key { required: true, ..key }, None, defs);
-    open.node()
-}
-
-/// One of several kinds.
-pub(crate) fn choice_schema(doc: &str, choices: Vec<Node>) -> Node {
-    Node::table([("oneOf", choices.into())]).described(doc)
+    let kinds = tables.into_iter().flat_map(|t| t.properties).collect();
+    let table = Node::table([("type", "object".into()), ("additionalProperties", false.into())])
+        .with("properties", Value::Table(kinds).into())
+        .with("minProperties", Value::Whole(1).into())
+        .with("maxProperties", Value::Whole(1).into());
+    if words.is_empty() { table.described(doc) } else { merged(&[words_schema(&words), table]).described(doc) }
 }
 
 /// A value of one of several types.

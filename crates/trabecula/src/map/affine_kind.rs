@@ -21,7 +21,7 @@ pub struct AffineKind {
 pub struct Cells {
     /// Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it follows; three
     /// numbers are ratios then.
-    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "period", "size"))]
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: Option<OneOrThree>,
     /// Angles about x, y, z: z is turned first, then y, then x.
     #[kind(unit = "degrees", default = [0.0; 3])]

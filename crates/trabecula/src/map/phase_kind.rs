@@ -12,7 +12,7 @@ use crate::kind::{DesignError, Fault, Key, Kind};
 #[kind(name = "Phase", noun = "a phase map")]
 pub struct PhaseKind {
     /// Cell edge, one number or three; each may vary.
-    #[kind(unit = "mm", above = 0.0)]
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: GradeOrThree,
     /// How cells are turned.
     #[kind(flatten)]

@@ -10,7 +10,7 @@ use geometry::math::{dot, norm, scale, sub, unit};
 #[kind(name = "CylinderMap", noun = "a map round an axis")]
 pub struct CylinderMapKind {
     /// Cell edge along the radius and along the axis, one number or two.
-    #[kind(unit = "mm", above = 0.0)]
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: OneOrTwo,
     /// Number of cells around.
     #[kind(min = 1.0, max = 1e6)]
@@ -28,7 +28,7 @@ pub struct CylinderMapKind {
 #[kind(name = "SphereMap", noun = "a map about a centre", check = SphereMapKind::even)]
 pub struct SphereMapKind {
     /// Cell edge along the radius.
-    #[kind(unit = "mm", above = 0.0)]
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: f64,
     /// Number of cells round the equator, even.
     #[kind(min = 2.0, max = 1e6)]

@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[kind(name = "Sweep", noun = "a map along a line")]
 pub struct SweepKind {
     /// Cell edge, one number or three: two across the line and one along it. Along a closed line it is made to fit.
-    #[kind(unit = "mm", above = 0.0)]
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: OneOrThree,
     /// The control points.
     #[kind(flatten)]

@@ -8,7 +8,9 @@ use trabecula::design::schema;
 use super::corpus;
 
 /// Alternatives without a design, and why.
-const EXEMPT: [(&str, &str); 4] = [
+const EXEMPT: [(&str, &str); 6] = [
+    ("Series: string", "a space group, as by its number"),
+    ("TetCell: integer", "a space group, as by its symbol"),
     ("Sigmoid: number", "a step of a constant is a constant"),
     ("Mesher: ftetwild", "a program of another package"),
     ("Unit: ", "each is a factor"),
@@ -23,51 +25,53 @@ fn resolved<'a>(root: &'a Json, of: &'a Json) -> (Option<&'a str>, &'a Json) {
     }
 }
 
-fn alternatives(of: &Json) -> impl Iterator<Item = &Json> {
-    ["oneOf", "anyOf"].into_iter().filter_map(|key| of.get(key)?.as_array()).flatten()
-}
-
 fn texts<'a>(of: &'a Json, key: &str) -> impl Iterator<Item = &'a str> {
     of.get(key).and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str)
 }
 
-/// Whether data has the form of a schema: its type, constant, length and keys, and one of its alternatives.
-fn fits(root: &Json, of: &Json, data: &Json) -> bool {
-    let (_, of) = resolved(root, of);
-    let is = |kind: &str| match kind {
+/// The JSON types that a schema allows.
+fn types(of: &Json) -> Vec<&str> {
+    of["type"].as_str().into_iter().chain(texts(of, "type")).collect()
+}
+
+fn is(data: &Json, kind: &str) -> bool {
+    match kind {
         "object" => data.is_object(),
         "array" => data.is_array(),
         "string" => data.is_string(),
         "number" => data.is_number(),
         "integer" => data.is_i64() || data.is_u64(),
         "boolean" => data.is_boolean(),
-        "null" => data.is_null(),
         _ => false,
-    };
-    let kinds = match of.get("type") {
-        Some(Json::String(kind)) => is(kind),
-        Some(Json::Array(kinds)) => kinds.iter().filter_map(Json::as_str).any(is),
-        _ => true,
-    };
-    let constant = of.get("const").is_none_or(|c| c == data);
-    let listed = of.get("enum").and_then(Json::as_array).is_none_or(|all| all.contains(data));
-    let length = |key: &str| of.get(key).and_then(Json::as_u64);
-    let count = data.as_array().map_or(0, Vec::len) as u64;
-    let long = length("minItems").is_none_or(|n| count >= n) && length("maxItems").is_none_or(|n| count <= n);
-    let needed = texts(of, "required").all(|key| data.get(key).is_some());
-    let choice = alternatives(of).next().is_none() || alternatives(of).any(|a| fits(root, a, data));
-    kinds && constant && listed && long && needed && choice
+    }
 }
 
-/// What an alternative is called: its constant, the keys that it needs, its definition or its type.
-fn name(of: &Json) -> String {
-    if let Some(text) = of.get("const").and_then(Json::as_str) {
-        return text.to_string();
+/// One of several: what it is called, and whether data makes use of it.
+type Alternative<'a> = (String, Box<dyn Fn(&Json) -> bool + 'a>);
+
+/// The alternatives that a schema offers: its words with meanings, its kinds, its sets of keys, its types.
+fn alternatives(of: &Json) -> Vec<Alternative<'_>> {
+    let mut out: Vec<Alternative> = Vec::new();
+    for listed in [of, &of["then"]].into_iter().filter(|s| s.get("x-taplo").is_some()) {
+        out.extend(
+            texts(listed, "enum").map(|word| -> Alternative { (word.into(), Box::new(move |data| data == word)) }),
+        );
     }
-    let needed: Vec<&str> = texts(of, "required").collect();
-    let reference = of.get("$ref").and_then(Json::as_str).and_then(|r| r.rsplit('/').next());
-    let kind = of.get("type").and_then(Json::as_str);
-    if needed.is_empty() { reference.or(kind).unwrap_or("other").to_string() } else { needed.join(" and ") }
+    let kinds = of.get("maxProperties").and_then(|_| of["properties"].as_object());
+    for key in kinds.filter(|_| of.get("x-kind").is_none()).into_iter().flat_map(|kinds| kinds.keys()) {
+        out.push((key.clone(), Box::new(move |data| data.get(key).is_some())));
+    }
+    for set in of["x-alternatives"].as_array().into_iter().flatten() {
+        let needed: Vec<&str> = texts(set, "required").collect();
+        let name = if needed.is_empty() { "object".to_string() } else { needed.join(" and ") };
+        out.push((name, Box::new(move |data| needed.iter().all(|key| data.get(*key).is_some()))));
+    }
+    let several = types(of);
+    for kind in several.iter().copied().filter(|_| several.len() > 1) {
+        let definition = of["x-kind"].as_str().filter(|_| kind == "object");
+        out.push((definition.unwrap_or(kind).into(), Box::new(move |data| is(data, kind))));
+    }
+    out
 }
 
 /// The alternatives below a schema, by definition and name.
@@ -77,33 +81,39 @@ fn offered(root: &Json, of: &Json, at: &str, met: &mut BTreeSet<String>, out: &m
         return;
     }
     let at = definition.unwrap_or(at);
-    // An optional key is also offered as null.
-    for a in alternatives(of).filter(|a| a.get("type").is_none_or(|kind| kind != "null")) {
-        out.insert(format!("{at}: {}", name(a)));
-        offered(root, a, at, met, out);
+    out.extend(alternatives(of).into_iter().map(|a| format!("{at}: {}", a.0)));
+    if let Some(table) = written_out(of) {
+        offered(root, &table, at, met, out);
+    } else {
+        of["properties"].as_object().into_iter().flatten().for_each(|(_, below)| offered(root, below, at, met, out));
     }
-    for below in of.get("properties").and_then(Json::as_object).into_iter().flat_map(|p| p.values()) {
+    for below in ["items", "additionalProperties", "then"].iter().filter_map(|key| of.get(key)) {
         offered(root, below, at, met, out);
     }
-    for below in ["items", "additionalProperties"].iter().filter_map(|key| of.get(key)) {
-        offered(root, below, at, met, out);
-    }
+}
+
+/// The definition whose keys stand in a schema.
+fn written_out(of: &Json) -> Option<Json> {
+    of["x-kind"].as_str().map(|name| serde_json::json!({ "$ref": format!("#/$defs/{name}") }))
 }
 
 /// The alternatives that data makes use of.
 fn used(root: &Json, of: &Json, at: &str, data: &Json, out: &mut BTreeSet<String>) {
     let (definition, of) = resolved(root, of);
     let at = definition.unwrap_or(at);
-    for a in alternatives(of).filter(|a| fits(root, a, data)) {
-        out.insert(format!("{at}: {}", name(a)));
-        used(root, a, at, data, out);
-    }
+    out.extend(alternatives(of).into_iter().filter(|a| (a.1)(data)).map(|a| format!("{at}: {}", a.0)));
     for value in data.as_array().into_iter().flatten() {
         if let Some(below) = of.get("items") {
             used(root, below, at, value, out);
         }
     }
+    if let (Some(words), Some(_)) = (of["then"].get("$ref"), data.as_str()) {
+        used(root, &of["then"], words.as_str().unwrap_or_default(), data, out);
+    }
     let Some(keys) = data.as_object() else { return };
+    if let Some(table) = written_out(of) {
+        return used(root, &table, at, data, out);
+    }
     let properties = of.get("properties").and_then(Json::as_object);
     for (key, value) in keys {
         if let Some(below) = properties.and_then(|p| p.get(key)).or_else(|| of.get("additionalProperties")) {

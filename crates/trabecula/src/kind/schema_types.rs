@@ -1,0 +1,84 @@
+//! The schema of a value of one of several JSON types, without alternatives: a number or a table, a word or a table.
+//!
+//! Most keywords of JSON Schema hold for one type alone (`minimum` for numbers, `items` for lists, `properties` for tables), so those
+//! of several schemas can stand side by side if their types differ, and a validator names what is wrong with the value that is there.
+//! `enum` and `const` hold for every type; they are put under a condition.
+
+use super::schema::{Defs, reference};
+use super::{Node, Value};
+
+/// The JSON types that a schema allows.
+fn types(schema: &Node) -> Vec<&str> {
+    match schema.get("type").map(|t| &t.value) {
+        Some(Value::Text(name)) => vec![name.as_str()],
+        Some(Value::List(names)) => names.iter().filter_map(Node::as_text).collect(),
+        _ if schema.get("enum").is_some() => vec!["string"],
+        _ => Vec::new(),
+    }
+}
+
+/// The same schema, and those in it, with the keywords side by side of every `anyOf` whose types differ.
+pub(super) fn one_of_types(schema: &Node, defs: &Defs) -> Node {
+    let inner = |node: &Node| one_of_types(node, defs);
+    match &schema.value {
+        Value::List(items) => items.iter().map(inner).collect::<Vec<Node>>().into(),
+        Value::Table(entries) => {
+            let table = entries.iter().map(|(key, _, node)| (key.clone(), None, inner(node))).collect();
+            let table: Node = Value::Table(table).into();
+            let Some(Value::List(choices)) = table.get("anyOf").map(|n| &n.value) else { return table };
+            // Of a definition the keys stand here; those within them are references again.
+            let choices: Vec<Node> = choices.iter().map(|choice| resolved(choice, defs)).collect();
+            let all: Vec<&str> = choices.iter().flat_map(types).collect();
+            let differ = all.iter().enumerate().all(|(i, t)| !all[..i].contains(t))
+                && choices.iter().all(|c| !types(c).is_empty());
+            // The condition of a table with sets of keys would hold for other values too; `words` alone sees to that.
+            let conditional = choices.iter().any(|c| c.get("if").is_some());
+            if !differ || conditional && all.iter().any(|t| !["object", "string"].contains(t)) {
+                return table;
+            }
+            let one = merged(&choices);
+            table.entries().filter(|e| e.0 != "anyOf").fold(one, |one, (key, node)| one.with(key, node.clone()))
+        }
+        _ => schema.clone(),
+    }
+}
+
+/// A reference as what it refers to, with its name.
+fn resolved(schema: &Node, defs: &Defs) -> Node {
+    match defs.resolve(schema) {
+        Some((name, of)) => one_of_types(of, defs).with("x-kind", name.into()),
+        None => schema.clone(),
+    }
+}
+
+/// One schema of several whose types differ. Descriptions, each of one type, are left out.
+pub(super) fn merged(choices: &[Node]) -> Node {
+    let names = choices.iter().flat_map(types).map(Node::from).collect::<Vec<_>>();
+    let (listed, others): (Vec<&Node>, Vec<&Node>) = choices.iter().partition(|c| c.get("enum").is_some());
+    let own = others.iter().flat_map(|c| c.entries()).filter(|e| !["type", "description"].contains(&e.0));
+    let out = own.fold(Node::table([("type", names.into())]), |out, (key, node)| out.with(key, node.clone()));
+    listed.into_iter().fold(out, words)
+}
+
+/// Adds the words that text may be. Editors offer the words in an `anyOf` but look into no `then`, which alone refuses others with
+/// a list of these; hence the second choice of `anyOf`, which allows anything.
+fn words(schema: Node, words: &Node) -> Node {
+    const CONDITION: [&str; 3] = ["if", "then", "else"];
+    let anything: Node = Value::Table(Vec::new()).into();
+    let words = match words.get("x-kind").and_then(Node::as_text) {
+        Some(name) => reference(name),
+        None => words
+            .entries()
+            .filter(|e| ["enum", "x-taplo"].contains(&e.0))
+            .fold(anything.clone(), |out, (key, node)| out.with(key, node.clone())),
+    };
+    let (condition, rest): (Vec<_>, Vec<_>) = schema.entries().partition(|e| CONDITION.contains(&e.0));
+    let table = |entries: Vec<(&str, &Node)>| -> Node {
+        entries.into_iter().fold(anything.clone(), |out, (key, node)| out.with(key, node.clone()))
+    };
+    let schema = table(rest)
+        .with("anyOf", vec![words.clone(), anything.clone()].into())
+        .with("if", Node::table([("type", "string".into())]))
+        .with("then", words);
+    if condition.is_empty() { schema } else { schema.with("else", table(condition)) }
+}
