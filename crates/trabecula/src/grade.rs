@@ -38,7 +38,7 @@ pub use rbf::Rbf;
 pub use region_step::region_step;
 pub use remapped::Remapped;
 pub use result::FieldKind;
-pub(crate) use result::several;
+pub(crate) use result::{lines, several};
 pub use samples::Samples;
 pub use sigmoid::{Sigmoid, SigmoidKind};
 pub use steps::Steps;

@@ -66,22 +66,30 @@ pub(super) fn percent(share: f64) -> String {
 }
 
 fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
+    let made = columns(spec, path, environment, |array| {
+        let chosen = component(spec, path, array)?;
+        Ok((1, move |t: &[f64], _| t[chosen]))
+    })?;
+    let one = made.into_iter().next();
+    one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
+}
+
+/// The component that is meant.
+fn component(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<usize, DesignError> {
     let at = format!("{path}.component");
-    let made = components(spec, path, environment, |array| match (spec.component, array.components) {
+    match (spec.component, array.components) {
         (_, 0) => Err(DesignError::new(path, format!("the array \"{}\" has no components", array.name))),
-        (None, 1) => Ok(vec![0]),
+        (None, 1) => Ok(0),
         (None, n) => Err(DesignError::new(
             &at,
             format!("the array \"{}\" has {n} components; give component, from 0 to {}", array.name, n - 1),
         )),
-        (Some(c), n) if (c as usize) < n => Ok(vec![c as usize]),
+        (Some(c), n) if (c as usize) < n => Ok(c as usize),
         (Some(c), n) => Err(DesignError::new(
             &at,
             format!("component is {}; the array \"{}\" has components 0 to {}", c, array.name, n - 1),
         )),
-    })?;
-    let one = made.into_iter().next();
-    one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
+    }
 }
 
 /// The components of a vector (three) or a symmetric tensor (six, in the order 11, 22, 33, 23, 13, 12).
@@ -91,25 +99,49 @@ pub(crate) fn several<const N: usize>(
     environment: &Environment,
     order: impl Fn(usize) -> Option<[usize; N]>,
 ) -> Result<[Grade; N], DesignError> {
-    let made = components(spec, path, environment, |array| {
-        order(array.components).map(|o| o.to_vec()).ok_or_else(|| {
-            let needed = if N == 3 { "a vector has three" } else { "a tensor has six or nine" };
-            DesignError::new(
-                format!("{path}.array"),
-                format!("the array \"{}\" has {} components; {needed}", array.name, array.components),
-            )
-        })
+    let made = columns(spec, path, environment, |array| {
+        let order = order(array.components).ok_or_else(|| wrong_components(path, array, "a tensor has six or nine"))?;
+        Ok((N, move |t: &[f64], c: usize| t[order[c]]))
     })?;
-    let mut made = made.into_iter().map(Grade::from);
-    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
+    Ok(grades(made))
 }
 
-/// The chosen components of an array, on grids over the region.
-fn components(
+/// The tensors v vᵀ (11, 22, 33, 23, 13, 12) of vectors made unit vectors at the file's own points, so that their signs and lengths do
+/// not count between them.
+pub(crate) fn lines(spec: &FieldKind, path: &str, environment: &Environment) -> Result<[Grade; 6], DesignError> {
+    const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]];
+    let made = columns(spec, path, environment, |array| {
+        if array.components != 3 {
+            return Err(wrong_components(path, array, "a vector has three"));
+        }
+        let square = |t: &[f64]| t.iter().map(|v| v * v).sum::<f64>();
+        if let Some(n) = array.values.chunks_exact(3).position(|t| !(square(t) > 0.0)) {
+            let what = if array.of_cells { "cell" } else { "point" };
+            let message =
+                format!("the array \"{}\" is zero at {what} {n}; it needs a direction everywhere", array.name);
+            return Err(DesignError::new(format!("{path}.array"), message));
+        }
+        Ok((6, move |t: &[f64], c: usize| t[PAIRS[c][0]] * t[PAIRS[c][1]] / square(t)))
+    })?;
+    Ok(grades(made))
+}
+
+fn wrong_components(path: &str, array: &formats::Array, needed: &str) -> DesignError {
+    let message = format!("the array \"{}\" has {} components; {needed}", array.name, array.components);
+    DesignError::new(format!("{path}.array"), message)
+}
+
+fn grades<const N: usize>(made: Vec<Samples>) -> [Grade; N] {
+    let mut made = made.into_iter().map(Grade::from);
+    core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0)))
+}
+
+/// Numbers made from each tuple of an array, on grids over the region: `choose` gives how many, and each from the tuple and its index.
+fn columns<F: Fn(&[f64], usize) -> f64>(
     spec: &FieldKind,
     path: &str,
     environment: &Environment,
-    choose: impl Fn(&formats::Array) -> Result<Vec<usize>, DesignError>,
+    choose: impl Fn(&formats::Array) -> Result<(usize, F), DesignError>,
 ) -> Result<Vec<Samples>, DesignError> {
     let at = format!("{path}.path");
     let file = environment.load(&spec.path, &at)?;
@@ -134,8 +166,8 @@ fn components(
         return Err(DesignError::new(format!("{path}.array"), message));
     }
     let unit = spec.unit.map_or(1.0, Unit::in_mm);
-    let chosen = choose(array)?;
-    let column = |c: usize| array.values.chunks_exact(array.components).map(move |t| t[c]);
+    let (count, number) = choose(array)?;
+    let column = |c: usize| array.values.chunks_exact(array.components).map(|t| number(t, c)).collect::<Vec<f64>>();
     let (points, tets, of): (Vec<Vec3>, _, _) = match data.shape {
         Shape::Mesh(elements) => {
             let (tets, of) = elements.tets();
@@ -148,15 +180,14 @@ fn components(
             } else {
                 (origin, nodes)
             };
-            let made = chosen.iter().map(|&c| Samples::new(origin, step, shape, column(c).collect()));
+            let made = (0..count).map(|c| Samples::new(origin, step, shape, column(c)));
             return made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong);
         }
     };
     // Values of cells go to their corners, weighted by volume.
-    let values: Vec<Vec<f64>> = chosen
-        .iter()
-        .map(|&c| {
-            let own: Vec<f64> = column(c).collect();
+    let values: Vec<Vec<f64>> = (0..count)
+        .map(|c| {
+            let own = column(c);
             if !array.of_cells {
                 return own;
             }

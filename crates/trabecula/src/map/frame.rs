@@ -3,7 +3,10 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 use super::phase_grid::Grid;
+use super::smooth_frames::Smoothing;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{
@@ -17,71 +20,138 @@ pub enum Orientation {
     /// R = Rx Ry Rz of three angles (degrees).
     Angles([Grade; 3]),
     /// The third axis along a vector, by the least turn from z. The vector's sign and length do not matter.
-    Direction([Grade; 3]),
+    Direction(Axis),
     /// The first and the third axis along two vectors: the third exactly, the first as nearly as it can.
     Frame {
         /// The first axis.
-        x: [Grade; 3],
+        x: Axis,
         /// The third axis.
-        z: [Grade; 3],
+        z: Axis,
     },
     /// The axes along the principal directions of a symmetric tensor, given as 11, 22, 33, 23, 13, 12.
     Stress([Grade; 6]),
 }
 
+/// The direction of an axis.
+#[derive(Clone)]
+pub enum Axis {
+    /// Along a vector v.
+    Vector([Grade; 3]),
+    /// Along the principal direction of the greatest value of a tensor v vᵀ, given as 11, 22, 33, 23, 13, 12: for vectors whose signs
+    /// are arbitrary, which vanish between two opposite ones.
+    Line([Grade; 6]),
+}
+
+impl Axis {
+    /// Unit vectors at points; those of lines have arbitrary signs.
+    fn vectors(&self, points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
+        match self {
+            Axis::Vector(of) => vectors(of, points, key),
+            Axis::Line(of) => along(&columns(of, points, key)?, points, key),
+        }
+    }
+
+    fn is_constant(&self) -> bool {
+        match self {
+            Axis::Vector(of) => constant(of),
+            Axis::Line(of) => constant(of),
+        }
+    }
+
+    /// Unit vectors at the nodes of a grid, smoothed; of lines with the signs that neighbours have.
+    fn at_nodes(
+        &self,
+        grid: &Grid,
+        nodes: &[Vec3],
+        key: &str,
+        smoothing: Option<&Smoothing>,
+    ) -> Result<Vec<Vec3>, Fault> {
+        let mut found = self.vectors(nodes, key)?;
+        let own = smoothing.map(|_| found.clone());
+        if let Some(smoothing) = smoothing {
+            let tensors: Vec<[f64; 6]> = found.iter().map(|v| square(*v)).collect();
+            found = along(&smoothing.axes(grid, &tensors), nodes, key)?;
+        }
+        match (self, own) {
+            (Axis::Vector(_), None) => {}
+            // A vector keeps the sign that it was given.
+            (Axis::Vector(_), Some(own)) => {
+                found.iter_mut().zip(&own).for_each(|(v, own)| *v = toward(*v, *own));
+            }
+            (Axis::Line(_), _) => comb(grid, &mut found, |_| 1.0, |_, v, to| toward(*v, *to)),
+        }
+        Ok(found)
+    }
+}
+
+/// v vᵀ as 11, 22, 33, 23, 13, 12.
+fn square([x, y, z]: Vec3) -> [f64; 6] {
+    [x * x, y * y, z * z, y * z, x * z, x * y]
+}
+
+/// The one of v and −v that is nearer to another vector.
+fn toward(v: Vec3, to: Vec3) -> Vec3 {
+    if dot(v, to) < 0.0 { scale(v, -1.0) } else { v }
+}
+
+fn constant(of: &[Grade]) -> bool {
+    of.iter().all(|g| g.constant().is_some())
+}
+
 impl Orientation {
     /// The frames at the nodes of a grid. Where signs and axes are not given, they are chosen so that neighbours agree.
-    pub(super) fn frames(&self, grid: &Grid, nodes: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+    pub(super) fn frames(&self, grid: &Grid, nodes: &[Vec3], smoothing: Option<&Smoothing>) -> Result<Frames, Fault> {
+        let sure = |at_nodes| Ok(Frames { at_nodes, trust: None });
         match self {
             Orientation::Angles(of) => {
                 let angles = columns(of, nodes, "rotate")?;
-                if of.iter().all(|g| g.constant().is_some()) {
-                    return Ok(vec![rotation(angles[0]); nodes.len()]);
+                if constant(of) {
+                    return sure(vec![rotation(angles[0]); nodes.len()]);
                 }
-                Ok(angles.into_iter().map(rotation).collect())
+                sure(angles.into_iter().map(rotation).collect())
             }
             Orientation::Direction(of) => {
-                let mut along = vectors(of, nodes, "direction")?;
-                comb(
-                    grid,
-                    &mut along,
-                    |_| 1.0,
-                    |_, v, to| {
-                        if dot(*v, *to) < 0.0 { scale(*v, -1.0) } else { *v }
-                    },
-                );
-                Ok(along.into_iter().map(turned_from_z).collect())
+                let mut along = of.at_nodes(grid, nodes, "direction", smoothing)?;
+                comb(grid, &mut along, |_| 1.0, |_, v, to| toward(*v, *to));
+                sure(along.into_iter().map(turned_from_z).collect())
             }
-            Orientation::Frame { x, z } => squared(x, z, nodes),
+            Orientation::Frame { x, z } => {
+                let x = x.at_nodes(grid, nodes, "frame.x", smoothing)?;
+                sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing)?, nodes)?)
+            }
             Orientation::Stress(of) => {
                 let values = columns(of, nodes, "stress")?;
-                let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) = values.iter().map(principal).unzip();
-                let sure: Vec<f64> = gaps.iter().map(|g| g[0].min(g[1]).min(g[2])).collect();
-                if gaps.iter().all(|g| *g == [0.0; 3]) {
-                    let message =
-                        "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
-                    return Err(Fault::new("stress", message));
+                let (mut frames, gaps) = principal_frames(&values, None)?;
+                if let Some(smoothing) = smoothing {
+                    let averages = smoothing.frames(grid, &frames, &gaps);
+                    comb(grid, &mut frames, |n| averages.confidence(n), |n, _, to| averages.settled(n, to));
+                    return Ok(Frames { at_nodes: frames, trust: Some(averages.trust()) });
                 }
                 let turns = cube();
-                comb(grid, &mut frames, |n| sure[n], |n, f, to| settled(f, &gaps[n], to, &turns));
-                Ok(frames)
+                let least = |n: usize| gaps[n][0].min(gaps[n][1]).min(gaps[n][2]);
+                comb(grid, &mut frames, least, |n, f, to| settled(f, &gaps[n], to, &turns));
+                sure(frames)
             }
         }
     }
 
     /// Whether it is the same everywhere.
     pub(super) fn is_constant(&self) -> bool {
-        let all = |of: &[Grade]| of.iter().all(|g| g.constant().is_some());
         match self {
-            Orientation::Angles(of) | Orientation::Direction(of) => all(of),
-            Orientation::Frame { x, z } => all(x) && all(z),
-            Orientation::Stress(of) => all(of),
+            Orientation::Angles(of) => constant(of),
+            Orientation::Direction(of) => of.is_constant(),
+            Orientation::Frame { x, z } => x.is_constant() && z.is_constant(),
+            Orientation::Stress(of) => constant(of),
         }
     }
 
     /// Whether signs or axes are chosen so that neighbours agree.
     pub(super) fn is_combed(&self) -> bool {
-        matches!(self, Orientation::Direction(_) | Orientation::Stress(_))
+        match self {
+            Orientation::Angles(_) => false,
+            Orientation::Frame { x, z } => [x, z].iter().any(|a| matches!(a, Axis::Line(_))),
+            Orientation::Direction(_) | Orientation::Stress(_) => true,
+        }
     }
 
     /// The key that it is given by.
@@ -94,29 +164,85 @@ impl Orientation {
         }
     }
 
-    /// The frames at points; where signs and axes are not given, those nearest to `like`.
-    pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3]) -> Result<Vec<Mat3>, Fault> {
+    /// The greatest difference of two principal values of a stress at points, against which directions are more or less sure; 0 for other
+    /// orientations.
+    pub(super) fn stress_range(&self, points: &[Vec3]) -> Result<f64, Fault> {
+        let Orientation::Stress(of) = self else { return Ok(0.0) };
+        let values = columns(of, points, "stress")?;
+        Ok(values.par_iter().map(|t| difference(&principal(t).1)).reduce(|| 0.0, f64::max))
+    }
+
+    /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is the greatest difference of two
+    /// principal values in the part.
+    pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3], range: f64) -> Result<Vec<Mat3>, Fault> {
+        let signed = |of: &Axis, key: &str, axis: usize| -> Result<Vec<Vec3>, Fault> {
+            let mut found = of.vectors(points, key)?;
+            if matches!(of, Axis::Line(_)) {
+                let like = like.iter().map(|l| [l[0][axis], l[1][axis], l[2][axis]]);
+                found.iter_mut().zip(like).for_each(|(v, l)| *v = toward(*v, l));
+            }
+            Ok(found)
+        };
         match self {
             Orientation::Angles(of) => {
                 let angles = columns(of, points, "rotate")?;
                 Ok(angles.into_iter().map(rotation).collect())
             }
             Orientation::Direction(of) => {
-                let along = vectors(of, points, "direction")?.into_iter().zip(like);
-                let signed = along.map(|(v, l)| {
-                    let sign = dot(v, [l[0][2], l[1][2], l[2][2]]).signum();
-                    scale(v, sign)
-                });
-                Ok(signed.map(turned_from_z).collect())
+                let along = of.vectors(points, "direction")?.into_iter().zip(like);
+                Ok(along.map(|(v, l)| turned_from_z(toward(v, [l[0][2], l[1][2], l[2][2]]))).collect())
             }
-            Orientation::Frame { x, z } => squared(x, z, points),
+            Orientation::Frame { x, z } => squared(signed(x, "frame.x", 0)?, signed(z, "frame.z", 2)?, points),
             Orientation::Stress(of) => {
                 let (values, turns) = (columns(of, points, "stress")?, cube());
-                let frames = values.iter().map(principal).zip(like);
-                Ok(frames.map(|((f, gaps), l)| settled(&f, &gaps, l, &turns)).collect())
+                let (frames, gaps) = principal_frames(&values, Some(range))?;
+                let all = frames.iter().zip(&gaps).zip(like);
+                Ok(all.map(|((f, gaps), l)| settled(f, gaps, l, &turns)).collect())
             }
         }
     }
+}
+
+/// Frames at the nodes of a grid.
+pub(super) struct Frames {
+    pub at_nodes: Vec<Mat3>,
+    /// How sure they are, from 0 to 1, where that differs.
+    pub trust: Option<Vec<f64>>,
+}
+
+/// The principal frames of tensors, and the gaps of their values over the greatest difference of two in the part, that of these tensors
+/// unless given: where little is carried no direction is sure.
+fn principal_frames(values: &[[f64; 6]], range: Option<f64>) -> Result<(Vec<Mat3>, Vec<Vec3>), Fault> {
+    let all: Vec<(Mat3, Vec3)> = values.par_iter().map(principal).collect();
+    let range = range.unwrap_or_else(|| all.iter().fold(0.0, |m, (_, v)| m.max(difference(v))));
+    if range == 0.0 {
+        let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
+        return Err(Fault::new("stress", message));
+    }
+    let gap = |v: &Vec3, i: usize| (v[i] - v[(i + 1) % 3]).abs().min((v[i] - v[(i + 2) % 3]).abs()) / range;
+    Ok(all.into_iter().map(|(f, v)| (f, [gap(&v, 0), gap(&v, 1), gap(&v, 2)])).unzip())
+}
+
+/// The greatest difference of three values.
+fn difference([a, b, c]: &Vec3) -> f64 {
+    (a - b).abs().max((b - c).abs()).max((c - a).abs())
+}
+
+/// The principal directions of the greatest values of tensors v vᵀ or sums of such.
+fn along(tensors: &[[f64; 6]], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
+    let one = |(t, p): (&[f64; 6], &Vec3)| {
+        let (axes, values) = principal(t);
+        let i = (0..3).fold(0, |m, i| if values[i] > values[m] { i } else { m });
+        if values[i] < 1e-12 {
+            return Err(no_direction(key, *p));
+        }
+        Ok([axes[0][i], axes[1][i], axes[2][i]])
+    };
+    tensors.par_iter().zip(points).map(one).collect()
+}
+
+fn no_direction(key: &str, p: Vec3) -> Fault {
+    Fault::new(key, format!("the vector is zero at {}; it needs a direction all over the region's bounds", in_mm(p)))
 }
 
 /// The frame between those at the nodes about a point: their mean, made orthonormal; of the nearest node where they are too far
@@ -148,8 +274,7 @@ pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], p: Vec3) -> Mat3 {
 }
 
 /// The frames of first and third axes.
-fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
-    let (x, z) = (vectors(x, points, "frame.x")?, vectors(z, points, "frame.z")?);
+fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
     let both = x.into_iter().zip(z).enumerate();
     both.map(|(n, (x, z))| {
         let x = sub(x, scale(z, dot(x, z)));
@@ -192,10 +317,7 @@ fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fau
     let mut found = columns(of, points, key)?;
     for (v, p) in found.iter_mut().zip(points) {
         if norm(*v) < 1e-12 {
-            return Err(Fault::new(
-                key,
-                format!("the vector is zero at {}; it needs a direction all over the region's bounds", in_mm(*p)),
-            ));
+            return Err(no_direction(key, *p));
         }
         *v = unit(*v);
     }
@@ -216,19 +338,14 @@ fn turned_from_z(d: Vec3) -> Mat3 {
     transpose(&[[1.0 - x * x * s, -x * y * s, -x], [-x * y * s, 1.0 - y * y * s, -y], [x, y, z]])
 }
 
-/// A gap between principal values, over the greatest of them, below which they count as equal.
+/// A gap between principal values, over the greatest difference in the part, below which they count as equal.
 const DOUBT: f64 = 0.05;
 
-/// The principal directions of a symmetric tensor, as a right-handed frame, and for each how far its value is from the
-/// nearest other, over the greatest value.
+/// The principal directions of a symmetric tensor, as a right-handed frame, and its principal values.
 fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
     let [xx, yy, zz, yz, xz, xy] = *t;
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let mut v = IDENTITY;
-    let size = a.as_flattened().iter().fold(0.0f64, |m, c| m.max(c.abs()));
-    if size == 0.0 {
-        return (v, [0.0; 3]);
-    }
     // Jacobi's rotations: a few sweeps bring the off-diagonal entries to rounding.
     for _ in 0..8 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
@@ -244,16 +361,10 @@ fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
             v = product(&v, &r);
         }
     }
-    let values = [a[0][0], a[1][1], a[2][2]];
-    let gap = |i: usize| {
-        let other = |j: usize| (values[i] - values[(i + j) % 3]).abs();
-        other(1).min(other(2)) / size
-    };
-    let gaps = [gap(0), gap(1), gap(2)];
     if determinant(&v) < 0.0 {
         v = v.map(|row| row.map(|c| -c));
     }
-    (v, gaps)
+    (v, [a[0][0], a[1][1], a[2][2]])
 }
 
 /// The 24 rotations of a cube.
@@ -418,7 +529,8 @@ mod tests {
         };
         let turns = cube();
         assert_eq!(turns.len(), 24);
-        let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) = nodes.iter().map(|p| principal(&tensor(*p))).unzip();
+        let values: Vec<[f64; 6]> = nodes.iter().map(|p| tensor(*p)).collect();
+        let (mut frames, gaps) = principal_frames(&values, None).expect("a tensor");
         comb(
             &g,
             &mut frames,
@@ -427,8 +539,9 @@ mod tests {
         );
         let by = product(&transpose(&frame(nodes[0])), &frames[0]);
         for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
-            // The eigenvectors' rounding over the gap; where values agree, the path to the next node that is sure.
-            let within = if gaps.iter().all(|g| *g > DOUBT) { 1e-3 } else { 15.0 };
+            // The eigenvectors' rounding over the gap; where values agree, the two steps to the next node that is sure, on each of
+            // which the frame turns by at most 11 degrees.
+            let within = if gaps.iter().all(|g| *g > DOUBT) { 1e-3 } else { 22.0 };
             assert!(angle(f, &product(&frame(*p), &by)) < within, "{} {within}", angle(f, &product(&frame(*p), &by)));
             assert!((determinant(f) - 1.0).abs() < 1e-12);
         }
@@ -452,7 +565,8 @@ mod tests {
             let values = nodes.iter().map(|p| tensor(*p)[c]).collect();
             Grade::from(Samples::new(g.origin, g.step, g.shape, values).expect("samples"))
         };
-        let frames = Orientation::Stress(core::array::from_fn(component)).frames(&g, &nodes).expect("frames");
+        let frames =
+            Orientation::Stress(core::array::from_fn(component)).frames(&g, &nodes, None).expect("frames").at_nodes;
         for (n, f) in frames.iter().enumerate() {
             assert!((determinant(f) - 1.0).abs() < 1e-9);
             if nodes[n][0] < 4.6 {
@@ -474,7 +588,7 @@ mod tests {
         let (g, nodes) = grid();
         // The sign flips in the middle; lines do not care.
         let of = [formula("sin(x)*(y-3.3)"), formula("0.5*(y-3.3)"), formula("cos(x)*(y-3.3)")];
-        let frames = Orientation::Direction(of).frames(&g, &nodes).expect("frames");
+        let frames = Orientation::Direction(Axis::Vector(of)).frames(&g, &nodes, None).expect("frames").at_nodes;
         for (n, f) in frames.iter().enumerate() {
             let want = unit([nodes[n][0].sin(), 0.5, nodes[n][0].cos()]);
             let z = apply(f, [0.0, 0.0, 1.0]);
@@ -483,7 +597,7 @@ mod tests {
             let ff = product(f, &transpose(f));
             assert!(angle(&ff, &IDENTITY) < 1e-5);
         }
-        let zero = Orientation::Direction([formula("x-1"), formula("y-2"), formula("z-3")]);
-        assert!(zero.frames(&g, &nodes).expect_err("zero").message.contains("(1.0000, 2.0000, 3.0000)"));
+        let zero = Orientation::Direction(Axis::Vector([formula("x-1"), formula("y-2"), formula("z-3")]));
+        assert!(zero.frames(&g, &nodes, None).err().expect("zero").message.contains("(1.0000, 2.0000, 3.0000)"));
     }
 }

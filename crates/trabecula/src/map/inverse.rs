@@ -112,6 +112,7 @@ mod tests {
             offset: [0.2, 0.3, -0.1],
             weight: None,
             angle_weight: 1.0,
+            smooth: None,
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

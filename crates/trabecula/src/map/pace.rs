@@ -186,6 +186,8 @@ struct Probe<'a> {
     wanted: &'a Wanted,
     bounds: Aabb,
     points: Vec<Vec3>,
+    /// The greatest difference of two principal values of a stress.
+    range: f64,
 }
 
 impl<'a> Probe<'a> {
@@ -205,12 +207,17 @@ impl<'a> Probe<'a> {
             points.retain(|_| depth.next().is_some_and(|d| d <= 0.0));
         }
         points.truncate(POINTS[0]);
-        Ok((!points.is_empty()).then_some(Probe { wanted, bounds: *bounds, points }))
+        let range = wanted.orientation.stress_range(&points)?;
+        Ok((!points.is_empty()).then_some(Probe { wanted, bounds: *bounds, points, range }))
     }
 
     /// The wavelengths and the frames at points; of frames that are alike, those nearest to `like`.
     fn target(&self, points: &[Vec3], like: &[Mat3]) -> Result<Vec<(Vec3, Mat3)>, Fault> {
-        let frames = self.wanted.orientation.frames_near(points, like)?;
+        // What is smoothed varies no faster than the grid can carry.
+        let frames = match self.wanted.smooth {
+            Some(_) => like.to_vec(),
+            None => self.wanted.orientation.frames_near(points, like, self.range)?,
+        };
         Ok(wavelengths(&self.wanted.wavelength, points)?.into_iter().zip(frames).collect())
     }
 

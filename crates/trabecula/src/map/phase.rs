@@ -8,10 +8,11 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
-use super::frame::{self, Orientation, in_mm};
+use super::frame::{self, Frames, Orientation, in_mm};
 use super::pace;
 use super::phase_grid::Grid;
 use super::poisson::Poisson;
+use super::smooth_frames::Smoothing;
 use super::spline::{self, Spline};
 use super::tilt::Tilt;
 use super::{Mapping, Rows, inverse};
@@ -45,6 +46,8 @@ pub struct Wanted {
     /// What an error of angle counts, for the same error of spacing (squares of the parts of ∇Φ − K across and along K); 1 if
     /// both count alike.
     pub angle_weight: f64,
+    /// The length over which directions, frames and stresses are smoothed, mm.
+    pub smooth: Option<f64>,
     /// Moves the lattice (mm).
     pub offset: Vec3,
 }
@@ -67,6 +70,8 @@ pub struct Phase {
     shift: Vec3,
     /// Least and greatest target wavelength, mm.
     wavelengths: [f64; 2],
+    /// The greatest difference of two principal values of a stress, at the nodes.
+    stress_range: f64,
     /// The mean wavelengths along the three axes of the cell, mm.
     mean: Vec3,
     /// A Lipschitz bound in the region's bounds, turns per mm.
@@ -90,13 +95,16 @@ impl Phase {
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
         let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
         checkpoint();
-        let frames = wanted.orientation.frames(&grid, &nodes)?;
-        checkpoint();
         let mut depth = vec![f64::NEG_INFINITY; grid.len()];
         if let Some(region) = settings.region {
             let chunks = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
             chunks.for_each(|(d, p)| region.values(p, d));
         }
+        let weight: Vec<f64> = depth.iter().map(|d| nearness(&grid, *d).powi(2)).collect();
+        let smoothing = wanted.smooth.map(|length| Smoothing { length, weight: &weight });
+        let Frames { at_nodes: frames, trust } = wanted.orientation.frames(&grid, &nodes, smoothing.as_ref())?;
+        checkpoint();
+        let range = wanted.orientation.stress_range(&nodes)?;
         let reach = 1e-9 * norm(bounds.size());
         let inside: Vec<bool> = depth.iter().map(|d| *d <= reach).collect();
         pace::check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
@@ -105,7 +113,11 @@ impl Phase {
             let of = frames.iter().zip(&wavelength);
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
         });
-        let close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
+        let mut close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
+        if let Some(trust) = trust {
+            let roots = close.get_or_insert_with(|| vec![1.0; nodes.len()]);
+            roots.iter_mut().zip(&trust).for_each(|(root, t)| *root = (*root * t.sqrt()).max(LEAST_ROOT));
+        }
         let ratio = wanted.angle_weight;
         if !(LEAST_RATIO..=1.0 / LEAST_RATIO).contains(&ratio) {
             let message = format!(
@@ -133,14 +145,14 @@ impl Phase {
         let (compared, between) = compared(&grid, &inside, settings.region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
         let jacobians: Vec<Mat3> = positions.par_iter().map(|p| spline.jacobian(*p).1).collect();
-        let off_nodes = targets(wanted, &grid, &frames, &between)?;
+        let off_nodes = targets(wanted, range, &grid, &frames, &between)?;
         let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
         let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
         let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
         let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(&grid, &k, n)).collect();
-        let range =
+        let lengths_range =
             wavelength.iter().flatten().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
-        let turn = distortion::turning(&grid, &frames, &inside, range[1]);
+        let turn = distortion::turning(&grid, &frames, &inside, lengths_range[1]);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);
@@ -151,7 +163,7 @@ impl Phase {
         };
         distortion.widen_density(&found, &positions);
         if !settings.folds {
-            refuse_folds(&grid, &spline, &distortion, &inside)?;
+            refuse_folds(&grid, &spline, &distortion, &inside, &remedy(wanted, lengths_range[1]))?;
         }
         let shift = mean.map(|m| -dot(m, wanted.offset));
         let average = (within.iter()).fold([0.0; 3], |s, &n| add(s, wavelength[n]));
@@ -164,14 +176,15 @@ impl Phase {
             spline,
             wanted: wanted.clone(),
             shift,
-            wavelengths: range,
+            wavelengths: lengths_range,
+            stress_range: range,
             mean: if within.is_empty() { wavelength[0] } else { scale(average, 1.0 / within.len() as f64) },
             max_lipschitz,
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
             hasty: chosen.hasty,
-            frames: OnceLock::new(),
+            frames: if wanted.smooth.is_some() { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
         })
     }
 
@@ -187,21 +200,21 @@ impl Phase {
     /// Numbers that are not finite, vectors without a direction.
     pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
         let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
-        let targets = targets(&self.wanted, self.spline.grid(), &self.combed()?, points)?;
+        let targets = targets(&self.wanted, self.stress_range, self.spline.grid(), &self.combed()?, points)?;
         Ok(jacobians.iter().zip(&targets).map(|(j, k)| distortion::compare(j, k)).collect())
     }
 
     /// The frames at the nodes, made again where points need them for their signs and axes.
     fn combed(&self) -> Result<Arc<[Mat3]>, Fault> {
-        if !self.wanted.orientation.is_combed() {
-            return Ok(Arc::default());
-        }
         if let Some(frames) = self.frames.get() {
             return Ok(frames.clone());
         }
+        if !self.wanted.orientation.is_combed() {
+            return Ok(Arc::default());
+        }
         let grid = self.spline.grid();
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes)?.into();
+        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None)?.at_nodes.into();
         Ok(self.frames.get_or_init(|| made).clone())
     }
 
@@ -316,13 +329,15 @@ fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<us
     (some(COMPARED).filter(|n| inside[*n]).collect(), between)
 }
 
-/// The target gradients at points; `frames` are those of the nodes, from which points have their signs and axes.
-fn targets(wanted: &Wanted, grid: &Grid, frames: &[Mat3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
-    let like: Vec<Mat3> = match wanted.orientation.is_combed() {
+/// The target gradients at points; `frames` are those of the nodes, from which points have their signs and axes, or, if they are
+/// smoothed, their frames.
+fn targets(wanted: &Wanted, range: f64, grid: &Grid, frames: &[Mat3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+    let smooth = wanted.smooth.is_some();
+    let like: Vec<Mat3> = match smooth || wanted.orientation.is_combed() {
         true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
         false => Vec::new(),
     };
-    let frames = wanted.orientation.frames_near(points, &like)?;
+    let frames = if smooth { like } else { wanted.orientation.frames_near(points, &like, range)? };
     let wavelength = wavelengths(&wanted.wavelength, points)?;
     let each = frames.iter().zip(&wavelength).map(|(f, w)| {
         let k = transpose(f);
@@ -356,7 +371,7 @@ pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>,
 
 /// The roots of the weights of nodes: closeness to the region times the target's weight. `None` if all are one.
 fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3]) -> Result<Option<Vec<f64>>, Fault> {
-    let fall = FALL * grid.step.into_iter().fold(0.0, f64::max);
+    let fall = fall(grid);
     let mut roots = vec![1.0; nodes.len()];
     if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
         weight.values(nodes, &mut roots);
@@ -378,9 +393,18 @@ fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3])
     } else if depth.iter().all(|d| *d <= 1e-6 * fall) {
         return Ok(None);
     }
-    let near = |d: &f64| (-d.max(0.0) / fall).exp();
-    let roots = roots.iter().zip(depth).map(|(w, d)| (w * near(d)).max(LEAST_ROOT));
+    let roots = roots.iter().zip(depth).map(|(w, d)| (w * nearness(grid, *d)).max(LEAST_ROOT));
     Ok(Some(roots.collect()))
+}
+
+/// The root of the weight of a node at a signed distance from the region.
+fn nearness(grid: &Grid, distance: f64) -> f64 {
+    (-distance.max(0.0) / fall(grid)).exp()
+}
+
+/// The distance over which roots of weights fall off by e, mm.
+fn fall(grid: &Grid) -> f64 {
+    FALL * grid.step.into_iter().fold(0.0, f64::max)
 }
 
 /// The three phases at the nodes, the mean of the rows of K, and the number of steps. With K̄ the mean of K, that of
@@ -422,8 +446,29 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> 
     (core::array::from_fn(|_| values.next().unwrap_or_default()), mean, steps)
 }
 
+/// What may keep a map from folding.
+fn remedy(wanted: &Wanted, longest: f64) -> String {
+    match (&wanted.orientation, wanted.smooth) {
+        (Orientation::Angles(_), _) => "Let orientation and wavelength vary more slowly".into(),
+        (of, None) => format!(
+            "Smooth the {} over a length, such as smooth = {}, let orientation and wavelength vary more slowly",
+            of.key(),
+            number(longest)
+        ),
+        (_, Some(length)) => {
+            format!("Use a smooth of more than {} mm, let orientation and wavelength vary more slowly", number(length))
+        }
+    }
+}
+
 /// Refuses a map whose det J is not positive at a node or between nodes in the region.
-fn refuse_folds(grid: &Grid, spline: &Spline, distortion: &Distortion, inside: &[bool]) -> Result<(), Fault> {
+fn refuse_folds(
+    grid: &Grid,
+    spline: &Spline,
+    distortion: &Distortion,
+    inside: &[bool],
+    remedy: &str,
+) -> Result<(), Fault> {
     let at_node = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
     let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
     let far: usize = strides.iter().sum();
@@ -439,7 +484,7 @@ fn refuse_folds(grid: &Grid, spline: &Spline, distortion: &Distortion, inside: &
         Some(p) => Err(Fault::new(
             "",
             format!(
-                "the map folds at {}: cells turn inside out there. Let orientation and wavelength vary more slowly, or allow it with folds = true",
+                "the map folds at {}: cells turn inside out there. {remedy}, or allow it with folds = true",
                 in_mm(p)
             ),
         )),

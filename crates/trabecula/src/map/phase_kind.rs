@@ -1,10 +1,11 @@
 //! The solved map, as it is declared.
 
-use super::{BuildMap, Map, Orientation, Phase, Settings, Wanted, shared};
+use super::{Axis, BuildMap, Map, Orientation, Phase, Settings, Wanted, shared};
 use crate::environment::Environment;
 use crate::field::Field;
-use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, several};
+use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, lines, several};
 use crate::kind::{DesignError, Fault, Key, Kind};
+use geometry::fault::number;
 
 /// Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At most one of
 /// rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
@@ -25,6 +26,10 @@ pub struct PhaseKind {
     /// their directions, below 1 to their sizes.
     #[kind(default = 1.0, min = 0.001, max = 1000.0)]
     angle_weight: f64,
+    /// Length over which a direction, a frame or a stress is smoothed, without regard to signs and order, before cells follow it;
+    /// parts of a stress count by how much they differ between directions. None unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    smooth: Option<f64>,
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
@@ -203,12 +208,19 @@ impl BuildMap for PhaseKind {
             }
             GradeOrThree::Three(of) => each(of, &below("wavelength"), &length)?,
         };
+        if let (Some(length), OrientationKind::Axes(_) | OrientationKind::Rotate(_)) = (self.smooth, &self.orientation)
+        {
+            let message =
+                "smooth is for a direction, a frame or a stress; angles are followed as they are given: leave it out";
+            return Err(DesignError::new(below("smooth"), message).found(number(length)));
+        }
         let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
         let wanted = Wanted {
             wavelength,
             orientation: self.orientation.build(path, environment)?,
             weight: weight.transpose()?,
             angle_weight: self.angle_weight,
+            smooth: self.smooth,
             offset: self.offset,
         };
         let region: &dyn Field = &**environment.region;
@@ -241,10 +253,8 @@ impl OrientationKind {
             None => Ok(Grade::Constant(0.0)),
         };
         let vector = |of: &VectorKind, key: &str| match of {
-            VectorKind::Components(of) => each(of, &below(key), &any),
-            VectorKind::Field(of) => {
-                several(&of.field, &below(&format!("{key}.field")), environment, |n| (n == 3).then_some([0, 1, 2]))
-            }
+            VectorKind::Components(of) => each(of, &below(key), &any).map(Axis::Vector),
+            VectorKind::Field(of) => lines(&of.field, &below(&format!("{key}.field")), environment).map(Axis::Line),
         };
         Ok(match self {
             OrientationKind::Axes(AxisAngles { rotate_x, rotate_y, rotate_z }) => Orientation::Angles([

@@ -11,6 +11,7 @@ mod flush;
 mod islands;
 mod local_thickness;
 mod measured;
+mod noisy_stress;
 mod phase;
 mod simplify;
 mod skin;

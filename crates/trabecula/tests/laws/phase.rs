@@ -29,6 +29,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         orientation: Orientation::Angles(angles.map(formula)),
         weight: None,
         angle_weight: 1.0,
+        smooth: None,
         offset: [0.1, 0.2, 0.3],
     };
     Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))

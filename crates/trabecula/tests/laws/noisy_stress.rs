@@ -1,0 +1,129 @@
+//! Cells along a stress that a solver might give: noise, parts that carry nothing, signs and orders of no meaning.
+
+use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, scale};
+use trabecula::grade::{Grade, Samples};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, Settings, Wanted};
+
+const STEP: f64 = 0.75;
+const WAVELENGTH: f64 = 3.0;
+
+/// A grid of samples over a box, of several components at each position.
+fn samples<const N: usize>(b: &Aabb, of: impl Fn(Vec3, &mut dyn FnMut() -> f64) -> [f64; N]) -> [Grade; N] {
+    let shape = b.size().map(|s| (s / STEP).round() as usize + 1);
+    let mut seed = 7;
+    let mut random = || geometry::random::random(&mut seed);
+    let mut columns = vec![Vec::new(); N];
+    for n in 0..shape.iter().product() {
+        let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
+        let p = core::array::from_fn(|a| b.min[a] + STEP * at[a] as f64);
+        columns.iter_mut().zip(of(p, &mut random)).for_each(|(column, v)| column.push(v));
+    }
+    let made = |c: usize| Grade::from(Samples::new(b.min, [STEP; 3], shape, columns[c].clone()).expect("samples"));
+    core::array::from_fn(made)
+}
+
+fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Phase, String> {
+    let wanted = Wanted {
+        wavelength: [0; 3].map(|_| Grade::Constant(WAVELENGTH)),
+        orientation,
+        weight: None,
+        angle_weight: 1.0,
+        smooth,
+        offset: [0.0; 3],
+    };
+    Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)
+}
+
+fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
+    let b = *b;
+    (1..=n).map(move |i| {
+        let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract());
+        core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a])
+    })
+}
+
+/// The angle (degrees) between a line and the nearest of the lattice's axes.
+fn off_axis(jacobian: &Mat3, along: Vec3) -> f64 {
+    let cosine = jacobian.iter().map(|k| dot(*k, along).abs() / norm(*k)).fold(0.0, f64::max);
+    cosine.min(1.0).acos().to_degrees()
+}
+
+fn mean(angles: impl Iterator<Item = f64>) -> f64 {
+    let all: Vec<f64> = angles.collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+/// Pure bending about z, with noise of each component at each node: wherever the beam carries a tenth of the greatest stress an axis of
+/// the cells lies along it, on average within the noise over that tenth, and nothing folds.
+#[test]
+fn a_bent_beam_is_followed_through_noise() {
+    let b = Aabb { min: [0.0; 3], max: [24.0, 24.0, 9.0] };
+    for noise in [0.0, 0.001, 0.01, 0.03] {
+        let stress = samples(&b, |p, random| {
+            let mut s = [0.0; 6].map(|_| noise * random());
+            s[0] += (p[1] - 12.0) / 12.0;
+            s
+        });
+        let map = solved(&b, Orientation::Stress(stress), Some(WAVELENGTH)).expect("no fold");
+        assert!(points(&b, 20_000).all(|p| determinant(&map.jacobian(p)) > 0.0));
+        let loaded = points(&b, 20_000).filter(|p| (p[1] - 12.0).abs() > 1.2);
+        let angle = mean(loaded.map(|p| off_axis(&map.jacobian(p), [1.0, 0.0, 0.0])));
+        assert!(angle <= (noise / 0.1).atan().to_degrees() + 1e-9, "noise {noise}: {angle}");
+    }
+}
+
+/// Without a smoothing length the same beam folds, and the message names the remedy.
+#[test]
+fn what_folds_names_the_smoothing_length() {
+    let b = Aabb { min: [0.0; 3], max: [24.0, 24.0, 9.0] };
+    let noisy = samples(&b, |_, random| [0.0; 6].map(|_| random()));
+    let message = solved(&b, Orientation::Stress(noisy), None).err().expect("noise alone folds");
+    assert!(message.contains("folds") && message.contains("smooth = 3"), "{message}");
+}
+
+/// The hoop and radial stress of a quarter of a ring: smoothing leaves a direction that turns as it is, and cells follow it as well as
+/// without noise.
+#[test]
+fn a_turning_stress_stays_what_it_is() {
+    let b = Aabb { min: [9.0, 9.0, 0.0], max: [24.0, 24.0, 6.0] };
+    let found = [0.0, 0.01, 0.03].map(|noise| {
+        let stress = samples(&b, |p, random| {
+            let [x, y] = [p[0], p[1]].map(|v| v / p[0].hypot(p[1]));
+            let hoop = [y * y, x * x, 0.0, 0.0, 0.0, -x * y];
+            hoop.map(|v| v + noise * random())
+        });
+        let map = solved(&b, Orientation::Stress(stress), Some(1.5)).expect("no fold");
+        mean(points(&b, 20_000).map(|p| off_axis(&map.jacobian(p), scale([-p[1], p[0], 0.0], 1.0 / p[0].hypot(p[1])))))
+    });
+    assert!(found[1] < 1.5 * found[0] && found[2] < 1.5 * found[0], "{found:?}");
+}
+
+/// Vectors whose signs are random give the cells of the vectors, bit for bit, smoothed or not.
+#[test]
+fn signs_of_vectors_do_not_count() {
+    let b = Aabb { min: [0.0; 3], max: [12.0, 9.0, 9.0] };
+    let axis = |p: Vec3| [(0.05 * p[1]).sin(), 0.1, 1.0];
+    let lines = |signs: bool, turned: bool| {
+        samples(&b, move |p, random| {
+            let sign = if signs && random() > 0.0 { -1.0 } else { 1.0 };
+            let v = if turned { [axis(p)[2], 0.0, -axis(p)[0]] } else { axis(p) };
+            let [x, y, z] = scale(v, sign / norm(v));
+            [x * x, y * y, z * z, y * z, x * z, x * y]
+        })
+    };
+    for smooth in [None, Some(2.0)] {
+        let made = [false, true].map(|signs| {
+            let direction = Orientation::Direction(Axis::Line(lines(signs, false)));
+            let frame = Orientation::Frame { x: Axis::Line(lines(signs, true)), z: Axis::Line(lines(signs, false)) };
+            [direction, frame].map(|of| solved(&b, of, smooth).expect("solved"))
+        });
+        for p in points(&b, 500) {
+            for (a, b) in made[0].iter().zip(&made[1]) {
+                assert_eq!(a.jacobian(p), b.jacobian(p));
+            }
+            let vector = axis(p);
+            let cosine = dot(made[0][0].jacobian(p)[2], vector).abs();
+            assert!(cosine > 0.98 * norm(vector) * norm(made[0][0].jacobian(p)[2]), "{p:?}");
+        }
+    }
+}
