@@ -180,25 +180,26 @@ class Solid(Picture):
 
     def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
         """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell``. Without a request
-        the one that the design's walls need, ``report().spacing``.
+        the one that the design's walls need, ``report().spacing``; where that makes more than 20 million triangles, which are
+        1 GB of STL, a coarser one that still carries the thinnest wall, and ``mesh`` warns of it.
         """
         if edge is not None and per_cell is not None:
             raise ValueError("give edge or per_cell, not both")
         if per_cell is not None:
             edge = self.wavelength / positive("per_cell", per_cell)
-        edge = self._usual if edge is None else positive("edge", edge)
+        edge = self._default if edge is None else positive("edge", edge)
         low, high = self.bounds
         extents = [b - a for a, b in zip(low, high, strict=True)]
         least = max(max(extents) / MOST_STEPS, (math.prod(extents) / MOST_CELLS) ** (1 / 3))
         if max(extents) / MOST_STEPS > edge:
             raise ValueError(
                 f"grid spacing {edge:g} mm cuts the region's {max(extents):.6g} mm into more than {MOST_STEPS:g} steps; use "
-                f"{rounded_up(least):g} mm or more; without a spacing {self._usual:.3g} mm is used"
+                f"{rounded_up(least):g} mm or more; without a spacing {self._default:.3g} mm is used"
             )
         if edge > self.wavelength / 2:
             raise ValueError(
                 f"grid spacing {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm: the lattice is "
-                f"not resolved; without a spacing {self._usual:.3g} mm is used"
+                f"not resolved; without a spacing {self._default:.3g} mm is used"
             )
         return edge
 
@@ -220,6 +221,16 @@ class Solid(Picture):
 
     @cached_property
     def _thinnest(self) -> dict[str, float]:
+    @cached_property
+    def _coarser(self) -> tuple[float, float, float] | None:
+        """Where that is too fine for one mesh: the spacing that is used, the one that the walls need, its triangles."""
+        return self._core.coarser_spacing()
+
+    @property
+    def _default(self) -> float:
+        """The grid spacing of a mesh unless another is asked for, mm."""
+        return self._coarser[0] if self._coarser else self._usual
+
         """The thinnest wall or neck of each lattice or graph of beams, mm, by its path, where there is one."""
         report = self.report()
         kinds = {"lattice": report.lattices, "beams": report.beams}
@@ -229,6 +240,17 @@ class Solid(Picture):
 
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
         """Warns of walls and necks that the grid cannot carry."""
+    def _warn_coarser(self, edge: float | None, per_cell: float | None) -> None:
+        """Tells of a spacing that nobody asked for and that is coarser than the walls need."""
+        if edge is None and per_cell is None and self._coarser:
+            used, wanted, triangles = self._coarser
+            warnings.warn(
+                f"a grid spacing of {wanted:.3g} mm, which the walls need, makes about {triangles:.2g} triangles; {used:g} mm "
+                "is used, which carries the thinnest wall; give an edge for another",
+                DesignWarning,
+                stacklevel=3,
+            )
+
         if self.skin is not None and self.skin < spacing:
             warnings.warn(
                 DesignWarning(
@@ -283,7 +305,7 @@ class Solid(Picture):
     ) -> Mesh:
         """The surface as a closed mesh.
 
-        ``edge`` is the grid spacing, mm, or ``per_cell`` samples on the smallest wavelength; else it is ``report().spacing``.
+        ``edge`` is the grid spacing, mm, or ``per_cell`` samples on the smallest wavelength; else it is ``spacing()``.
         The result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
 
         ``islands``: what becomes of all pieces but the largest. ``"drop-small"`` leaves out those at the region's boundary
@@ -317,6 +339,7 @@ class Solid(Picture):
         fits(memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
+        self._warn_coarser(edge, per_cell)
         self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
         warn_islands(others, words)
         if not smooth:
@@ -397,6 +420,7 @@ class Solid(Picture):
         fits(most, f"{need['triangles']:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         made = self._core.parts(chosen, spacing, _threads(threads), progress, islands == "error")
+        self._warn_coarser(edge, per_cell)
         parts = {}
         for name, (core, others, words) in zip(chosen, made, strict=True):
             if name == "wall":
@@ -487,11 +511,12 @@ class Solid(Picture):
         progress: Progress | None = None,
     ) -> Voxels:
         """Occupancy on cubic voxels of edge ``step`` (mm) over the region's bounds."""
-        spacing = self.spacing(step, per_cell)
+        spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
         low, high = self.bounds
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
         fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
+        self._warn_coarser(edge, per_cell)
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
@@ -506,7 +531,7 @@ class Solid(Picture):
     ) -> Thickness:
         """Local thickness of walls and pores on voxels of edge ``step`` (mm), as ``Mesh.thickness`` of the surface at grid
         spacing ``edge``, or ``per_cell`` samples on the smallest wavelength; without either
-        ``report().spacing``.
+        ``Solid.spacing()``.
         """
         wanted = None if step is None else positive("step", step)
         return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)

@@ -218,6 +218,13 @@ impl Solid {
     }
 
     /// What a surface at grid spacing `edge` (mm) takes, as `reports.EstimateReport`. It is counted on a grid of at least
+    /// The grid spacing of a mesh without a request, where that of the report makes too many triangles: what is used and what the
+    /// walls need, mm, and about how many triangles that would make.
+    fn coarser_spacing(slf: Py<Self>, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
+        let found = run_apart(py, None, move || slf.get().built.coarser_spacing())?;
+        Ok(found.map(|c| (c.spacing, c.wanted, c.triangles)))
+    }
+
     /// `coarse` (mm) and scaled from there: triangles grow as the spacing to the power −2.
     fn estimate(slf: Py<Self>, py: Python<'_>, edge: f64, coarse: f64) -> PyResult<Bound<'_, PyAny>> {
         let counted = edge.max(coarse);

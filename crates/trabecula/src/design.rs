@@ -16,6 +16,7 @@ mod built_report;
 mod cell_zones;
 mod coarse_steps;
 mod data;
+mod default_spacing;
 mod design_schema;
 mod joins;
 mod sample;
@@ -49,6 +50,7 @@ pub use build_blend::Blended;
 pub use build_tets::{TetReport, Tets};
 pub use cell_zones::CellZone;
 pub use data::*;
+pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
 

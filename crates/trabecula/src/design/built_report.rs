@@ -1,9 +1,9 @@
 //! The report on a design, without meshing it.
 
 use std::cell::LazyCell;
-use std::collections::BTreeMap;
 
 use super::build_blend::Functions;
+use super::default_spacing::spacing;
 use super::{Blended, Built, Joins, Tiled, build_beams, sample};
 use crate::analysis::{self, Transition};
 use crate::blend::Phases;
@@ -131,31 +131,6 @@ pub(super) fn report(built: &Built) -> DesignReport {
 
 /// Share of a volume by which sums over tetrahedra and over triangles may differ.
 const ROUNDING: f64 = 1e-9;
-/// Grid steps on the smallest wavelength, at least.
-const PER_CELL: f64 = 32.0;
-/// Grid steps on a cell's finest wave, at least.
-const PER_WAVE: f64 = 24.0;
-/// Grid steps across the thinnest wall or neck, at least.
-const PER_WALL: f64 = 2.0;
-/// Grid steps on the thinnest beam's diameter, at least.
-const PER_BEAM: f64 = 6.0;
-/// Grid steps on the smallest wavelength, at most: for waves, and for walls, necks, beams and the skin.
-const AT_MOST: [f64; 2] = [128.0, 64.0];
-
-/// The grid spacing (mm) at which a mesh is made unless another is asked for. The volume of sheets of named cells at it:
-/// `tests/laws/spacing.rs`.
-fn spacing(built: &Built, lattices: &BTreeMap<String, LatticeReport>, beams: &BTreeMap<String, BeamsReport>) -> f64 {
-    let wavelength = built.solid.wavelength;
-    let waves = built.lattices.iter().map(|(_, l)| l.map.wavelength() / (PER_WAVE * l.cell.series().frequency()));
-    // Tilings are meshed tetrahedron by tetrahedron, with steps of their own.
-    let gridded = lattices.values().filter(|l| l.tets.is_none());
-    let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
-    let beams = beams.values().map(|b| b.thickness / PER_BEAM);
-    let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
-    let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
-    (wavelength / PER_CELL).min(waves).min(walls)
-}
-
 fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
     let iso = Varied::of_iso(lattice, points);
     let fraction = Varied::of_fraction(lattice, points);

@@ -9,7 +9,7 @@ const OFF: f64 = 0.01;
 /// Share of the mesh that may be solid or not: with an overlap the fraction is known by samples.
 const SAMPLED: f64 = 0.002;
 /// Fewest steps along the edge of a tetrahedron.
-const LEAST: f64 = 4.0;
+pub(super) const LEAST: f64 = 4.0;
 
 impl Built {
     /// What is wrong with the surface of a lattice over tetrahedra that was made in steps of `edge` (mm), encloses `volume`

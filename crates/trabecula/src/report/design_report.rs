@@ -19,7 +19,7 @@ pub struct DesignReport {
     pub region: RegionReport,
     /// Grid spacing of a mesh unless another is asked for, mm: the smallest wavelength / 32, or less for what is finer: 1/24 of
     /// a cell's finest wave (down to a wavelength / 128), half the thinnest wall or neck, a sixth of the thinnest beam, the skin
-    /// (down to a wavelength / 64).
+    /// (down to a wavelength / 64). More than 20 million triangles are made with a coarser one.
     pub spacing: f64,
     /// Chord error of a mesh of whole beams unless another resolution is asked for, mm: a fiftieth of the radius of the thinnest.
     /// None for what is meshed on a grid.

@@ -4,7 +4,7 @@ use geometry::measure::size;
 use trabecula::cell::catalogue;
 use trabecula::design::{Built, Design, NoFiles};
 use trabecula::extract::GridSurface;
-use trabecula::surface_maker::Islands;
+use trabecula::surface_maker::{Islands, SurfaceMaker};
 
 use crate::common::meshed;
 
@@ -54,4 +54,43 @@ fn the_finest_detail_decides() {
     near(sheet("primitive", "thickness = 0.05"), 4.0 / 64.0);
     let beams = built("[beams.core]\ncell = \"bcc\"\nmap.affine.wavelength = 4\nradius = 0.3\n").report().spacing;
     near(beams, 0.1);
+}
+
+/// A mesh of more than 20 million triangles gets a spacing that is coarser by the root of the excess, since triangles fall with
+/// the square of the spacing, as long as 12 steps are left on the wavelength and 1.5 across the thinnest wall.
+#[test]
+fn too_many_triangles_make_the_spacing_coarser() {
+    let sheet = |size: f64, thickness: f64| {
+        let text = format!(
+            "schema = 1\n[region.box]\nsize = [{size}, {size}, {size}]\n[lattice.core]\ncell = \"gyroid\"\npart = \"sheet\"\n\
+             map.affine.wavelength = 4\nlevel.thickness = {thickness}\n"
+        );
+        Design::from_toml(&text).expect("text").build(&NoFiles).expect("built")
+    };
+    assert_eq!(sheet(20.0, 0.4).coarser_spacing(), None);
+    let some = sheet(50.0, 0.8);
+    let coarser = some.coarser_spacing().expect("some 3.6e7 triangles");
+    assert_eq!(coarser.wanted, some.report().spacing);
+    assert!(coarser.triangles > 25e6 && coarser.spacing < 4.0 / 12.0, "{coarser:?}");
+    // Scaled by the square from 16 steps on the wavelength, while cells along edges grow in number with the first power.
+    let made = GridSurface(&some.solid).estimate(coarser.spacing).expect("estimate").triangles;
+    assert!((made / 20e6 - 1.0).abs() < 0.2, "{made} at {coarser:?}");
+    // Far too many: what the thinnest wall allows, then what the wavelength allows.
+    let walls = sheet(200.0, 0.25).coarser_spacing().expect("coarser");
+    let least = sheet(200.0, 0.25).report().lattices["core"].thickness.expect("known").least();
+    assert!((walls.spacing * 1.5 / least - 1.0).abs() < 1e-2 && walls.spacing * 1.5 <= least, "{walls:?} for {least}");
+    let waves = sheet(200.0, 0.8).coarser_spacing().expect("coarser");
+    assert!((waves.spacing * 12.0 / 4.0 - 1.0).abs() < 1e-2 && waves.spacing <= 4.0 / 12.0, "{waves:?}");
+}
+
+/// Over tetrahedra, too: steps are then those along their edges, with the same 12 on the wavelength.
+#[test]
+fn large_tetrahedra_are_not_cut_finer_than_a_mesh_can_hold() {
+    let text = "schema = 1\n[region.box]\nsize = [100, 100, 100]\n[lattice.core]\npart = \"sheet\"\ncell.tet.name = \"frd\"\nmap.tets.size = 9\nlevel.fraction = 0.3\n";
+    let built = Design::from_toml(text).expect("text").build(&NoFiles).expect("built");
+    let coarser = built.coarser_spacing().expect("coarser");
+    let triangles = |edge| built.surface().estimate(edge).expect("estimate").triangles;
+    assert!((triangles(coarser.wanted) / coarser.triangles - 1.0).abs() < 0.3, "{coarser:?}");
+    assert!(coarser.spacing <= built.solid.wavelength / 12.0 && coarser.spacing > coarser.wanted);
+    assert!(triangles(coarser.spacing) < 0.8 * coarser.triangles);
 }

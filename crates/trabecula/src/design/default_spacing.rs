@@ -1,0 +1,97 @@
+//! The grid spacing at which a mesh is made unless another is asked for: what the design's walls need, or less if that is too
+//! much for one mesh.
+
+use std::collections::BTreeMap;
+
+use super::Built;
+use super::coarse_steps::LEAST;
+use crate::report::{BeamsReport, LatticeReport};
+use crate::tiling::steps_enough;
+
+/// Grid steps on the smallest wavelength, at least.
+const PER_CELL: f64 = 32.0;
+/// Grid steps on a cell's finest wave, at least.
+const PER_WAVE: f64 = 24.0;
+/// Grid steps across the thinnest wall or neck, at least.
+const PER_WALL: f64 = 2.0;
+/// Grid steps on the thinnest beam's diameter, at least.
+const PER_BEAM: f64 = 6.0;
+/// Grid steps on the smallest wavelength, at most: for waves, and for walls, necks, beams and the skin.
+const AT_MOST: [f64; 2] = [128.0, 64.0];
+
+/// Most triangles of a mesh for which no spacing is asked: 1 GB of binary STL.
+const TRIANGLES: f64 = 20e6;
+/// Grid steps that are left for it on the smallest wavelength, and across the thinnest wall, neck or beam: fewer break up.
+const COARSE_PER_CELL: f64 = 12.0;
+const COARSE_PER_WALL: f64 = 1.5;
+/// An estimate is made on a grid of at most this many steps on the smallest wavelength, and scaled from there.
+const COUNTED: f64 = 16.0;
+
+/// A spacing (mm) that is coarser than the walls need, for the sake of the number of triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coarser {
+    /// What is used.
+    pub spacing: f64,
+    /// What the walls need.
+    pub wanted: f64,
+    /// About how many triangles that would make.
+    pub triangles: f64,
+}
+
+impl Built {
+    /// The spacing of a mesh without a request where that of the report makes more than 20 million triangles: coarser by the
+    /// root of the excess, but with 12 steps on the smallest wavelength and 1.5 across the thinnest wall, neck and beam, and no
+    /// wider than the skin or a transition. Over tetrahedra, whose walls have no step in common, the lattice stays in one piece
+    /// instead. `None` where the report's will do, or nothing coarser resolves the walls.
+    pub fn coarser_spacing(&self) -> Option<Coarser> {
+        let report = self.report();
+        let (wanted, wavelength) = (report.spacing, self.solid.wavelength);
+        let counted = wanted.max(wavelength / COUNTED);
+        // What cannot be estimated cannot be meshed: the mesh says why.
+        let found = self.surface().estimate(counted).ok()?;
+        let triangles = found.triangles * (counted / wanted).powi(2);
+        if triangles <= TRIANGLES {
+            return None;
+        }
+        let gridded = report.lattices.values().filter(|l| l.tets.is_none());
+        let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least());
+        let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
+        let limits = necks.map(|t| t / COARSE_PER_WALL).chain([wavelength / COARSE_PER_CELL]);
+        let limits = limits.chain(self.skin).chain(self.solid.transition).chain(self.whole_steps());
+        let most = limits.fold(f64::INFINITY, f64::min);
+        let spacing = rounded_down((wanted * (triangles / TRIANGLES).sqrt()).min(most));
+        (spacing > wanted).then_some(Coarser { spacing, wanted, triangles })
+    }
+
+    /// The largest step along tetrahedra in which the lattice has the pieces that it is predicted to have.
+    fn whole_steps(&self) -> Option<f64> {
+        let [only] = &self.tilings[..] else { return None };
+        let steps = steps_enough(&only.tiling, LEAST as usize).filter(|_| only.explicit)?;
+        Some(only.tiling.map.mean_edge() / steps as f64)
+    }
+}
+
+/// v, rounded down to three digits.
+fn rounded_down(v: f64) -> f64 {
+    let unit = 10f64.powi(v.log10().floor() as i32 - 2);
+    let rounded = (v / unit).floor() * unit;
+    format!("{rounded:.12}").parse().unwrap_or(rounded)
+}
+
+/// The grid spacing (mm) at which a mesh of few triangles is made unless another is asked for. The volume of sheets of named
+/// cells at it: `tests/laws/spacing.rs`.
+pub(super) fn spacing(
+    built: &Built,
+    lattices: &BTreeMap<String, LatticeReport>,
+    beams: &BTreeMap<String, BeamsReport>,
+) -> f64 {
+    let wavelength = built.solid.wavelength;
+    let waves = built.lattices.iter().map(|(_, l)| l.map.wavelength() / (PER_WAVE * l.cell.series().frequency()));
+    // Tilings are meshed tetrahedron by tetrahedron, with steps of their own.
+    let gridded = lattices.values().filter(|l| l.tets.is_none());
+    let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
+    let beams = beams.values().map(|b| b.thickness / PER_BEAM);
+    let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
+    let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
+    (wavelength / PER_CELL).min(waves).min(walls)
+}
