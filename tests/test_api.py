@@ -195,6 +195,43 @@ def test_streaming_agrees_with_memory(tmp_path):
     assert abs(lt.Mesh.read(tmp_path / "a.stl").volume / mesh.volume - 1) < 1e-5
 
 
+@pytest.mark.parametrize("kind", ["stl", "3mf", "ply", "obj"])
+def test_streamed_files_are_those_of_the_mesh(tmp_path, kind):
+    """Byte by byte, whatever is dropped; nothing else is left, not even when the work is stopped on its way."""
+    solid = cube().build()
+    for islands in ("keep", "drop"):
+        told = solid.save(tmp_path / f"a.{kind}", per_cell=9, islands=islands)
+        made = solid.mesh(per_cell=9, islands=islands)
+        made.write(tmp_path / f"b.{kind}")
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+        assert told.triangles == made.counts[1]
+
+    class Enough(Exception):
+        pass
+
+    def stop(done, total):
+        raise Enough
+
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(Enough):
+        solid.save(tmp_path / f"c.{kind}", edge=0.03, progress=stop)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_default_spacing_is_one_that_a_mesh_can_hold(tmp_path):
+    """Before anything is made, and not if a spacing is given."""
+    core = lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.4))
+    solid = lt.Design(region=lt.region.box([60] * 3), lattice={"core": core}).build()
+    wanted = solid.report().spacing
+    assert solid.spacing() > 1.2 * wanted and solid.spacing(edge=wanted) == wanted
+    assert solid.estimate().triangles == pytest.approx(20e6, rel=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", lt.DesignWarning)
+        with pytest.raises(lt.DesignWarning, match=r"which the walls need, makes about .* triangles; .* mm is used"):
+            solid.save(tmp_path / "a.3mf")
+    assert not list(tmp_path.iterdir())
+
+
 def test_voxels(tmp_path):
     """Voxels are the sign of the field at their centres."""
     solid = cube().build()

@@ -121,11 +121,7 @@ def spacing(word: str = "--edge", *more):
 
 
 #: The mesh formats that are written, each with what is particular to it.
-WRITTEN = ", ".join(
-    f".{suffix}" + (f" ({', '.join(words)})" if (words := [w for w in ("binary", "streams") if getattr(row, w)]) else "")
-    for suffix, row in MESHES.items()
-    if row.writes
-)
+WRITTEN = ", ".join(f".{suffix}" + (" (binary)" if row.binary else "") for suffix, row in MESHES.items() if row.writes)
 DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for standard input", "DESIGN", True)
 DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
 JSON = option("--json", action="store_true", help="print the figures as JSON on stdout")
@@ -169,7 +165,8 @@ COMMANDS = {
     ),
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
-        f"The name of OUT decides the format: {WRITTEN}. A file that streams needs bounded memory.\n"
+        f"The name of OUT decides the format: {WRITTEN}. The mesh is written while it is made, in bounded\n"
+        "memory, unless the design has a skin, whose closed voids are looked for.\n"
         "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. With\n"
         "--smooth it is held in memory too, and the smallest angle of 19 in 20 triangles is then 15 degrees or more; all\n"
         "guarantees, sharp edges, flat faces and the volume are kept. --open leaves out the faces on the region's boundary:\n"

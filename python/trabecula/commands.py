@@ -17,7 +17,7 @@ from .cli import SHOWN
 from .design import Design, load, parsed
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
-from .formats import DESIGNS, MESH_READS, STDIN, STREAMS, is_design, kind_of
+from .formats import DESIGNS, MESH_READS, STDIN, is_design, kind_of
 from .machine import fits
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -158,8 +158,8 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     options = {**resolution(args), "threads": args.threads, "progress": progress, "islands": args.islands}
     options |= {"smooth": True} if args.smooth else {}
     asked = {} if args.chord is None else {"chord": args.chord}
-    streams = not (lighter or args.smooth or args.open) and kind_of(args.output) in STREAMS
-    if streams and (asked or not closes(solid, resolution(args))):
+    whole = lighter or args.smooth or args.open
+    if not whole and (kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))):
         given = {"edge": None, "per_cell": None, "chord": None} | options
 
         def accept(found) -> None:
@@ -170,7 +170,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
                 )
             settle()
 
-        return solid._save_stl(args.output, **given, accept=accept).to_dict() | asked
+        return solid._save(args.output, **given, accept=accept).to_dict() | asked
     if not lighter and not asked:
         solid.check_room(args.output, **resolution(args))
     surface = solid.mesh(**options)

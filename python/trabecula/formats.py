@@ -7,7 +7,7 @@ import os
 from . import _core
 
 __all__ = [
-    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "STREAMS", "TET_READS", "TET_WRITES"),
+    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "TET_READS", "TET_WRITES"),
     *("STDIN", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
 ]
 
@@ -18,8 +18,6 @@ STDIN = "-"
 MESHES = {row.suffix: row for row in _core.mesh_formats()}
 MESH_READS = tuple(MESHES)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
-#: Mesh formats into which a solid is written while it is meshed.
-STREAMS = tuple(suffix for suffix, row in MESHES.items() if row.streams)
 VOXEL_WRITES = ("npy", "vti")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}

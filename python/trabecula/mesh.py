@@ -38,6 +38,8 @@ __all__ = ["Mesh"]
 
 #: Pairs of triangles after which self-intersections are counted no further.
 MANY = 1_000_000
+#: The title in files that have one; not the file's name: the same solid is the same bytes.
+TITLE = "Lattice part"
 
 
 class Picture:
@@ -372,9 +374,8 @@ class Mesh(Picture, Transformed):
         kind = extension(path, MESH_WRITES)
         vertices, triangles = self._core.counts
         fits(file_size(kind, triangles, vertices), f"{triangles:.3g} triangles", path)
-        title = "Lattice part"  # not the file's name: the same solid is the same bytes
         with whole_file(path) as temporary:
-            self._core.write(temporary, kind, title)
+            self._core.write(temporary, kind, TITLE)
 
     def png(
         self,

@@ -15,7 +15,7 @@ from .formats import MESH_WRITES, VOXEL_WRITES
 from .given import fixed, positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits, rounded_up
-from .mesh import Mesh, Picture
+from .mesh import TITLE, Mesh, Picture
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
 from .thickness import Thickness
@@ -48,6 +48,8 @@ __all__ = ["Solid", "Voxels"]
 MOST_STEPS, MOST_CELLS = 4e6, 2e12
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
+#: Bytes for each triangle of the temporary files of vertices and triangles.
+SPOOLED = 24
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
@@ -216,11 +218,9 @@ class Solid(Picture):
 
     @cached_property
     def _usual(self) -> float:
-        """The grid spacing that is used unless another is asked for, mm."""
+        """The grid spacing that the walls need, mm."""
         return self.report().spacing
 
-    @cached_property
-    def _thinnest(self) -> dict[str, float]:
     @cached_property
     def _coarser(self) -> tuple[float, float, float] | None:
         """Where that is too fine for one mesh: the spacing that is used, the one that the walls need, its triangles."""
@@ -231,6 +231,8 @@ class Solid(Picture):
         """The grid spacing of a mesh unless another is asked for, mm."""
         return self._coarser[0] if self._coarser else self._usual
 
+    @cached_property
+    def _thinnest(self) -> dict[str, float]:
         """The thinnest wall or neck of each lattice or graph of beams, mm, by its path, where there is one."""
         report = self.report()
         kinds = {"lattice": report.lattices, "beams": report.beams}
@@ -238,8 +240,6 @@ class Solid(Picture):
         ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
         return {name: t for name, t in ends.items() if t}
 
-    def _warn_thin(self, spacing: float, word: str = "edge") -> None:
-        """Warns of walls and necks that the grid cannot carry."""
     def _warn_coarser(self, edge: float | None, per_cell: float | None) -> None:
         """Tells of a spacing that nobody asked for and that is coarser than the walls need."""
         if edge is None and per_cell is None and self._coarser:
@@ -251,6 +251,8 @@ class Solid(Picture):
                 stacklevel=3,
             )
 
+    def _warn_thin(self, spacing: float, word: str = "edge") -> None:
+        """Warns of walls and necks that the grid cannot carry."""
         if self.skin is not None and self.skin < spacing:
             warnings.warn(
                 DesignWarning(
@@ -337,9 +339,9 @@ class Solid(Picture):
         # Measuring and writing take as much again.
         memory = 2 * need.memory + (SMOOTHED * need.triangles if smooth else 0)
         fits(memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
+        self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
-        self._warn_coarser(edge, per_cell)
         self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
         warn_islands(others, words)
         if not smooth:
@@ -375,6 +377,7 @@ class Solid(Picture):
     ) -> tuple[MeshReport, QualityReport | None]:
         """The figures of the surface on a grid, and the quality of its triangles."""
         spacing = self.spacing(edge, per_cell)
+        self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         made, quality, islands = self._core.measure(spacing, self.region_volume(spacing), _threads(threads), progress)
         self._warn_coarse(made.volume + left_out(islands), spacing, pieces=islands.found + 1)
@@ -418,9 +421,9 @@ class Solid(Picture):
         # Each part has its own copy of what it shares; measuring and writing take as much again.
         most = 2 * len(chosen) * need.memory
         fits(most, f"{need['triangles']:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
+        self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         made = self._core.parts(chosen, spacing, _threads(threads), progress, islands == "error")
-        self._warn_coarser(edge, per_cell)
         parts = {}
         for name, (core, others, words) in zip(chosen, made, strict=True):
             if name == "wall":
@@ -448,10 +451,13 @@ class Solid(Picture):
             return self._core.stream_beams(temporary, chord, _threads(threads))
 
     def check_room(self, path: str | os.PathLike[str], edge: float | None = None, per_cell: float | None = None) -> None:
-        """Raises ValueError if the disk has no room for the mesh file ``path`` at this spacing; meshes nothing."""
+        """Raises ValueError if the disk has no room for the mesh file ``path`` at this spacing and the temporary files that
+        it is made from; meshes nothing.
+        """
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing).triangles
-        size = file_size(extension(path, MESH_WRITES), need)
+        kind = extension(path, MESH_WRITES)
+        size = file_size(kind, need) * (2 if kind == "3mf" else 1) + (0 if kind == "stl" else SPOOLED * need)
         fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
     def save_stl(
@@ -464,12 +470,31 @@ class Solid(Picture):
         islands: Islands = "drop-small",
         chord: float | None = None,
     ) -> SurfaceReport:
-        """Streams the surface to a binary STL without holding it in memory, and gives its figures. ``islands`` and ``chord``
-        are as for ``mesh``.
-        """
-        return self._save_stl(path, edge, per_cell, threads, progress, islands, chord)
+        """``save`` to a binary STL."""
+        extension(path, ("stl",))
+        return self._save(path, edge, per_cell, threads, progress, islands, chord)
 
-    def _save_stl(
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        edge: float | None = None,
+        per_cell: float | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        islands: Islands = "drop-small",
+        chord: float | None = None,
+    ) -> SurfaceReport:
+        """Streams the surface to a mesh file (.stl, .3mf, .ply or .obj) without holding it in memory, and gives its figures.
+
+        The bytes are those of ``mesh(…).write(path)``. ``islands`` and ``chord`` are as for ``mesh``; with ``chord`` the mesh
+        is held in memory unless the file is an STL.
+
+        An .stl is written at once; for the others vertices and triangles go to temporary files beside it, which are gone at
+        the end, whatever that is.
+        """
+        return self._save(path, edge, per_cell, threads, progress, islands, chord)
+
+    def _save(
         self,
         path: str | os.PathLike[str],
         edge: float | None,
@@ -480,14 +505,19 @@ class Solid(Picture):
         chord: float | None,
         accept: Callable[[SurfaceReport], Any] = lambda made: None,
     ) -> SurfaceReport:
-        """As ``save_stl``; what ``accept`` or a warning raises leaves no file behind."""
+        """As ``save``; what ``accept`` or a warning raises leaves no file behind."""
         check_islands(islands)
-        extension(path, ("stl",))
+        kind = extension(path, MESH_WRITES)
         check_place(path)
         chord = self._chord_of(chord, edge, per_cell, islands)
+        if chord is not None and kind != "stl":
+            made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
+            made.write(path)
+            return made.summary()
         if chord is not None:
             return self._stream_beams(path, self._chord(chord, edge, per_cell, islands), threads)
         spacing = self.spacing(edge, per_cell)
+        self._warn_coarser(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
             made = self.mesh(spacing, None, threads, progress, islands)
             summary = made.summary()
@@ -497,7 +527,7 @@ class Solid(Picture):
         self.check_room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
-            summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
+            summary, words = self._core.stream((temporary, kind, TITLE), spacing, _threads(threads), progress, islands)
             self._warn_coarse(summary.volume + left_out(summary.islands), spacing, pieces=summary.islands.found + 1)
             warn_islands(summary.islands, words)
             accept(summary)
@@ -516,7 +546,6 @@ class Solid(Picture):
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
         fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
-        self._warn_coarser(edge, per_cell)
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made

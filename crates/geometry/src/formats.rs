@@ -8,6 +8,7 @@ use crate::fault::Fault;
 use crate::mesh::Mesh;
 
 mod elements;
+mod indexed;
 mod join;
 mod npy;
 mod number;
@@ -24,6 +25,7 @@ mod vtu;
 mod xml;
 
 pub use elements::Elements;
+pub use indexed::{Aside, Indexed};
 pub use npy::{read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
@@ -49,12 +51,17 @@ pub struct Format {
 pub struct Writer {
     /// Whether numbers are bytes rather than text.
     pub binary: bool,
-    /// Whether a solid can be written while it is meshed, in bounded memory.
-    pub streams: bool,
     /// Bytes of a file for each triangle and each vertex; those of text for parts of some hundred mm.
     pub bytes: [f64; 2],
-    /// Writes a file.
-    write: fn(&Mesh, &Metadata, &mut dyn io::Write) -> io::Result<()>,
+    write: Write,
+}
+
+/// Writes a file.
+enum Write {
+    /// One in which each triangle has corners of its own.
+    Soup(fn(&Mesh, &mut dyn io::Write) -> io::Result<()>),
+    /// One with numbered vertices. What follows numbers that are not known yet is put aside.
+    Indexed(fn(&dyn Indexed, &Metadata, &mut dyn Aside, &mut dyn io::Write) -> io::Result<()>),
 }
 
 /// The mesh formats, in the order in which texts name them.
@@ -66,9 +73,8 @@ pub const FORMATS: &[Format] = &[
         read: stl::read,
         writer: Some(Writer {
             binary: true,
-            streams: true,
             bytes: [50.0, 0.0],
-            write: |mesh, _, mut out| stl::write(mesh, &mut out),
+            write: Write::Soup(|mesh, mut out| stl::write(mesh, &mut out)),
         }),
     },
     Format {
@@ -76,12 +82,7 @@ pub const FORMATS: &[Format] = &[
         in_mm: true,
         soup: false,
         read: threemf::read,
-        writer: Some(Writer {
-            binary: false,
-            streams: false,
-            bytes: [7.0, 9.0],
-            write: |mesh, meta, mut out| threemf::write(mesh, meta, &mut out),
-        }),
+        writer: Some(Writer { binary: false, bytes: [7.0, 9.0], write: Write::Indexed(threemf::write) }),
     },
     Format {
         suffix: "ply",
@@ -90,9 +91,8 @@ pub const FORMATS: &[Format] = &[
         read: |bytes| ply::read(without_mark(bytes)),
         writer: Some(Writer {
             binary: true,
-            streams: false,
             bytes: [13.0, 24.0],
-            write: |mesh, _, mut out| ply::write(mesh, &mut out),
+            write: Write::Indexed(|mesh, _, _, out| ply::write(mesh, out)),
         }),
     },
     Format {
@@ -102,9 +102,8 @@ pub const FORMATS: &[Format] = &[
         read: |bytes| obj::read(without_mark(bytes)),
         writer: Some(Writer {
             binary: false,
-            streams: false,
             bytes: [27.0, 50.0],
-            write: |mesh, meta, mut out| obj::write(mesh, meta, &mut out),
+            write: Write::Indexed(|mesh, meta, _, out| obj::write(mesh, meta, out)),
         }),
     },
     Format { suffix: "off", in_mm: false, soup: false, read: |bytes| off::read(without_mark(bytes)), writer: None },
@@ -186,12 +185,37 @@ pub struct Metadata {
 /// **Errors**: whatever `out` reports, unchanged; `InvalidInput` for an unknown suffix, an index out of range, a
 /// coordinate that is not finite in single precision, or more triangles or vertices than the format can count.
 pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    let Some(writer) = Format::of(suffix).and_then(|f| f.writer.as_ref()) else {
-        let written = FORMATS.iter().filter(|f| f.writer.is_some());
-        return Err(invalid(unknown(suffix, &suffixes(written))));
-    };
+    let write = writer(suffix)?;
     check_mesh(mesh)?;
-    (writer.write)(mesh, meta, out)
+    match write {
+        Write::Soup(write) => write(mesh, out),
+        Write::Indexed(write) => write(mesh, meta, &mut Vec::new(), out),
+    }
+}
+
+/// Writes a mesh that need not be in memory in a format with numbered vertices: the same bytes as [`write_mesh`]. `aside` holds
+/// bytes in between.
+///
+/// **Errors**: as [`write_mesh`], but for coordinates and indices, which are not checked; `InvalidInput` for a format whose
+/// triangles have corners of their own; whatever the mesh and `aside` report.
+pub fn write_indexed(
+    mesh: &dyn Indexed,
+    suffix: &str,
+    meta: &Metadata,
+    aside: &mut dyn Aside,
+    out: &mut dyn io::Write,
+) -> io::Result<()> {
+    match writer(suffix)? {
+        Write::Indexed(write) => write(mesh, meta, aside, out),
+        Write::Soup(_) => Err(invalid(format!("{suffix} has no numbered vertices"))),
+    }
+}
+
+/// How files with this suffix are written.
+fn writer(suffix: &str) -> io::Result<&'static Write> {
+    let found = Format::of(suffix).and_then(|f| f.writer.as_ref());
+    let written = || FORMATS.iter().filter(|f| f.writer.is_some());
+    found.map(|w| &w.write).ok_or_else(|| invalid(unknown(suffix, &suffixes(written()))))
 }
 
 /// Writes several meshes into one 3MF, each an object of its own with its name, all to be built where they are.
@@ -199,7 +223,9 @@ pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out:
 /// **Errors**: as [`write_mesh`].
 pub fn write_objects<W: io::Write>(objects: &[(&str, &Mesh)], meta: &Metadata, out: &mut W) -> io::Result<()> {
     objects.iter().try_for_each(|o| check_mesh(o.1))?;
-    threemf::write_objects(objects, meta, out)
+    let objects: Vec<(&str, &dyn Indexed)> =
+        objects.iter().map(|(name, mesh)| (*name, *mesh as &dyn Indexed)).collect();
+    threemf::write_objects(&objects, meta, &mut Vec::new(), out)
 }
 
 /// Refuses what no format can hold.
@@ -219,20 +245,20 @@ fn invalid(message: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, message)
 }
 
-/// Makes pieces of `count` items, `chunk` at a time, on all threads, and takes them in order. A few pieces per
+/// Makes pieces of `count` items, `chunk` at a time, on all threads, and takes them in order until one fails. A few pieces per
 /// thread are held at once; their limits depend on `chunk` alone.
 fn in_order<T: Send>(
     count: usize,
     chunk: usize,
-    make: impl Fn(Range<usize>) -> T + Sync,
+    make: impl Fn(Range<usize>) -> io::Result<T> + Sync,
     mut take: impl FnMut(T) -> io::Result<()>,
 ) -> io::Result<()> {
     let chunks = count.div_ceil(chunk);
     let batch = 4 * rayon::current_num_threads();
     for first in (0..chunks).step_by(batch) {
         let piece = |i: usize| make(i * chunk..count.min((i + 1) * chunk));
-        let made: Vec<T> = (first..chunks.min(first + batch)).into_par_iter().map(piece).collect();
-        made.into_iter().try_for_each(&mut take)?;
+        let made: Vec<io::Result<T>> = (first..chunks.min(first + batch)).into_par_iter().map(piece).collect();
+        made.into_iter().try_for_each(|made| take(made?))?;
     }
     Ok(())
 }

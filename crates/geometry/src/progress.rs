@@ -23,6 +23,24 @@ impl Progress for Silent {
     }
 }
 
+/// A stage of a longer computation, which takes it from one share of the whole to another.
+pub struct Stage<'a> {
+    /// The progress of the whole.
+    pub whole: &'a dyn Progress,
+    /// The shares, 0 to 1, at which the stage begins and ends.
+    pub from: f64,
+    /// See `from`.
+    pub to: f64,
+}
+
+impl Progress for Stage<'_> {
+    fn step(&self, done: u64, total: u64) -> bool {
+        const FINE: f64 = 1e6;
+        let share = self.from + (self.to - self.from) * done as f64 / total.max(1) as f64;
+        self.whole.step((share * FINE) as u64, FINE as u64)
+    }
+}
+
 /// Why a computation ended without a result.
 #[derive(Debug)]
 pub enum Stopped {

@@ -32,6 +32,25 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).or_else(|e| wrong(e.kind(), format!("{name} cannot be read: {e}")))
 }
 
+/// An empty file next to the one at `path`, to be written and read back, of which nothing is left however the work ends: it has
+/// no name any more where the system allows that, and elsewhere the system removes it when it is closed.
+pub fn nameless(path: &Path, ending: &str) -> Result<File> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    let mut options = File::options();
+    options.read(true).write(true).create_new(true);
+    #[cfg(windows)]
+    {
+        use std::os::windows::fs::OpenOptionsExt;
+        const DELETE_ON_CLOSE: u32 = 0x0400_0000;
+        options.custom_flags(DELETE_ON_CLOSE);
+    }
+    let file = options.open(&name)?;
+    #[cfg(not(windows))]
+    std::fs::remove_file(&name)?;
+    Ok(file)
+}
+
 /// The file at `path`, empty, to be written and read back.
 ///
 /// It is cut off only if there is something to cut: some systems flush a file to the disk when it is closed if it was

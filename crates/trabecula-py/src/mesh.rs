@@ -43,8 +43,6 @@ pub struct MeshFormat {
     writes: bool,
     /// Whether numbers are bytes rather than text in what is written.
     binary: bool,
-    /// Whether a solid can be written while it is meshed.
-    streams: bool,
     /// Bytes of a file for each triangle and each vertex.
     bytes: [f64; 2],
 }
@@ -56,10 +54,14 @@ impl MeshFormat {
             suffix: row.suffix,
             writes: writer.is_some(),
             binary: writer.is_some_and(|w| w.binary),
-            streams: writer.is_some_and(|w| w.streams),
             bytes: writer.map_or([0.0; 2], |w| w.bytes),
         }
     }
+}
+
+/// What is written of a mesh into formats that carry it.
+pub fn metadata(title: String, design: String) -> formats::Metadata {
+    formats::Metadata { title, design, application: format!("Trabecula {}", env!("CARGO_PKG_VERSION")) }
 }
 
 impl Mesh {
@@ -295,9 +297,7 @@ impl Mesh {
     /// Writes meshes, each with its name, to a 3MF at `path` as one object each; the design is that of the first one.
     #[staticmethod]
     fn write_objects(py: Python<'_>, path: PathBuf, objects: Vec<(String, Py<Mesh>)>, title: String) -> PyResult<()> {
-        let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
-        let design = objects.first().map_or(String::new(), |o| o.1.get().design.clone());
-        let meta = formats::Metadata { title, design, application };
+        let meta = metadata(title, objects.first().map_or(String::new(), |o| o.1.get().design.clone()));
         let meshes: Vec<_> = objects.iter().map(|(name, mesh)| (name.as_str(), &mesh.get().surface.mesh)).collect();
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
@@ -309,8 +309,7 @@ impl Mesh {
 
     /// Writes the mesh to `path` in the format `extension`.
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
-        let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
-        let meta = formats::Metadata { title, design: self.design.clone(), application };
+        let meta = metadata(title, self.design.clone());
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
             formats::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;

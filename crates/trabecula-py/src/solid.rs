@@ -1,5 +1,6 @@
 //! Solids: field, surface, voxels, figures.
 
+use std::io::BufWriter;
 use std::path::PathBuf;
 
 use geometry::progress::Stopped;
@@ -16,13 +17,13 @@ use trabecula::report::{
     DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
 };
 use trabecula::solid::Space;
-use trabecula::surface_maker::{Islands, Options, SurfaceMaker};
+use trabecula::surface_maker::{self, Islands, Options, Scratch, SurfaceMaker};
 use trabecula::truss::Beams;
 
 use crate::arrays::{self, values};
 use crate::error;
 use crate::file;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, metadata};
 use crate::quadors::Quadors;
 use crate::region::Region;
 use crate::report::report;
@@ -217,7 +218,6 @@ impl Solid {
         Ok(d)
     }
 
-    /// What a surface at grid spacing `edge` (mm) takes, as `reports.EstimateReport`. It is counted on a grid of at least
     /// The grid spacing of a mesh without a request, where that of the report makes too many triangles: what is used and what the
     /// walls need, mm, and about how many triangles that would make.
     fn coarser_spacing(slf: Py<Self>, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
@@ -225,6 +225,7 @@ impl Solid {
         Ok(found.map(|c| (c.spacing, c.wanted, c.triangles)))
     }
 
+    /// What a surface at grid spacing `edge` (mm) takes, as `reports.EstimateReport`. It is counted on a grid of at least
     /// `coarse` (mm) and scaled from there: triangles grow as the spacing to the power −2.
     fn estimate(slf: Py<Self>, py: Python<'_>, edge: f64, coarse: f64) -> PyResult<Bound<'_, PyAny>> {
         let counted = edge.max(coarse);
@@ -346,24 +347,33 @@ impl Solid {
         Ok((Mesh::new(made.surface, self.design.clone()), made.error.unwrap_or(0.0)))
     }
 
-    /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives its `reports.SurfaceReport`, and the other
-    /// connected components in words.
-    #[pyo3(signature = (path, edge, threads=None, progress=None, islands="drop-small"))]
-    fn stream_stl<'py>(
+    /// Streams the surface to a file, given as path, extension and title; memory stays bounded. Gives its `reports.SurfaceReport`,
+    /// and the other connected components in words.
+    #[pyo3(signature = (file, edge, threads=None, progress=None, islands="drop-small"))]
+    fn stream<'py>(
         &self,
         py: Python<'py>,
-        path: PathBuf,
+        file: (PathBuf, String, String),
         edge: f64,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
         islands: &str,
     ) -> PyResult<(Bound<'py, PyAny>, String)> {
         let islands = islands_word(islands)?;
+        let (path, extension, title) = file;
+        let meta = metadata(title, self.design.clone());
         let summary = run(py, threads, progress, |p| {
-            // Whole tiles are written at once: a buffer would only copy them.
+            let (maker, options) = (self.built.surface(), Options { resolution: edge, islands });
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
-            let options = Options { resolution: edge, islands };
-            self.built.surface().stream_stl(&options, &mut out, p)
+            if extension == "stl" {
+                // Whole tiles are written at once: a buffer would only copy them.
+                return maker.stream_stl(&options, &mut out, p);
+            }
+            let aside = |ending| file::nameless(&path, ending).map_err(Stopped::Io);
+            let [mut vertices, mut triangles, mut text] = [aside(".1")?, aside(".2")?, aside(".3")?];
+            let scratch: Scratch = [&mut vertices, &mut triangles, &mut text];
+            let mut out = BufWriter::with_capacity(1 << 20, out);
+            surface_maker::stream_mesh(&*maker, &options, (&extension, &meta), scratch, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
         Ok((report(py, "SurfaceReport", &SurfaceReport::from(&s))?, s.components.words()))

@@ -8,7 +8,9 @@ use geometry::formats::{self, stl};
 use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 
-use crate::surface_maker::{Components, Estimate, Islands, Made, Options, Store, Summary, SurfaceMaker};
+use crate::surface_maker::{
+    Components, Estimate, Islands, Made, Options, Pieces, Resolved, Store, Summary, SurfaceMaker, Totals,
+};
 
 /// Triangulates uncut beams; the resolution is the chord error. Hubs that are equal but for their position are triangulated
 /// once.
@@ -27,6 +29,23 @@ impl BeamSurface {
 }
 
 impl SurfaceMaker for BeamSurface {
+    /// The mesh is held in memory.
+    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
+        let made = self.mesh(options, progress)?;
+        let SurfaceMesh { mesh, cut } = &made.surface;
+        out.add(&mesh.vertices, &mesh.triangles, cut).map_err(Stopped::Io)?;
+        let totals = Totals {
+            triangles: mesh.triangles.len() as u64,
+            vertices: mesh.vertices.len() as u64,
+            volume: mesh.volume(),
+            area: [mesh.area(), 0.0],
+            bounds: mesh.bounds(),
+        };
+        let parts = vec![(totals.triangles, true)];
+        let components = made.components;
+        Ok(Resolved { parts, first: vec![0], walls: Vec::new(), totals, components, error: made.error })
+    }
+
     fn mesh(&self, options: &Options, _: &dyn Progress) -> Result<Made, Stopped> {
         Self::check(options)?;
         let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;

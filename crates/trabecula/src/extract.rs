@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::solid::Solid;
 use crate::surface_maker::{
-    self, Estimate, Islands, Made, Measured, Options, StlStream, Store, Summary, SurfaceMaker, not_empty,
+    self, Estimate, Islands, Measured, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, not_empty,
 };
 
 mod cube_table;
@@ -72,10 +72,10 @@ fn stride(n: usize) -> usize {
 }
 
 impl SurfaceMaker for GridSurface<'_> {
-    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
         let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
-        let mut out = Stitched::default();
+        let mut out = Stitched::new(out);
         each_tile(&grid, progress, |view: View| view.patch(0, middle), |patch| out.add(patch))?;
         out.finish(options)
     }

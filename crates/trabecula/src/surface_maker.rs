@@ -7,26 +7,58 @@ use std::io;
 
 use geometry::fault::Fault;
 use geometry::formats::stl;
-use geometry::progress::{Progress, Stopped};
+use geometry::math::Vec3;
+use geometry::progress::{Progress, Stage, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 
 mod compact;
 mod components;
 mod measured;
+mod spool;
 
 pub use compact::Store;
-pub use components::{CRUMB, Component, Components, DUST, Islands, SMALL};
-pub(crate) use components::{ComponentGraph, NONE, Resolved, Totals};
+pub use components::{CRUMB, Component, Components, DUST, Islands, Resolved, SMALL};
+pub(crate) use components::{ComponentGraph, NONE, Totals};
 pub use measured::{Figures, Measured};
+pub use spool::{Scratch, stream_mesh};
+
+/// What takes a surface piece by piece: memory, or files.
+pub trait Pieces: Send {
+    /// Adds vertices, numbered on from those before, and triangles of any vertices so far, each with whether it is a cut.
+    ///
+    /// # Errors
+    /// Failures of the files.
+    fn add(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]], cut: &[bool]) -> io::Result<()>;
+}
+
+impl Pieces for SurfaceMesh {
+    fn add(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]], cut: &[bool]) -> io::Result<()> {
+        self.mesh.vertices.extend_from_slice(vertices);
+        self.mesh.triangles.extend_from_slice(triangles);
+        self.cut.extend_from_slice(cut);
+        Ok(())
+    }
+}
 
 /// A method of meshing one solid.
 pub trait SurfaceMaker {
-    /// The surface, held in memory. Same bytes for any number of threads.
+    /// Makes the surface piece by piece, with all its connected components; says which of them stay. Memory is bounded by the
+    /// pieces in flight. Same pieces for any number of threads.
     ///
     /// # Errors
     /// A resolution at which no mesh can be made; an interruption; more than 2³² vertices; several connected components, if
-    /// the options refuse them.
-    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped>;
+    /// the options refuse them; failures of `out`.
+    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped>;
+
+    /// The surface, held in memory. Same bytes for any number of threads.
+    ///
+    /// # Errors
+    /// As `make`.
+    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+        let mut surface = SurfaceMesh::default();
+        let found = self.make(options, &mut surface, progress)?;
+        Ok(Made { surface: kept(surface, &found), components: found.components, error: found.error })
+    }
 
     /// The surface, streamed as binary STL without holding the mesh. The 84-byte header is rewritten at the end. Same bytes
     /// for any number of threads.
@@ -127,6 +159,12 @@ pub(crate) fn check_count(triangles: u64) -> Result<(), Stopped> {
     Err(Stopped::Refused(Fault::new("edge", message)))
 }
 
+/// The number of the next vertex, if it has one.
+pub(crate) fn next_vertex(count: usize) -> Result<u32, Stopped> {
+    u32::try_from(count)
+        .map_err(|_| Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL")))
+}
+
 /// The components of a mesh that stay: the mesh without those that were dropped or filled.
 pub(crate) fn kept(surface: SurfaceMesh, found: &Resolved) -> SurfaceMesh {
     if found.components.unchanged() {
@@ -143,8 +181,8 @@ pub(crate) struct StlStream<'a> {
     compacts: bool,
 }
 
-/// Progress steps of making the surface for each step of compaction, which moves records that much faster.
-const COMPACTION: u64 = 16;
+/// The share of the work that compaction takes.
+const COMPACTION: f64 = 1.0 / 17.0;
 
 impl<'a> StlStream<'a> {
     pub fn new(out: &'a mut dyn Store, islands: Islands, progress: &'a dyn Progress) -> Result<StlStream<'a>, Stopped> {
@@ -154,7 +192,8 @@ impl<'a> StlStream<'a> {
 
     /// The progress of making the surface, which leaves a share for compaction.
     pub fn progress(&self) -> impl Progress + use<'a> {
-        Scaled { progress: self.progress, compacts: self.compacts }
+        let compaction = if self.compacts { COMPACTION } else { 0.0 };
+        Stage { whole: self.progress, from: 0.0, to: 1.0 - compaction }
     }
 
     pub fn write(&mut self, records: &[u8]) -> Result<(), Stopped> {
@@ -163,16 +202,16 @@ impl<'a> StlStream<'a> {
 
     /// Removes dropped components and writes the header.
     pub fn finish(self, found: Resolved, triangles: u64) -> Result<Summary, Stopped> {
-        let moved = |share: f64| !self.compacts || compacted(self.progress, share);
+        let stage = Stage { whole: self.progress, from: 1.0 - COMPACTION, to: 1.0 };
+        let moved = |record: u64| !self.compacts || stage.step(record, triangles);
         if !found.components.unchanged() {
             let ranges = compact::ranges(&found.parts);
-            let go_on = |record: u64| moved(record as f64 / triangles as f64);
             let (head, size) = (stl::HEADER as u64, stl::RECORD as u64);
-            if !compact::compact(self.out, head, size, &ranges, go_on).map_err(Stopped::Io)? {
+            if !compact::compact(self.out, head, size, &ranges, moved).map_err(Stopped::Io)? {
                 return Err(Stopped::Interrupted);
             }
         }
-        if !moved(1.0) {
+        if !moved(triangles) {
             return Err(Stopped::Interrupted);
         }
         let header = stl::header(found.totals.triangles as u32);
@@ -181,34 +220,6 @@ impl<'a> StlStream<'a> {
             .and_then(|_| self.out.write_all(&header))
             .and_then(|()| self.out.flush())
             .map_err(Stopped::Io)?;
-        Ok(Summary {
-            triangles: found.totals.triangles,
-            volume: found.totals.volume,
-            area_lattice: found.totals.area[0],
-            area_cut: found.totals.area[1],
-            components: found.components,
-            error: None,
-        })
-    }
-}
-
-/// Reports the share of records that compaction has moved.
-fn compacted(progress: &dyn Progress, share: f64) -> bool {
-    const FINE: f64 = 1000.0;
-    let made = FINE * COMPACTION as f64;
-    progress.step((made + share * FINE) as u64, (made + FINE) as u64)
-}
-
-struct Scaled<'a> {
-    progress: &'a dyn Progress,
-    compacts: bool,
-}
-
-impl Progress for Scaled<'_> {
-    fn step(&self, done: u64, total: u64) -> bool {
-        match self.compacts {
-            true => self.progress.step(done * COMPACTION, total * (COMPACTION + 1)),
-            false => self.progress.step(done, total),
-        }
+        Ok(found.summary())
     }
 }

@@ -7,13 +7,14 @@ use std::io::{self, Write};
 use super::join::Joiner;
 use super::number::push_u32;
 use super::text::{Lines, at_line, parse, position, shown, words};
-use super::{Metadata, in_order, invalid};
+use super::{Indexed, Metadata, in_order, invalid};
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
 /// Writes OBJ; coordinates are the shortest decimal text that reads back to the same double.
-pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    if mesh.vertices.len() >= u32::MAX as usize {
+pub fn write(mesh: &dyn Indexed, meta: &Metadata, out: &mut dyn Write) -> io::Result<()> {
+    let [v, t] = mesh.counts();
+    if v >= u32::MAX as usize {
         return Err(invalid(format!("OBJ holds at most {} vertices here", u32::MAX - 1)));
     }
     for (key, text) in [("", meta.application.as_str()), ("title ", meta.title.as_str())] {
@@ -24,16 +25,16 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
     out.write_all(b"# lengths in mm\n")?;
     let points = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 40);
-        for [x, y, z] in &mesh.vertices[r] {
+        for [x, y, z] in mesh.positions(r)?.iter() {
             // Writing to memory cannot fail.
             let _ = writeln!(text, "v {x} {y} {z}");
         }
-        text
+        Ok(text)
     };
-    in_order(mesh.vertices.len(), 1 << 14, points, |text| out.write_all(&text))?;
+    in_order(v, 1 << 14, points, |text| out.write_all(&text))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 28);
-        for t in &mesh.triangles[r] {
+        for t in mesh.corners(r)?.iter() {
             text.push(b'f');
             for v in t {
                 text.push(b' ');
@@ -41,9 +42,9 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
             }
             text.push(b'\n');
         }
-        text
+        Ok(text)
     };
-    in_order(mesh.triangles.len(), 1 << 14, faces, |text| out.write_all(&text))
+    in_order(t, 1 << 14, faces, |text| out.write_all(&text))
 }
 
 /// Reads vertices and faces; everything else is passed over.

@@ -6,14 +6,14 @@ use std::io::{self, Write};
 
 use super::join::Joiner;
 use super::text::{at_line, parse, shown, words};
-use super::{in_order, invalid};
+use super::{Indexed, in_order, invalid};
 use crate::fault::Fault;
 use crate::math::Vec3;
 use crate::mesh::Mesh;
 
 /// Writes binary PLY. Coordinates are double precision: nothing is rounded.
-pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
-    let (v, t) = (mesh.vertices.len(), mesh.triangles.len());
+pub fn write(mesh: &dyn Indexed, out: &mut dyn Write) -> io::Result<()> {
+    let [v, t] = mesh.counts();
     if v > i32::MAX as usize {
         return Err(invalid(format!("PLY holds at most {} vertices here, the mesh has {v}", i32::MAX)));
     }
@@ -23,18 +23,18 @@ pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
          double y\nproperty double z\nelement face {t}\nproperty list uchar int vertex_indices\nend_header\n"
     )?;
     let points = |r: std::ops::Range<usize>| {
-        let numbers = mesh.vertices[r].iter().flatten();
-        numbers.flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()
+        let positions = mesh.positions(r)?;
+        Ok(positions.iter().flatten().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
     };
     in_order(v, 1 << 15, points, |bytes| out.write_all(&bytes))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut bytes = vec![3; r.len() * 13];
-        for (record, t) in bytes.chunks_exact_mut(13).zip(&mesh.triangles[r]) {
+        for (record, t) in bytes.chunks_exact_mut(13).zip(mesh.corners(r)?.iter()) {
             for (to, i) in record[1..].chunks_exact_mut(4).zip(t) {
                 to.copy_from_slice(&i.to_le_bytes());
             }
         }
-        bytes
+        Ok(bytes)
     };
     in_order(t, 1 << 15, faces, |bytes| out.write_all(&bytes))
 }

@@ -25,7 +25,7 @@ pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
         for t in &mesh.triangles[range] {
             push_record(&mut bytes, t.map(|v| mesh.vertices[v as usize].map(|x| x as f32)));
         }
-        bytes
+        Ok(bytes)
     };
     in_order(count, 1 << 14, make, |bytes| out.write_all(&bytes))
 }
@@ -46,7 +46,7 @@ pub fn write_pieces<W: Write>(
         for piece in range {
             each(piece, &mut |t| push_record(&mut bytes, t.map(|p| p.map(|x| x as f32))));
         }
-        bytes
+        Ok(bytes)
     };
     let some = (pieces << 14).div_ceil(count.max(1)).max(1);
     in_order(pieces, some, make, |bytes| out.write_all(&bytes))

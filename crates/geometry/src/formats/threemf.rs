@@ -6,8 +6,7 @@ use std::io::{self, Write};
 
 use super::number::{push_f32, push_u32};
 use super::xml::escaped;
-use super::{Metadata, in_order, invalid};
-use crate::mesh::Mesh;
+use super::{Aside, Indexed, Metadata, in_order, invalid};
 
 mod deflate;
 mod package;
@@ -31,19 +30,24 @@ const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// Writes 3MF. Coordinates are rounded to single precision, which is what readers of the format hold.
-pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    write_objects(&[("", mesh)], meta, out)
+pub fn write(mesh: &dyn Indexed, meta: &Metadata, aside: &mut dyn Aside, out: &mut dyn Write) -> io::Result<()> {
+    write_objects(&[("", mesh)], meta, aside, out)
 }
 
 /// Writes several meshes as one 3MF: an object and an item of the build for each, with its name unless that is empty.
 ///
-/// The model is deflated in pieces on all threads; the pieces join to one stream, since each ends at a byte.
-pub fn write_objects<W: Write>(objects: &[(&str, &Mesh)], meta: &Metadata, out: &mut W) -> io::Result<()> {
-    let large = |m: &Mesh| m.vertices.len() >= i32::MAX as usize || m.triangles.len() >= i32::MAX as usize;
-    if objects.iter().any(|o| large(o.1)) {
+/// The model is deflated in pieces on all threads; the pieces join to one stream, since each ends at a byte. They are put aside,
+/// as their size comes before them.
+pub fn write_objects(
+    objects: &[(&str, &dyn Indexed)],
+    meta: &Metadata,
+    aside: &mut dyn Aside,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    if objects.iter().any(|o| o.1.counts().iter().any(|n| *n >= i32::MAX as usize)) {
         return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
-    let mut model = Entry::new(MODEL);
+    let mut model = Entry::new(MODEL, aside);
     let mut head = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\" \
          xmlns:trabecula=\"urn:trabecula:design\">\n"
@@ -57,24 +61,26 @@ pub fn write_objects<W: Write>(objects: &[(&str, &Mesh)], meta: &Metadata, out: 
     for (id, (name, mesh)) in (1..).zip(objects) {
         let name = if name.is_empty() { String::new() } else { format!(" name=\"{}\"", escaped(name)) };
         head.push_str(&format!("<object id=\"{id}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n"));
-        model.push(Piece::of(head.as_bytes()));
-        push_mesh(&mut model, mesh)?;
+        model.push(Piece::of(head.as_bytes()))?;
+        push_mesh(&mut model, *mesh)?;
         head = "</triangles>\n</mesh>\n</object>\n".into();
         tail.push_str(&format!("<item objectid=\"{id}\"/>\n"));
     }
-    model.push(Piece::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()));
-    let mut types = Entry::new("[Content_Types].xml");
-    types.push(Piece::of(TYPES.as_bytes()));
-    let mut relations = Entry::new("_rels/.rels");
-    relations.push(Piece::of(RELATIONS.as_bytes()));
-    package::write(&[types, relations, model], package::LIMIT, out)
+    model.push(Piece::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()))?;
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    let mut types = Entry::new("[Content_Types].xml", &mut first);
+    types.push(Piece::of(TYPES.as_bytes()))?;
+    let mut relations = Entry::new("_rels/.rels", &mut second);
+    relations.push(Piece::of(RELATIONS.as_bytes()))?;
+    package::write(&mut [types, relations, model], package::LIMIT, out)
 }
 
 /// Adds the vertices and triangles of a mesh.
-fn push_mesh(model: &mut Entry, mesh: &Mesh) -> io::Result<()> {
+fn push_mesh(model: &mut Entry, mesh: &dyn Indexed) -> io::Result<()> {
+    let [vertices, triangles] = mesh.counts();
     let points = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
-        for p in &mesh.vertices[r] {
+        for p in mesh.positions(r)?.iter() {
             let [x, y, z] = p.map(|v| v as f32);
             text.extend_from_slice(b"<vertex x=\"");
             push_f32(&mut text, x);
@@ -84,17 +90,14 @@ fn push_mesh(model: &mut Entry, mesh: &Mesh) -> io::Result<()> {
             push_f32(&mut text, z);
             text.extend_from_slice(b"\"/>\n");
         }
-        Piece::of(&text)
+        Ok(Piece::of(&text))
     };
-    let mut put = |piece| {
-        model.push(piece);
-        Ok(())
-    };
-    in_order(mesh.vertices.len(), 1 << 14, points, &mut put)?;
+    let mut put = |piece| model.push(piece);
+    in_order(vertices, 1 << 14, points, &mut put)?;
     put(Piece::of(b"</vertices>\n<triangles>\n"))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 56);
-        for [a, b, c] in &mesh.triangles[r] {
+        for [a, b, c] in mesh.corners(r)?.iter() {
             text.extend_from_slice(b"<triangle v1=\"");
             push_u32(&mut text, *a);
             text.extend_from_slice(b"\" v2=\"");
@@ -103,7 +106,7 @@ fn push_mesh(model: &mut Entry, mesh: &Mesh) -> io::Result<()> {
             push_u32(&mut text, *c);
             text.extend_from_slice(b"\"/>\n");
         }
-        Piece::of(&text)
+        Ok(Piece::of(&text))
     };
-    in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)
+    in_order(triangles, 1 << 14, faces, &mut put)
 }

@@ -6,13 +6,14 @@
 
 use geometry::fault::{Fault, number};
 use geometry::progress::{Progress, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 
 use super::sampling_grid::Grid;
 use super::stitched::Stitched;
 use super::tile::View;
 use super::tile_queue::each_tile;
 use crate::solid::{Solid, Space};
-use crate::surface_maker::{Islands, Made, Options};
+use crate::surface_maker::{Islands, Made, Options, Resolved, kept};
 
 /// One of the solids that a sheet makes of its region.
 pub struct SpaceMade {
@@ -39,7 +40,8 @@ pub fn spaces(
 ) -> Result<Vec<SpaceMade>, Stopped> {
     let grid = Grid::of_spaces(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
-    let mut all: Vec<Stitched> = wanted.iter().map(|_| Stitched::default()).collect();
+    let mut surfaces = vec![SurfaceMesh::default(); wanted.len()];
+    let mut all: Vec<Stitched> = surfaces.iter_mut().map(|s| Stitched::new(s)).collect();
     let map = |view: View| match view.hole {
         Some(at) => Err(at),
         None => Ok(wanted.iter().map(|s| view.patch(*s as usize, middle)).collect::<Vec<_>>()),
@@ -50,13 +52,17 @@ pub fn spaces(
     })?;
     let islands = if in_one_piece { Islands::Error } else { Islands::Keep };
     let finished = wanted.iter().zip(all).map(|(space, out)| {
-        let made = out.finish(&Options { resolution: edge, islands }).map_err(|stopped| match stopped {
+        out.finish(&Options { resolution: edge, islands }).map_err(|stopped| match stopped {
             Stopped::Refused(fault) => Stopped::Refused(of_space(*space, fault)),
             other => other,
-        })?;
-        Ok(SpaceMade { space: *space, made })
+        })
     });
-    finished.collect()
+    let found = finished.collect::<Result<Vec<Resolved>, Stopped>>()?;
+    let made = wanted.iter().zip(surfaces).zip(found).map(|((space, surface), found)| {
+        let made = Made { surface: kept(surface, &found), components: found.components, error: None };
+        SpaceMade { space: *space, made }
+    });
+    Ok(made.collect())
 }
 
 /// A fault of one of the solids.

@@ -1,52 +1,77 @@
 //! The patches of tiles, stitched to one mesh.
 
-use geometry::fault::Fault;
 use geometry::math::Vec3;
 use geometry::progress::Stopped;
-use geometry::surface_mesh::SurfaceMesh;
 use rustc_hash::FxHashMap;
 
 use super::tile::Patch;
 use super::tile_components::{TileComponents, TileSweep};
-use crate::surface_maker::{self, Made, Options, not_empty};
+use crate::surface_maker::{Options, Pieces, Resolved, next_vertex, not_empty};
 
-/// A mesh that grows by one tile after the other.
-#[derive(Default)]
-pub(super) struct Stitched {
-    out: SurfaceMesh,
+/// A mesh that grows by one tile after the other, in order. It holds the names of the border vertices of two layers of tiles.
+pub(super) struct Stitched<'a> {
+    out: &'a mut dyn Pieces,
     sweep: TileSweep,
-    /// Vertices on the borders of tiles, by name.
-    border: FxHashMap<u128, u32>,
+    vertices: usize,
+    triangles: u64,
+    /// Vertices on the borders of tiles of the current layer and of the one below it, by name.
+    border: [FxHashMap<u128, u32>; 2],
+    layer: usize,
+    // Buffers, kept to save allocations.
+    new: Vec<Vec3>,
+    numbers: Vec<u32>,
 }
 
-impl Stitched {
+impl<'a> Stitched<'a> {
+    /// An empty mesh, which goes to `out`.
+    pub fn new(out: &'a mut dyn Pieces) -> Stitched<'a> {
+        Stitched {
+            out,
+            sweep: TileSweep::default(),
+            vertices: 0,
+            triangles: 0,
+            border: Default::default(),
+            layer: 0,
+            new: Vec::new(),
+            numbers: Vec::new(),
+        }
+    }
+
     /// Adds the patch of the next tile.
-    pub fn add(&mut self, (patch, components): (Patch, TileComponents)) -> Result<(), Stopped> {
-        let Stitched { out, border, .. } = self;
-        let mut numbers = Vec::with_capacity(patch.vertices.len());
+    pub fn add(&mut self, (mut patch, components): (Patch, TileComponents)) -> Result<(), Stopped> {
+        let layer = components.tile[2];
+        if layer != self.layer {
+            // A vertex is shared within a layer of tiles or with the layer below.
+            let below = std::mem::take(&mut self.border[0]);
+            self.border[1] = if layer == self.layer + 1 { below } else { FxHashMap::default() };
+            self.layer = layer;
+        }
+        let [here, below] = &mut self.border;
+        self.new.clear();
+        self.numbers.clear();
         for (v, shared) in patch.vertices.iter().zip(&patch.shared) {
-            let vertices: &mut Vec<Vec3> = &mut out.mesh.vertices;
-            let new = u32::try_from(vertices.len()).map_err(|_| {
-                Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL"))
-            })?;
+            let new = next_vertex(self.vertices)?;
             let number = match shared {
-                Some(key) => *border.entry(*key).or_insert(new),
+                Some(key) => below.get(key).copied().unwrap_or_else(|| *here.entry(*key).or_insert(new)),
                 None => new,
             };
             if number == new {
-                vertices.push(*v);
+                self.new.push(*v);
+                self.vertices += 1;
             }
-            numbers.push(number);
+            self.numbers.push(number);
         }
-        out.mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
-        out.cut.extend_from_slice(&patch.cut);
+        for t in &mut patch.triangles {
+            *t = t.map(|v| self.numbers[v as usize]);
+        }
+        self.triangles += patch.triangles.len() as u64;
+        self.out.add(&self.new, &patch.triangles, &patch.cut).map_err(Stopped::Io)?;
         self.sweep.add(components).map_err(Stopped::Refused)
     }
 
-    /// The whole mesh, once all tiles are added.
-    pub fn finish(self, options: &Options) -> Result<Made, Stopped> {
-        not_empty(self.out.mesh.triangles.len() as u64, options.resolution)?;
-        let found = self.sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
-        Ok(Made { surface: surface_maker::kept(self.out, &found), components: found.components, error: None })
+    /// The components of the whole mesh, once all tiles are added.
+    pub fn finish(self, options: &Options) -> Result<Resolved, Stopped> {
+        not_empty(self.triangles, options.resolution)?;
+        self.sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)
     }
 }

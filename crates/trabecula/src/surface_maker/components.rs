@@ -11,6 +11,8 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::union_find::{find, unite};
 
+use super::Summary;
+
 /// Grid cells: a component with less volume is under two grid steps across.
 pub const SMALL: f64 = 8.0;
 /// Grid cells: a component with less volume is no part of the design, but of its sampling.
@@ -178,17 +180,34 @@ pub(crate) struct ComponentGraph {
     pub solid: Vec<u32>,
 }
 
-/// The connected components of a complete surface.
-pub(crate) struct Resolved {
+/// The connected components of a complete surface, and which of its triangles stay.
+pub struct Resolved {
     /// For each component of each part, in order, its number of triangles and whether it stays.
-    pub parts: Vec<(u64, bool)>,
+    pub(crate) parts: Vec<(u64, bool)>,
     /// For each of them, the first of its surface component.
-    pub first: Vec<u32>,
+    pub(crate) first: Vec<u32>,
     /// The walls of cavities that stay, by the first of each, with their totals.
-    pub walls: Vec<(u32, Totals)>,
+    pub(crate) walls: Vec<(u32, Totals)>,
     /// Totals of what stays.
-    pub totals: Totals,
+    pub(crate) totals: Totals,
+    /// The components.
     pub components: Components,
+    /// Greatest distance of triangles from the surface (mm), where the method measures it.
+    pub error: Option<f64>,
+}
+
+impl Resolved {
+    /// What is left of the surface.
+    pub fn summary(self) -> Summary {
+        Summary {
+            triangles: self.totals.triangles,
+            volume: self.totals.volume,
+            area_lattice: self.totals.area[0],
+            area_cut: self.totals.area[1],
+            components: self.components,
+            error: self.error,
+        }
+    }
 }
 
 impl ComponentGraph {
@@ -303,10 +322,9 @@ impl ComponentGraph {
         }
         // Closed and made of triangles: three edges for two of them.
         let euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
-        let part = |i: usize| (self.totals[i].triangles, stays(self.surface[i] as usize));
-        let parts = (0..count).map(part).collect();
+        let parts = (0..count).map(|i| (self.totals[i].triangles, stays(self.surface[i] as usize))).collect();
         let components = Components { count: solids, cavities: walls.len() as u64, euler, ..found };
-        Ok(Resolved { parts, first: self.surface, walls, totals: sum, components })
+        Ok(Resolved { parts, first: self.surface, walls, totals: sum, components, error: None })
     }
 }
 

@@ -29,7 +29,9 @@ use super::{Level, Tiling};
 use crate::cell::tet::{NamedTetCell, Nodes, Subdivision};
 use crate::map::Tets;
 use crate::map::tet_map::NONE;
-use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty};
+use crate::surface_maker::{
+    self, Estimate, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty,
+};
 use component_links::ComponentLinks;
 pub use connectivity::{Connectivity, ZonePair, connectivity, steps_enough};
 use geometry::fault::{Fault, number};
@@ -343,31 +345,33 @@ fn turned([a, b, c]: [u32; 3], flipped: bool) -> [u32; 3] {
 pub struct TilingSurface<'a>(pub &'a Tiling);
 
 impl SurfaceMaker for TilingSurface<'_> {
-    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
         let work = Work::new(self.0, options.resolution).map_err(Stopped::Refused)?;
-        let (mut out, mut links, mut shared) =
-            (SurfaceMesh::default(), ComponentLinks::default(), SharedVertices::default());
+        let (mut links, mut shared) = (ComponentLinks::default(), SharedVertices::default());
+        let (mut vertices, mut count) = (0, 0u64);
         work.each(progress, false, |start, chunk| {
             let (mut totals, mut positions) = (&chunk.totals[..], &chunk.positions[..]);
+            let (mut new, mut triangles, mut cut) = (Vec::new(), Vec::new(), Vec::new());
             for (t, surface) in (start..).zip(&chunk.surfaces) {
                 let (mine, rest) = positions.split_at(surface.vertices.len());
                 positions = rest;
                 let ids = self.0.map.tet(t);
-                let numbers = shared.numbers(ids, surface, mine, &mut out.mesh.vertices)?;
+                let numbers = shared.numbers(ids, surface, mine, vertices, &mut new)?;
                 let flipped = self.0.map.flipped(t);
                 for (v, cap) in &surface.triangles {
-                    out.mesh.triangles.push(turned(*v, flipped).map(|v| numbers[v as usize]));
-                    out.cut.push(*cap);
+                    triangles.push(turned(*v, flipped).map(|v| numbers[v as usize]));
+                    cut.push(*cap);
                 }
                 let (of, rest) = totals.split_at(surface.solid_of.len());
                 totals = rest;
                 links.add(&self.0.map, t, work.mask(t), surface, of).map_err(Stopped::Refused)?;
             }
-            Ok(())
+            vertices += new.len();
+            count += triangles.len() as u64;
+            out.add(&new, &triangles, &cut).map_err(Stopped::Io)
         })?;
-        not_empty(out.mesh.triangles.len() as u64, options.resolution)?;
-        let found = links.graph().resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
-        Ok(Made { surface: surface_maker::kept(out, &found), components: found.components, error: None })
+        not_empty(count, options.resolution)?;
+        links.graph().resolve(options.islands, options.resolution).map_err(Stopped::Refused)
     }
 
     /// Memory is bounded by the tetrahedra in flight and a few numbers for each.

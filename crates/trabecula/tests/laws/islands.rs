@@ -218,7 +218,7 @@ fn figures_are_those_of_the_file() {
 }
 
 /// Stops at a share of the way; remembers how far it was told of.
-struct Until(f64, std::sync::Mutex<f64>);
+pub struct Until(pub f64, pub std::sync::Mutex<f64>);
 
 impl Progress for Until {
     fn step(&self, done: u64, total: u64) -> bool {

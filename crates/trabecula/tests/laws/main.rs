@@ -18,6 +18,7 @@ mod skin;
 mod smooth;
 mod spaces;
 mod spacing;
+mod streams;
 mod surface;
 mod tets;
 mod thickness;

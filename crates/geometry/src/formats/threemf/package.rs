@@ -6,6 +6,8 @@ use std::io::{self, Write};
 
 use flate2::Crc;
 
+use super::Aside;
+
 /// Sizes from here on are written in 64 bits.
 pub const LIMIT: u64 = u32::MAX as u64;
 
@@ -34,29 +36,27 @@ impl Piece {
 }
 
 /// A file inside the archive.
-pub struct Entry {
+pub struct Entry<'a> {
     name: &'static str,
-    pieces: Vec<Vec<u8>>,
+    pieces: &'a mut dyn Aside,
     crc: Crc,
     size: u64,
+    /// Bytes in the archive: the pieces and the two that end the stream.
+    packed: u64,
 }
 
-impl Entry {
-    /// An empty file.
-    pub fn new(name: &'static str) -> Self {
-        Entry { name, pieces: Vec::new(), crc: Crc::new(), size: 0 }
+impl<'a> Entry<'a> {
+    /// An empty file, whose pieces are put aside in `pieces`.
+    pub fn new(name: &'static str, pieces: &'a mut dyn Aside) -> Self {
+        Entry { name, pieces, crc: Crc::new(), size: 0, packed: FINAL.len() as u64 }
     }
 
     /// Adds a piece at the end.
-    pub fn push(&mut self, piece: Piece) {
+    pub fn push(&mut self, piece: Piece) -> io::Result<()> {
         self.crc.combine(&piece.crc);
         self.size += piece.size;
-        self.pieces.push(piece.bytes);
-    }
-
-    /// Bytes in the archive: the pieces and the two that end the stream.
-    fn packed(&self) -> u64 {
-        self.pieces.iter().map(|p| p.len() as u64).sum::<u64>() + FINAL.len() as u64
+        self.packed += piece.bytes.len() as u64;
+        self.pieces.put(piece.bytes)
     }
 }
 
@@ -86,11 +86,11 @@ impl Record {
 }
 
 /// Writes the archive. Numbers of `limit` and above take 64-bit fields (`LIMIT`, less in tests).
-pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result<()> {
+pub fn write(entries: &mut [Entry], limit: u64, out: &mut dyn Write) -> io::Result<()> {
     let mut at = 0u64;
     let mut directory = Record::default();
-    for e in entries {
-        let (packed, name) = (e.packed(), e.name.as_bytes());
+    for e in entries.iter_mut() {
+        let (packed, name) = (e.packed, e.name.as_bytes());
         let wide = e.size >= limit || packed >= limit || at >= limit;
         let version = if wide { 45 } else { 20 };
         let fields = |r: &mut Record| {
@@ -115,7 +115,7 @@ pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result
             directory.two(1).two(24).eight(e.size).eight(packed).eight(at);
         }
         out.write_all(&local.0)?;
-        e.pieces.iter().try_for_each(|p| out.write_all(p))?;
+        e.pieces.copy_to(out)?;
         out.write_all(&FINAL)?;
         at += local.0.len() as u64 + packed;
     }
@@ -138,12 +138,14 @@ mod tests {
     fn pieces_join_with_narrow_and_wide_sizes() {
         let text: Vec<u8> = (0..200_000u32).flat_map(|i| format!("{} ", i % 9973 * (i % 977)).into_bytes()).collect();
         for limit in [LIMIT, 0, 1000] {
-            let mut long = Entry::new("a/long.txt");
-            text.chunks(7001).for_each(|c| long.push(Piece::of(c)));
-            let mut short = Entry::new("short");
-            short.push(Piece::of(b"x"));
+            let mut aside = [Vec::new(), Vec::new(), Vec::new()];
+            let [a, b, c] = &mut aside;
+            let mut long = Entry::new("a/long.txt", a);
+            text.chunks(7001).for_each(|c| long.push(Piece::of(c)).unwrap());
+            let mut short = Entry::new("short", b);
+            short.push(Piece::of(b"x")).unwrap();
             let mut bytes = Vec::new();
-            write(&[long, short, Entry::new("empty")], limit, &mut bytes).unwrap();
+            write(&mut [long, short, Entry::new("empty", c)], limit, &mut bytes).unwrap();
             let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
             for (name, want) in [("a/long.txt", &text[..]), ("short", b"x"), ("empty", b"")] {
                 let mut got = Vec::new();

@@ -355,16 +355,17 @@ mod tests {
     use crate::formats::Metadata;
     use crate::formats::tests::{refuses_damage, tetrahedron};
 
-    fn archive(entries: &[Entry]) -> Vec<u8> {
+    fn archive(entries: &mut [Entry]) -> Vec<u8> {
         let mut bytes = Vec::new();
         package::write(entries, package::LIMIT, &mut bytes).unwrap();
         bytes
     }
 
     fn pack(model: &str) -> Vec<u8> {
-        let mut entry = Entry::new(MODEL);
-        entry.push(Piece::of(model.as_bytes()));
-        archive(&[entry])
+        let mut aside = Vec::new();
+        let mut entry = Entry::new(MODEL, &mut aside);
+        entry.push(Piece::of(model.as_bytes())).unwrap();
+        archive(&mut [entry])
     }
 
     const SHAPE: &str = "<mesh><vertices><vertex z=\"0\" x='0' y=\"0\"/><vertex x=\"1\" y=\"0\" z=\"0\" /><vertex x=\"0\" y=\"1\" \
@@ -378,7 +379,7 @@ mod tests {
         mesh.vertices[3][2] = 1.0 / 3.0;
         let meta = Metadata { title: "a & <b>".into(), design: "x = 1 < 2\n".into(), application: "t".into() };
         let mut bytes = Vec::new();
-        write(&mesh, &meta, &mut bytes).unwrap();
+        write(&mesh, &meta, &mut Vec::new(), &mut bytes).unwrap();
         let back = read(&bytes).unwrap();
         assert!(back.vertices.contains(&[0.0, 0.0, f64::from(1.0f32 / 3.0)]));
         assert_eq!(back.triangles.len(), 4);
@@ -435,12 +436,13 @@ mod tests {
 
     #[test]
     fn blanks_without_end_are_refused_before_they_are_made() {
-        let mut long = Entry::new("blanks");
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        let mut long = Entry::new("blanks", &mut first);
         let blanks = vec![b'\n'; 1 << 20];
-        (0..60).for_each(|_| long.push(Piece::of(&blanks)));
-        let mut short = Entry::new("some");
-        (0..9).for_each(|_| short.push(Piece::of(&blanks)));
-        let bytes = archive(&[long, short]);
+        (0..60).for_each(|_| long.push(Piece::of(&blanks)).unwrap());
+        let mut short = Entry::new("some", &mut second);
+        (0..9).for_each(|_| short.push(Piece::of(&blanks)).unwrap());
+        let bytes = archive(&mut [long, short]);
         let mut package = Package::open(&bytes).unwrap();
         let message = package.file("blanks", |_| Ok(())).unwrap_err().message;
         assert!(message.contains("62914560") && message.contains("100 times"), "{message}");

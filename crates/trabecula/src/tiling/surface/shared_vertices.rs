@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::tet_surface::TetSurface;
 use crate::map::tet_map::NONE;
-use geometry::fault::Fault;
+use crate::surface_maker::next_vertex;
 use geometry::math::Vec3;
 use geometry::progress::Stopped;
 
@@ -19,18 +19,16 @@ pub(super) struct SharedVertices {
 }
 
 impl SharedVertices {
-    /// The number of each vertex of a surface; new vertices are added to the mesh.
+    /// The number of each vertex of a surface; new vertices are added to `new`, which begins at number `base`.
     pub fn numbers(
         &mut self,
         ids: [u32; 4],
         surface: &TetSurface,
         places: &[Vec3],
+        base: usize,
         vertices: &mut Vec<Vec3>,
     ) -> Result<Vec<u32>, Stopped> {
-        if vertices.len() + places.len() > u32::MAX as usize {
-            let message = "more than 2^32 vertices; use a larger edge, or STL";
-            return Err(Stopped::Refused(Fault::new("edge", message)));
-        }
+        next_vertex(base + vertices.len() + places.len())?;
         let mut counts = [[0u32; 16]; 2];
         for (v, zero) in surface.zero.iter().enumerate() {
             counts[usize::from(v >= surface.crossings)][usize::from(*zero)] += 1;
@@ -39,7 +37,7 @@ impl SharedVertices {
         let mut next = [[(0, false); 16]; 2];
         for (node, (counts, next)) in counts.iter().zip(&mut next).enumerate() {
             for zero in (0..16).filter(|z| counts[*z] > 0) {
-                let new = vertices.len() as u32;
+                let new = (base + vertices.len()) as u32;
                 let mut on = (0..4).filter(|i| zero >> i & 1 == 0).map(|i| ids[i]);
                 let mut corner = || on.next().unwrap_or(NONE);
                 let first = match (zero as u32).count_ones() {
@@ -63,7 +61,7 @@ impl SharedVertices {
             let next = &mut next[usize::from(v >= surface.crossings)][usize::from(*zero)];
             let name = next.0;
             if next.1 {
-                vertices[name as usize] = *position;
+                vertices[name as usize - base] = *position;
             }
             next.0 += 1;
             name
