@@ -57,7 +57,7 @@ def test_overlapping_cells_are_told_as_they_are_made():
 
 
 def test_crumbs_between_lattice_and_skin_are_closed():
-    """Voids of less than a grid cell's volume, where struts nearly touch the skin, are filled and counted unless all is kept."""
+    """Voids smaller than a grid cell, where struts nearly touch the skin, are filled and counted unless all is kept."""
     lattice = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=5), level=lt.level.fraction(0.25))
     solid = lt.Design(region=lt.region.sphere(radius=12), lattice={"a": lattice}, skin=lt.skin(0.8)).build()
     edge = 0.35

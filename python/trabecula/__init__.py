@@ -24,10 +24,11 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .parts import write_parts
     from .quadors import Quadors, Slice
-    from .solid import Solid, Voxels
+    from .solid import Solid
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
+    from .voxels import Voxels
 
 __all__ = [
     "Beams",
@@ -76,7 +77,7 @@ _HOMES = {
     "TetMesh": "tets",
     "Thickness": "thickness",
     "Transitions": "transition",
-    "Voxels": "solid",
+    "Voxels": "voxels",
     "spartan": "design",
     "write_parts": "parts",
     "iso": "levels",

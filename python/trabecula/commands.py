@@ -12,7 +12,7 @@ from functools import cache
 
 from . import _core, cell
 from . import beams as unit_cells
-from .catalogue import cell_facts
+from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .cli import SHOWN
 from .design import Design, load, parsed
 from .errors import DesignWarning, IslandsWarning, Refused
@@ -24,7 +24,7 @@ from .parts import part_files, write_parts
 from .solid import Solid
 from .starter import starter
 from .terminal import Progress, figure, say, settle, warn, warned
-from .texts import counted, intervals, table, voids
+from .texts import counted, table, voids
 
 __all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "tets", "voxels"]
 
@@ -100,7 +100,8 @@ def mesh(args) -> None:
             small = "at the region's boundary, smaller than eight grid cells and a thousandth of the largest, "
         say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
     if others and others["filled"]:
-        say(f"{counted(others['filled'], 'closed void')} smaller than a grid cell filled: {others['filled_volume']:.3g} mm³ in all")
+        filled = counted(others["filled"], "closed void")
+        say(f"{filled} smaller than a grid cell filled: {others['filled_volume']:.3g} mm³ in all")
     if args.json:
         return put_json(made | {"warnings": warned()})
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
@@ -451,38 +452,6 @@ def cells(args) -> None:
     for it in made:
         print(f"{it['name']}  ({it['title']})")
         print("\n".join(f"  {line}" for line in words(it)))
-
-
-def cell_words(it: dict):
-    """A periodic cell."""
-    yield f"f       {it['formula']}"
-    yield f"group   {it['group']}"
-    yield f"range   {it['range'][0]:.6g} to {it['range'][1]:.6g}"
-    for part, whole in it["connected_fraction"].items():
-        yield f"{part:7} in one piece at fractions {intervals(whole) or 'never'}"
-    yield f"source  {it['source']}"
-
-
-def tet_cell_words(it: dict):
-    """A tetrahedral cell."""
-    terms = (f"{t['amplitude']:g} {t['component'].title()} ({' '.join(str(h) for h in t['hkl'])})" for t in it["terms"])
-    yield f"series  group {it['group']}: {', '.join(terms)}"
-    dual, site = ", dual" if it["dual"] else "", " ".join(f"{v:g}" for v in it["site"])
-    yield f"tetrahedron of edge {it['edge']:.4f} cells about {site}{dual}"
-    yield f"part    {it['part']} at fraction {it['fraction']:g} (iso {it['iso']:.4f})"
-    yield f"faces   {counted(it['ports'], 'port')} on each, {100 * it['face_fraction']:.1f} % of it"
-    for part, whole in it["connected_fraction"].items():
-        yield f"{part:7} in one piece that reaches all faces at fractions {intervals(whole) or 'never'}"
-
-
-def unit_cell_words(it: dict):
-    """A unit cell of beams."""
-    yield f"group    {it['group']}"
-    yield f"cell     {len(it['nodes'])} nodes, {len(it['struts'])} beams of {figure(it['length'])} edges in all"
-    yield f"valence  {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}"
-    yield f"Maxwell  {it['maxwell']:+d}"
-    if it["aspect"] != [1.0, 1.0, 1.0]:
-        yield f"edges    in the ratio {' : '.join(figure(v) for v in it['aspect'])} for its usual shape"
 
 
 # --- what they share -------------------------------------------------------------------------------------------------

@@ -1,0 +1,81 @@
+"""Voxels: a part as occupancy on a grid."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from . import _core
+from .files import extension, whole_file
+from .formats import VOXEL_WRITES
+from .given import fixed, positive
+from .machine import fits
+from .transforms import factor_of, vector_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["Voxels"]
+
+
+class Voxels:
+    """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
+
+    def __init__(self, core: _core.Voxels):
+        self._core = core
+
+    def __repr__(self) -> str:
+        return f"<trabecula.Voxels {' x '.join(map(str, self.shape))}, step {self.step:g} mm>"
+
+    @property
+    def origin(self) -> list[float]:
+        """Lower corner of the first voxel, mm."""
+        return list(self._core.origin)
+
+    @property
+    def step(self) -> float:
+        """Edge of a voxel, mm."""
+        return self._core.step
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along x, y, z."""
+        nx, ny, nz = self._core.shape
+        return nx, ny, nz
+
+    @cached_property
+    def solid(self) -> NDArray[np.uint8]:
+        """1 where the voxel's centre is solid, indexed [x, y, z]; read-only."""
+        return fixed(self._core.solid).transpose(2, 1, 0)
+
+    def moved(self, vector: Sequence[float]) -> Voxels:
+        """The voxels with their origin moved by ``vector`` (three numbers, mm)."""
+        origin = [a + b for a, b in zip(self.origin, vector_of("vector", vector), strict=True)]
+        if not all(map(math.isfinite, origin)):
+            raise ValueError(f"vector is {list(vector)}; the origin would be beyond 1e308 mm")
+        return Voxels(self._core.placed(origin, self.step))
+
+    def scaled(self, factor: float, center: Sequence[float] = (0, 0, 0)) -> Voxels:
+        """The voxels with origin and step scaled by one ``factor`` greater than 0 about ``center``: they stay cubes. Mirrored
+        or stretched voxels are none; scale the design's mesh.
+        """
+        by = abs(factor_of("factor", positive("factor", factor)))
+        middle = vector_of("center", center)
+        return Voxels(self._core.placed([(a - c) * by + c for a, c in zip(self.origin, middle, strict=True)], self.step * by))
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid voxels, mm³."""
+        return float(self.solid.sum(dtype="int64")) * self.step**3
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the voxels: .npy (indexed [x, y, z]) or .vti (an image for ParaView, with origin and step)."""
+        kind = extension(path, VOXEL_WRITES)
+        count = math.prod(self.shape)
+        fits(1000.0 + count, f"{count:.3g} voxels", path, self.step, 3, "step")
+        with whole_file(path) as temporary:
+            self._core.write(temporary, kind)
