@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .given import named
 
-__all__ = ["fraction", "iso", "porosity", "thickness"]
+__all__ = ["fraction", "iso", "pore", "porosity", "thickness"]
 
 Amount = float | dict
 
@@ -29,27 +29,62 @@ def thickness(value: Amount, mid: float = 0.0) -> dict:
 
 
 @named
-def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
+def pore(value: Amount, mid: float = 0.0) -> dict:
+    """The diameter in mm of the largest ball that passes through the void from cell to cell; of a sheet through both sides.
+
+    The map is ``map.affine()`` or ``map.spartan()``.
+    """
+    return _level("pore", value, mid=mid)
+
+
+@named
+def fraction(
+    value: Amount,
+    of: str = "cell",
+    fit: str = "table",
+    mid: float = 0.0,
+    thickness: float | None = None,
+    pore: float | None = None,
+) -> dict:
     """The solid volume fraction, between 0 and 1, of the periodic cell (``of="cell"``) or of the finished part
     (``of="part"``, solved for).
 
     ``fit="spartan"`` uses the SPARTAN polynomial instead of the cell's own distribution (part ``lower``; diamond,
     gyroid). ``mid`` moves a sheet off its centre: |f - mid| ≤ t.
 
-    With ``thickness``, mm, of a sheet's wall or a network's narrowest neck, the wavelength is solved for: the map is
-    ``map.affine()`` or ``map.spartan()`` without one, or with three as ratios.
+    With ``thickness``, mm, of a sheet's wall or a network's narrowest neck, or ``pore``, mm, the wavelength is solved for: the
+    map is ``map.affine()`` or ``map.spartan()`` without one, or with three as ratios.
     """
-    return _level("fraction", value, of, fit, mid, thickness)
+    return _level("fraction", value, of, fit, mid, thickness, pore)
 
 
 @named
-def porosity(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
+def porosity(
+    value: Amount,
+    of: str = "cell",
+    fit: str = "table",
+    mid: float = 0.0,
+    thickness: float | None = None,
+    pore: float | None = None,
+) -> dict:
     """One minus the solid fraction; see ``fraction``."""
-    return _level("porosity", value, of, fit, mid, thickness)
+    return _level("porosity", value, of, fit, mid, thickness, pore)
 
 
 def _level(
-    key: str, value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None
+    key: str,
+    value: Amount,
+    of: str = "cell",
+    fit: str = "table",
+    mid: float = 0.0,
+    thickness: float | None = None,
+    pore: float | None = None,
 ) -> dict:
-    given = {"of": (of, "cell"), "fit": (fit, "table"), "mid": (mid, 0.0), "thickness": (thickness, None)}
+    given = {
+        "of": (of, "cell"),
+        "fit": (fit, "table"),
+        "mid": (mid, 0.0),
+        "thickness": (thickness, None),
+        "pore": (pore, None),
+    }
     return {key: value} | {k: v for k, (v, usual) in given.items() if v != usual}

@@ -21,8 +21,8 @@ def affine(
 ) -> dict:
     """A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
 
-    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it
-        follows; three numbers are ratios then. [mm, above 0, optional]
+    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness or a pore, from
+        which it follows; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     skew: Shears by name, in degrees: xz = 20 moves x by tan(20°) · z. [default {}]
@@ -38,8 +38,8 @@ def spartan(
 ) -> dict:
     """The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
 
-    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it
-        follows; three numbers are ratios then. [mm, above 0, optional]
+    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness or a pore, from
+        which it follows; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     """

@@ -405,6 +405,11 @@ class LatticeReport(Report):
     """The level t. Where the thickness is given: the constant level of equal fraction. None for cells by zones."""
     part: str
     """sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)."""
+    pore: float | list[float] | None
+    """Diameter of the largest ball that passes through the void from cell to cell, mm; of a sheet the lesser of its two
+    sides. Zero where the void is closed."""
+    pore_sides: list[float | list[float]] | None
+    """Of a sheet: the same of the void f < 0 and of the void f > 0, mm."""
     porosity: float | list[float]
     """1 − fraction."""
     tets: TilingReport | None

@@ -3,18 +3,23 @@
 mod curvature;
 mod cut;
 mod distance;
+mod foot_point;
 mod named;
 mod nearest;
 mod periodic_components;
 mod periodic_spline;
+mod pore;
+mod pore_level;
 mod quantile;
 mod series;
 pub mod tet;
 mod thickness;
+mod throat;
 
 pub(crate) use cut::Cut;
 pub use distance::Distance;
 pub use named::{Named, catalogue, named};
+use periodic_components::{Openings, openings};
 pub use periodic_components::{connected, necks};
 pub use series::{Series, Term};
 
@@ -46,6 +51,7 @@ pub struct Cell {
     table: OnceLock<quantile::Quantile>,
     connected: [OnceLock<Vec<[f64; 2]>>; 3],
     necks: [OnceLock<Vec<(Vec3, f64)>>; 3],
+    openings: [OnceLock<Openings>; 3],
 }
 
 impl Cell {
@@ -61,6 +67,7 @@ impl Cell {
             table: OnceLock::new(),
             connected: Default::default(),
             necks: Default::default(),
+            openings: Default::default(),
         }
     }
 
@@ -184,11 +191,16 @@ impl Cell {
     /// Minimum wall thickness (sheet) or narrowest neck diameter (lower, upper) at level `iso`, in mm, where
     /// phases relate to millimetres by u = `to_phase` · x. `None` where the part is empty or full.
     pub fn thickness(&self, part: Part, iso: f64, to_phase: &Mat3) -> Option<f64> {
-        let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.gradients(u, v, g);
         match part {
-            Part::Sheet => thickness::wall(&f, iso, to_phase),
-            _ => thickness::neck(&f, part, iso, self.necks(part), to_phase),
+            Part::Sheet => thickness::wall(&|u, v, g| self.gradients(u, v, g), iso, to_phase),
+            _ => thickness::neck(&self.series, part, iso, self.necks(part), to_phase),
         }
+    }
+
+    /// The levels at which the void on a side, f ≤ t (`Lower`) or f ≥ t (`Upper`), is connected with its translates in one, two
+    /// and three independent directions, and phases (of the plain series) of the saddles that make it so.
+    fn openings(&self, side: Part) -> &Openings {
+        self.openings[side as usize].get_or_init(|| openings(&|u, v, g| self.plain.gradients(u, v, g), side))
     }
 
     /// Values and gradients (per turn) at phases `u`.

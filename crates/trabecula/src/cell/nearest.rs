@@ -7,19 +7,21 @@
 
 use rayon::prelude::*;
 
+use super::foot_point::LevelSurface;
 use super::series::Series;
-use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, scale, transpose};
 
 /// The nearest points of the surface to the nodes of a grid.
 pub(super) struct Search<'a> {
     series: &'a Series,
+    surface: LevelSurface<'a>,
     shape: [usize; 3],
-    to_phase: Mat3,
-    back: Mat3,
     /// From a node to its 26 neighbours: steps in the grid and in space.
     around: Vec<([i32; 3], Vec3)>,
-    /// Longest edge of the cell and longest diagonal of a grid cell, mm.
-    sizes: [f64; 2],
+    /// One step along each axis of the grid, mm.
+    spacing: Mat3,
+    /// Longest diagonal of a grid cell, mm.
+    diagonal: f64,
 }
 
 /// Nothing found yet.
@@ -36,27 +38,66 @@ impl<'a> Search<'a> {
                 (d, apply(&to_space, turns))
             })
             .collect();
-        let edge = transpose(&to_space).map(norm).into_iter().fold(0.0, f64::max);
         let diagonal = around.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
-        Search { series, shape, to_phase: *to_phase, back: transpose(to_phase), around, sizes: [edge, diagonal] }
+        let columns = transpose(&to_space);
+        let spacing = core::array::from_fn(|a| scale(columns[a], 1.0 / shape[a] as f64));
+        let surface = LevelSurface::new(series, 0.0, to_phase, 3.0 * diagonal);
+        Search { series, surface, shape, around, spacing, diagonal }
+    }
+
+    /// One step along each axis of the grid, mm.
+    pub(super) fn spacing(&self) -> &Mat3 {
+        &self.spacing
+    }
+
+    /// Longest diagonal of a grid cell, mm.
+    pub(super) fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+
+    /// From a node to its 26 neighbours: steps in the grid and in space (mm).
+    pub(super) fn around(&self) -> &[([i32; 3], Vec3)] {
+        &self.around
+    }
+
+    /// The node some steps from one at an index.
+    pub(super) fn moved(&self, at: [usize; 3], d: [i32; 3]) -> usize {
+        let [i, j, k]: [usize; 3] =
+            core::array::from_fn(|a| (at[a] as i32 + d[a]).rem_euclid(self.shape[a] as i32) as usize);
+        (k * self.shape[1] + j) * self.shape[0] + i
+    }
+
+    /// The node a step from another, and its period relative to that.
+    pub(super) fn stepped(&self, node: u32, d: [i32; 3]) -> (u32, [i32; 3]) {
+        let at = self.index(node as usize);
+        let wrap = core::array::from_fn(|a| (at[a] as i32 + d[a]).div_euclid(self.shape[a] as i32));
+        (self.moved(at, d) as u32, wrap)
+    }
+
+    /// The node nearest to a phase along each axis, and the vector (mm) from it to the phase.
+    pub(super) fn nearest_node(&self, u: Vec3) -> (u32, Vec3) {
+        let along: Vec3 = core::array::from_fn(|a| u[a] * self.shape[a] as f64);
+        let from = (0..3).fold([0.0; 3], |s, a| add(s, scale(self.spacing[a], along[a] - along[a].round())));
+        (self.moved([0; 3], along.map(|c| c.round() as i32)) as u32, from)
     }
 
     fn count(&self) -> usize {
         self.shape.iter().product()
     }
 
-    fn index(&self, node: usize) -> [usize; 3] {
+    /// The index of a node along the axes.
+    pub(super) fn index(&self, node: usize) -> [usize; 3] {
         let [nx, ny, _] = self.shape;
         [node % nx, node / nx % ny, node / nx / ny]
     }
 
     /// The phase of a node.
-    fn phase(&self, node: usize) -> Vec3 {
+    pub(super) fn phase(&self, node: usize) -> Vec3 {
         let i = self.index(node);
         core::array::from_fn(|a| i[a] as f64 / self.shape[a] as f64)
     }
 
-    fn neighbour(&self, [i, j, k]: [usize; 3], d: [i32; 3]) -> usize {
+    pub(super) fn neighbour(&self, [i, j, k]: [usize; 3], d: [i32; 3]) -> usize {
         let [nx, ny, nz] = self.shape;
         let go = |at: usize, step: i32, n: usize| match step {
             1 if at + 1 == n => 0,
@@ -71,11 +112,11 @@ impl<'a> Search<'a> {
     /// Signed distances at the nodes.
     pub(super) fn distances(&self) -> Vec<f64> {
         let (f, feet) = self.feet();
-        f.iter().zip(&feet).map(|(f, foot)| norm(*foot).min(self.sizes[0]).copysign(*f)).collect()
+        f.iter().zip(&feet).map(|(f, foot)| norm(*foot).min(self.surface.edge()).copysign(*f)).collect()
     }
 
     /// Values of f at the nodes, and the vector (mm) from each to the nearest point of the surface.
-    fn feet(&self) -> (Vec<f64>, Vec<Vec3>) {
+    pub(super) fn feet(&self) -> (Vec<f64>, Vec<Vec3>) {
         let u: Vec<Vec3> = (0..self.count()).map(|i| self.phase(i)).collect();
         let (mut f, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
         f.par_chunks_mut(4096)
@@ -89,7 +130,7 @@ impl<'a> Search<'a> {
         // A propagated foot is that of a neighbour; once refined, it may be nearer to other nodes too, so both alternate.
         changed = (0..feet.len()).collect();
         for _ in 0..6 {
-            let sharp: Vec<Vec3> = changed.par_iter().map(|&i| self.nearest(u[i], feet[i])).collect();
+            let sharp: Vec<Vec3> = changed.par_iter().map(|&i| self.surface.nearest(u[i], feet[i])).collect();
             for (i, foot) in changed.iter().zip(sharp) {
                 feet[*i] = foot;
             }
@@ -115,10 +156,10 @@ impl<'a> Search<'a> {
                         continue;
                     }
                     let share = f[node] / (f[node] - other);
-                    let Some(on) = self.onto(u, scale(*step, share)) else {
+                    let Some(on) = self.surface.onto(u, scale(*step, share)) else {
                         continue;
                     };
-                    let foot = self.nearest(u, on);
+                    let foot = self.surface.nearest(u, on);
                     if dot(foot, foot) < dot(best, best) {
                         best = foot;
                     }
@@ -173,93 +214,13 @@ impl<'a> Search<'a> {
         }
         (0..feet.len()).filter(|i| served[*i]).collect()
     }
-
-    /// f, ∇ₓf and second derivatives in space at `from` (mm) from the phase u.
-    fn second(&self, u: Vec3, from: Vec3) -> (f64, Vec3, Mat3) {
-        let (f, g, h) = self.series.second(add(u, apply(&self.to_phase, from)));
-        let h = product(&self.back, &product(&h, &self.to_phase));
-        (f, apply(&self.back, g), h)
-    }
-
-    /// The point of the surface near `from`, by Newton's method along the gradient.
-    fn onto(&self, u: Vec3, from: Vec3) -> Option<Vec3> {
-        let mut at = from;
-        for _ in 0..12 {
-            let (f, g, _) = self.second(u, at);
-            let step = scale(g, -f / dot(g, g));
-            at = add(at, step);
-            let moved = norm(sub(at, from));
-            if moved.is_nan() || moved > 3.0 * self.sizes[1] {
-                return None;
-            }
-            if norm(step) <= 1e-12 * self.sizes[0] {
-                return Some(at);
-            }
-        }
-        None
-    }
-
-    /// The nearest point of the surface to the phase u, from a point of the surface near it; never farther than that.
-    fn nearest(&self, u: Vec3, from: Vec3) -> Vec3 {
-        if !from[0].is_finite() {
-            return from;
-        }
-        match self.lagrange(u, from) {
-            Some(foot) if dot(foot, foot) <= dot(from, from) * (1.0 + 1e-12) => foot,
-            _ => self.descend(u, from),
-        }
-    }
-
-    /// Newton's method on p + λ∇f = 0, f(p) = 0: the vector p from u is normal to the surface.
-    fn lagrange(&self, u: Vec3, from: Vec3) -> Option<Vec3> {
-        let mut p = from;
-        let mut multiplier = None;
-        for _ in 0..10 {
-            let (f, g, h) = self.second(u, p);
-            let l = multiplier.unwrap_or(-dot(p, g) / dot(g, g));
-            let mut a = h.map(|r| scale(r, l));
-            (0..3).for_each(|i| a[i][i] += 1.0);
-            let solve = inverse(&a);
-            let (along, rest) = (apply(&solve, g), apply(&solve, add(p, scale(g, l))));
-            let dl = (f - dot(g, rest)) / dot(g, along);
-            let step = sub(scale(rest, -1.0), scale(along, dl));
-            p = add(p, step);
-            multiplier = Some(l + dl);
-            let length = norm(step);
-            if length.is_nan() || length > self.sizes[0] {
-                return None;
-            }
-            // The next step would be its square, and the distance is stationary at the foot.
-            if length <= 1e-5 * self.sizes[0] {
-                return Some(p);
-            }
-        }
-        None
-    }
-
-    /// Towards the nearest point by going to the foot on the tangent plane and back to the surface, while that
-    /// shortens the distance.
-    fn descend(&self, u: Vec3, from: Vec3) -> Vec3 {
-        let (mut p, mut pace) = (from, 1.0);
-        for _ in 0..40 {
-            let n = unit(self.second(u, p).1);
-            let step = sub(scale(n, dot(n, p)), p);
-            if norm(step) <= 1e-7 * self.sizes[0] || pace < 1e-3 {
-                break;
-            }
-            match self.onto(u, add(p, scale(step, pace))) {
-                Some(q) if dot(q, q) < dot(p, p) => p = q,
-                _ => pace *= 0.5,
-            }
-        }
-        p
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::distance::tests::{series, stretched, surface};
     use super::*;
+    use geometry::math::sub;
 
     /// Feet lie on the surface, and no point of it is nearer, in any period.
     #[test]
@@ -272,7 +233,7 @@ mod tests {
             let to_space = inverse(&m);
             for i in (0..feet.len()).step_by(97) {
                 let u = search.phase(i);
-                let (f, g, _) = search.second(u, feet[i]);
+                let (f, g, _) = search.surface.second(u, feet[i]);
                 assert!(f.abs() < 1e-6 * norm(g), "{name} {u:?}: {f}");
                 let distance = |p: &(Vec3, Vec3)| {
                     (0..27)

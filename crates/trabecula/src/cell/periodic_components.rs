@@ -23,9 +23,11 @@ mod sublattice;
 mod torus_grid;
 
 pub(super) use critical::{Critical, Function, critical, sample};
-use offset_forest::{Forest, Joined};
-use sublattice::{Int3, Sublattice};
-use torus_grid::{AROUND, DIRECTIONS, Grid, groups};
+pub(super) use offset_forest::{Forest, Joined};
+pub(super) use sublattice::Int3;
+use sublattice::Sublattice;
+pub(super) use torus_grid::AROUND;
+use torus_grid::{DIRECTIONS, Grid, groups};
 
 /// The steps along the axes.
 const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -45,6 +47,7 @@ struct Event {
     components: [u32; 2],
     shift: Int3,
     level: f64,
+    place: Vec3,
     exact: bool,
 }
 
@@ -57,7 +60,7 @@ pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
     let found = Sweep::prepared(f, part, |sweep| {
         let (births, events) = sweep.events();
         let last = sweep.order.last().map_or(0, |i| *i);
-        let full = sweep.refine(last, &[], 3).unwrap_or(sweep.amounts[last as usize]);
+        let full = sweep.refine(last, &[], 3).map_or(sweep.amounts[last as usize], |c| c.0);
         replay(births, events, full, sweep.grid.error, sweep.grid.range())
     });
     let mut intervals = found.unwrap_or_default();
@@ -65,6 +68,30 @@ pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
         intervals.iter_mut().flatten().for_each(|v| *v = -*v + 0.0);
     }
     intervals
+}
+
+/// A level and a phase for one, two and three independent directions.
+pub(super) type Openings = [Option<(f64, Vec3)>; 3];
+
+/// For one, two and three independent directions: the level from which on a component of the part (`Lower` or `Upper`) is
+/// connected with its translates in that number, as amounts of solid grow, and the phase of the saddle that does it. Levels are
+/// those of f; as exact as those of [`connected`].
+pub(super) fn openings(f: Function, part: Part) -> Openings {
+    let found = Sweep::prepared(f, part, |sweep| {
+        let (births, mut events) = sweep.events();
+        events.sort_by(|a, b| a.level.total_cmp(&b.level));
+        let mut forest = Forest::new(sweep.amounts.len());
+        births.iter().for_each(|b| forest.insert(b.node));
+        let mut found = Openings::default();
+        for e in &events {
+            forest.join(e.components[0], e.components[1], e.shift);
+            let rank = forest.translations(e.components[0]).rank();
+            found[..rank].iter_mut().for_each(|open| *open = open.or(Some((e.level, e.place))));
+        }
+        found
+    });
+    let sign = if part == Part::Upper { -1.0 } else { 1.0 };
+    found.unwrap_or_default().map(|open| open.map(|(level, at)| (sign * level, at)))
 }
 
 /// The saddles at which components that are separate in R³ join, a component and its own lattice translate included: (phase
@@ -109,9 +136,9 @@ impl Sweep<'_> {
         Some(make(&Sweep { f, part, grid: &grid, amounts: &amounts, order: &order }))
     }
 
-    /// The amount at the critical point near a node from which at most `falling` directions lead to more solid;
+    /// The amount at, and the phase of, the critical point near a node from which at most `falling` directions lead to more solid;
     /// sought from the node and from the middles towards `others`.
-    fn refine(&self, node: u32, others: &[u32], falling: usize) -> Option<f64> {
+    fn refine(&self, node: u32, others: &[u32], falling: usize) -> Option<(f64, Vec3)> {
         let here = self.grid.position(node);
         let middle = |o: &u32| {
             let d = sub(self.grid.position(*o), here).map(|v| v - v.round());
@@ -121,8 +148,13 @@ impl Sweep<'_> {
             let c = self.critical(node, start)?;
             let level = amount(self.part, c.level);
             let near = (level - self.amounts[node as usize]).abs() <= 3.0 * self.grid.error;
-            (c.falling <= falling && near).then_some(level)
+            (c.falling <= falling && near).then_some((level, c.at))
         })
+    }
+
+    /// The amount at a node, and its phase.
+    fn sampled(&self, node: u32) -> (f64, Vec3) {
+        (self.amounts[node as usize], self.grid.position(node))
     }
 
     /// The critical point near `start`, with the sign of the amount about `node`.
@@ -171,13 +203,9 @@ impl Sweep<'_> {
             nears.extend(present(&forest, &near).map(|(i, wrap)| (i, i, wrap)));
             forest.insert(node);
             if nears.is_empty() {
-                let level = self.refine(node, &[], 0);
-                births.push(Birth {
-                    node,
-                    level: level.unwrap_or(self.amounts[node as usize]),
-                    exact: level.is_some(),
-                    translations: Sublattice::default(),
-                });
+                let found = self.refine(node, &[], 0);
+                let (level, _) = found.unwrap_or_else(|| self.sampled(node));
+                births.push(Birth { node, level, exact: found.is_some(), translations: Sublattice::default() });
             }
             for &(element, towards, wrap) in &nears {
                 let (components, shift) = match forest.join(node, element, wrap) {
@@ -186,9 +214,9 @@ impl Sweep<'_> {
                     Joined::Merged { components, shift } => (components, shift),
                     Joined::Loop { component, shift } => ([component; 2], shift),
                 };
-                let level = self.refine(node, &[towards], 1);
-                let (level, exact) = (level.unwrap_or(self.amounts[node as usize]), level.is_some());
-                events.push(Event { components, shift, level, exact });
+                let found = self.refine(node, &[towards], 1);
+                let (level, place) = found.unwrap_or_else(|| self.sampled(node));
+                events.push(Event { components, shift, level, place, exact: found.is_some() });
             }
         }
         (births, events)
@@ -311,7 +339,7 @@ impl Sweep<'_> {
 }
 
 /// The neighbours that are in the forest, one of each group that is connected already.
-fn present(forest: &Forest, near: &[(u32, Int3); 14]) -> impl Iterator<Item = (u32, Int3)> + use<> {
+pub(super) fn present(forest: &Forest, near: &[(u32, Int3); 14]) -> impl Iterator<Item = (u32, Int3)> + use<> {
     let bits = (0..14).fold(0, |bits, k| bits | u16::from(forest.has(near[k].0)) << k);
     let near = *near;
     groups(bits).map(move |k| near[k])

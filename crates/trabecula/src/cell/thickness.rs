@@ -5,13 +5,17 @@
 use rayon::prelude::*;
 
 use super::Part;
+use super::foot_point::LevelSurface;
 use super::periodic_components::{Function, critical, sample};
+use super::series::Series;
 use geometry::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Samples of the mid-surface along each axis of the torus.
 const SAMPLES: usize = 24;
-/// Rays from a point along which the surface is first searched.
-const DIRECTIONS: usize = 256;
+/// Rays from a point, the shortest of which bounds the distance to the surface.
+const DIRECTIONS: usize = 32;
+/// Steps of a grid about the point within that bound: the surface is met on its edges.
+const STEPS_ABOUT: i32 = 8;
 
 /// Minimum wall thickness (mm) of the sheet |f| ≤ `iso`, where u = `to_phase` · x.
 ///
@@ -132,7 +136,7 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
 ///
 /// `necks` are those of [`necks`](super::necks): phases and levels. Where every neck is
 /// closed and the components are disconnected it is zero. `None` where the part is empty or full, and for sheets.
-pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: &Mat3) -> Option<f64> {
+pub fn neck(series: &Series, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: &Mat3) -> Option<f64> {
     let sign = match part {
         Part::Lower => 1.0,
         Part::Upper => -1.0,
@@ -141,9 +145,9 @@ pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: 
     let deep: Vec<Vec3> = necks.iter().filter(|(_, level)| sign * (iso - level) > 0.0).map(|(at, _)| *at).collect();
     if deep.is_empty() {
         // Every neck is closed: disconnected components, if any.
-        return (!extremes(f, sign, iso).is_empty()).then_some(0.0);
+        return (!extremes(&|u, v, g| series.gradients(u, v, g), sign, iso).is_empty()).then_some(0.0);
     }
-    let radii: Vec<f64> = deep.par_iter().filter_map(|u| distance(f, *u, iso, sign, to_phase)).collect();
+    let radii: Vec<f64> = deep.par_iter().filter_map(|u| distance(series, *u, iso, sign, to_phase)).collect();
     radii.into_iter().reduce(f64::min).map(|r| 2.0 * r)
 }
 
@@ -177,39 +181,45 @@ fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     found
 }
 
-/// Distance (mm) from a solid point to the surface f = iso: the nearest of many rays, then the nearest point by
-/// alternating between the tangent plane's foot and the surface.
-fn distance(f: Function, u: Vec3, iso: f64, sign: f64, to_phase: &Mat3) -> Option<f64> {
+/// Distance (mm) from a solid point to the surface f = iso: the least of the feet on it from all crossings of the surface with
+/// the edges of a grid about the point, within the shortest of some rays. `None` where no ray meets the surface.
+fn distance(series: &Series, u: Vec3, iso: f64, sign: f64, to_phase: &Mat3) -> Option<f64> {
+    let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| series.gradients(u, v, g);
     let speed = spectral_norm(to_phase);
-    let back = transpose(to_phase);
-    let reach = |d: Vec3| first_beyond(f, u, apply(to_phase, d), speed, |v| sign * (v - iso));
     // Points of a sphere on a Fibonacci spiral.
     let golden = core::f64::consts::PI * (3.0 - 5f64.sqrt());
-    let mut rays: Vec<(f64, Vec3)> = (0..DIRECTIONS)
-        .filter_map(|k| {
-            let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
-            let (s, c) = (golden * k as f64).sin_cos();
-            let r = (1.0 - z * z).sqrt();
-            let d = [r * c, r * s, z];
-            Some((reach(d)?, d))
-        })
-        .collect();
-    rays.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let nearest = rays.iter().take(3).map(|&(mut least, mut d)| {
-        // Turn the ray towards the outward normal where it ends, as long as that shortens it.
-        let mut turn = 1.0;
-        while turn > 1e-3 {
-            let (_, g) = sample(f, add(u, scale(apply(to_phase, d), least)));
-            let normal = unit(scale(apply(&back, g), sign));
-            let next = unit(add(scale(d, 1.0 - turn), scale(normal, turn)));
-            match reach(next) {
-                Some(s) if s < least - 1e-13 * least => (least, d) = (s, next),
-                _ => turn *= 0.5,
+    let rays = (0..DIRECTIONS).filter_map(|k| {
+        let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+        let (s, c) = (golden * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        first_beyond(&f, u, apply(to_phase, [r * c, r * s, z]), speed, |v| sign * (v - iso))
+    });
+    let bound = rays.reduce(f64::min)?;
+    let (half, step) = (STEPS_ABOUT + 1, bound / f64::from(STEPS_ABOUT));
+    let n = 2 * half + 1;
+    let at = |i: i32| [i % n, i / n % n, i / (n * n)].map(|c| step * f64::from(c - half));
+    let points: Vec<Vec3> = (0..n * n * n).map(|i| add(u, apply(to_phase, at(i)))).collect();
+    let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    series.gradients(&points, &mut v, &mut g);
+    let mut met: Vec<(f64, Vec3)> = Vec::new();
+    for (axis, stride) in [1, n, n * n].into_iter().enumerate() {
+        for i in (0..n * n * n).filter(|i| i / stride % n + 1 < n) {
+            let [a, b] = [i, i + stride].map(|i| v[i as usize] - iso);
+            if (a < 0.0) != (b < 0.0) {
+                let mut p = at(i);
+                p[axis] += step * a / (a - b);
+                met.push((norm(p), p));
             }
         }
-        least
+    }
+    met.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let surface = LevelSurface::new(series, iso, to_phase, 3.0 * step);
+    // The foot of a patch of the surface is less than a step nearer than where the grid meets it.
+    let nearest = met.iter().try_fold(bound, |least, (d, p)| {
+        let foot = || surface.onto(u, *p).map_or(least, |p| norm(surface.nearest(u, p)));
+        if *d > least + step { Err(least) } else { Ok(least.min(foot())) }
     });
-    nearest.reduce(f64::min)
+    Some(nearest.unwrap_or_else(|least| least))
 }
 
 #[cfg(test)]
@@ -217,20 +227,23 @@ mod tests {
     use super::*;
     use core::f64::consts::{PI, TAU};
 
+    fn cosines(of: &[[i32; 3]]) -> Series {
+        let terms = of.iter().map(|&hkl| super::super::Term { hkl, amplitude: 1.0, phase: 0.0 });
+        Series::new(terms.collect()).expect("a series")
+    }
+
     /// cos x + cos y + cos z.
-    fn primitive(u: &[Vec3], v: &mut [f64], g: &mut [Vec3]) {
-        for ((u, v), g) in u.iter().zip(v).zip(g) {
-            *v = u.iter().map(|c| (TAU * c).cos()).sum();
-            *g = u.map(|c| -TAU * (TAU * c).sin());
-        }
+    fn primitive() -> Series {
+        cosines(&[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    }
+
+    fn of(series: &Series) -> impl Fn(&[Vec3], &mut [f64], &mut [Vec3]) + Sync {
+        |u, v, g| series.gradients(u, v, g)
     }
 
     /// cos x.
-    fn slabs(u: &[Vec3], v: &mut [f64], g: &mut [Vec3]) {
-        for ((u, v), g) in u.iter().zip(v).zip(g) {
-            *v = (TAU * u[0]).cos();
-            *g = [-TAU * (TAU * u[0]).sin(), 0.0, 0.0];
-        }
+    fn slabs() -> Series {
+        cosines(&[[1, 0, 0]])
     }
 
     fn cubic(wavelength: f64) -> Mat3 {
@@ -245,27 +258,27 @@ mod tests {
     fn flat_walls_have_their_closed_form() {
         // |cos 2πx| ≤ t about x = 1/4: half width asin(t)/2π.
         for t in [0.01, 0.3, 0.9f64] {
-            about(wall(&slabs, t, &cubic(5.0)), 5.0 * t.asin() / PI, 1e-8);
+            about(wall(&of(&slabs()), t, &cubic(5.0)), 5.0 * t.asin() / PI, 1e-8);
         }
         // Stretched and turned: only the length along the phase's gradient counts.
         let r = geometry::math::rotation([20.0, 35.0, 50.0]);
         let map = geometry::math::product(&[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]], &transpose(&r));
-        about(wall(&slabs, 0.3, &map), 4.0 * 0.3f64.asin() / PI, 1e-8);
+        about(wall(&of(&slabs()), 0.3, &map), 4.0 * 0.3f64.asin() / PI, 1e-8);
     }
 
     #[test]
     fn thin_walls_are_their_first_order() {
         // The gradient of the primitive on f = 0 is greatest where sin² sums most: cos = 0 on all axes, |∇f| = 2π√3.
         let t = 1e-3;
-        about(wall(&primitive, t, &cubic(4.0)), 4.0 * 2.0 * t / (TAU * 3f64.sqrt()), 1e-5);
+        about(wall(&of(&primitive()), t, &cubic(4.0)), 4.0 * 2.0 * t / (TAU * 3f64.sqrt()), 1e-5);
     }
 
     #[test]
     fn no_wall_where_nothing_or_all_is_solid() {
-        assert_eq!(wall(&primitive, 0.0, &cubic(4.0)), None);
-        assert_eq!(wall(&primitive, -1.0, &cubic(4.0)), None);
-        assert_eq!(wall(&primitive, f64::NAN, &cubic(4.0)), None);
-        assert_eq!(wall(&primitive, 3.5, &cubic(4.0)), None);
+        assert_eq!(wall(&of(&primitive()), 0.0, &cubic(4.0)), None);
+        assert_eq!(wall(&of(&primitive()), -1.0, &cubic(4.0)), None);
+        assert_eq!(wall(&of(&primitive()), f64::NAN, &cubic(4.0)), None);
+        assert_eq!(wall(&of(&primitive()), 3.5, &cubic(4.0)), None);
     }
 
     /// Radius about the saddle (1/2, 1/2, 0) of the primitive's lower neck, in periods: it is round to no order, so the
@@ -295,24 +308,24 @@ mod tests {
 
     #[test]
     fn necks_of_the_primitive() {
-        let necks = super::super::necks(&primitive, Part::Lower);
+        let necks = super::super::necks(&of(&primitive()), Part::Lower);
         assert_eq!(necks.len(), 3);
         for t in [-0.9, -0.5, 0.0] {
             let want = 2.0 * neck_radius(t);
-            about(neck(&primitive, Part::Lower, t, &necks, &cubic(1.0)), want, 1e-4);
+            about(neck(&primitive(), Part::Lower, t, &necks, &cubic(1.0)), want, 1e-4);
             // Lengths scale with the wavelength.
-            about(neck(&primitive, Part::Lower, t, &necks, &cubic(7.0)), 7.0 * want, 1e-4);
+            about(neck(&primitive(), Part::Lower, t, &necks, &cubic(7.0)), 7.0 * want, 1e-4);
         }
         // The upper part is the lower one moved by half a period.
-        let upper = super::super::necks(&primitive, Part::Upper);
-        about(neck(&primitive, Part::Upper, 0.5, &upper, &cubic(1.0)), 2.0 * neck_radius(-0.5), 1e-4);
+        let upper = super::super::necks(&of(&primitive()), Part::Upper);
+        about(neck(&primitive(), Part::Upper, 0.5, &upper, &cubic(1.0)), 2.0 * neck_radius(-0.5), 1e-4);
     }
 
     #[test]
     fn a_stretched_neck_is_as_thin_as_its_short_side() {
-        let necks = super::super::necks(&primitive, Part::Lower);
+        let necks = super::super::necks(&of(&primitive()), Part::Lower);
         let map = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]];
-        let long = neck(&primitive, Part::Lower, -0.9, &necks, &map);
+        let long = neck(&primitive(), Part::Lower, -0.9, &necks, &map);
         // Necks along z keep their sections; the nearest point lies across, at cos a = 1 − (1 + t)…: solved on one axis.
         let section = 2.0 * ((0.9f64).acos() / TAU).min(f64::INFINITY);
         assert!(long.is_some_and(|v| v <= section * 1.001 && v > 0.5 * section), "{long:?} {section}");
@@ -320,13 +333,13 @@ mod tests {
 
     #[test]
     fn loose_pieces_have_no_neck() {
-        let necks = super::super::necks(&primitive, Part::Lower);
+        let necks = super::super::necks(&of(&primitive()), Part::Lower);
         for t in [-3.0 + 1e-4, -1.001] {
-            let found = neck(&primitive, Part::Lower, t, &necks, &cubic(2.0));
+            let found = neck(&primitive(), Part::Lower, t, &necks, &cubic(2.0));
             assert_eq!(found, Some(0.0), "{t}");
         }
-        assert_eq!(neck(&primitive, Part::Lower, -3.5, &necks, &cubic(2.0)), None);
-        assert_eq!(neck(&primitive, Part::Lower, 3.5, &necks, &cubic(2.0)), None);
-        assert_eq!(neck(&primitive, Part::Sheet, 0.5, &necks, &cubic(2.0)), None);
+        assert_eq!(neck(&primitive(), Part::Lower, -3.5, &necks, &cubic(2.0)), None);
+        assert_eq!(neck(&primitive(), Part::Lower, 3.5, &necks, &cubic(2.0)), None);
+        assert_eq!(neck(&primitive(), Part::Sheet, 0.5, &necks, &cubic(2.0)), None);
     }
 }

@@ -227,9 +227,9 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     let cell = Arc::new(cell);
     let here = Environment { path: below("map"), ..*environment };
     let level = Environment { path: below("level"), ..*environment };
-    let map = match spec.level.amount.wall() {
+    let map = match spec.level.amount.length() {
         None => spec.map.build(&here)?,
-        Some(wall) => build_level::solved_map(spec, wall, &cell, &here, &level)?,
+        Some(length) => build_level::solved_map(spec, length, &cell, &here, &level)?,
     };
     let here = level;
     let level = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;

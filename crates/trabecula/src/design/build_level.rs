@@ -1,17 +1,18 @@
 //! Levels, which set how much is solid: data to [`Level`].
 
+use super::built_report::Varied;
 use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
 use crate::cell::{Cell, Part};
 use crate::environment::Environment;
 use crate::field::Field;
-use crate::grade::Grade;
-use crate::grade::{Quantity, key_of};
+use crate::grade::{Grade, Quantity, Remapped, Stops, key_of};
 use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
 use geometry::fault::{Fault, number};
 use geometry::math::Interval;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
@@ -68,8 +69,9 @@ pub(super) fn level(
     }
     let quantity = spec.amount.quantity(path(key), environment);
     let amount = value.build(&quantity)?;
-    if matches!(key, "iso" | "thickness") || spec.amount.wall().is_some() {
-        let found = if spec.amount.wall().is_some() { "a thickness, too" } else { key };
+    let length = spec.amount.length();
+    if matches!(key, "iso" | "thickness" | "pore") || length.is_some() {
+        let found = length.map_or(key.to_string(), |(length, _)| format!("a {length}, too"));
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
                 let message = format!("\"{option}\" goes with fraction or porosity, found {found}; leave it out");
@@ -77,8 +79,11 @@ pub(super) fn level(
             }
         }
     }
-    if let (Some(wall), PartSpec::Sheet) = (spec.amount.wall(), part) {
-        return Ok(Level::Thickness(Grade::Constant(wall_number(wall, environment)?)));
+    if let (Some(length @ ("thickness", _)), PartSpec::Sheet) = (length, part) {
+        return Ok(Level::Thickness(Grade::Constant(length_number(length, environment)?)));
+    }
+    if key == "pore" {
+        return pore(&amount, part.into(), cell, map, environment);
     }
     if key == "iso" {
         return Ok(Level::Iso(amount));
@@ -127,43 +132,105 @@ pub(super) fn level(
     }
 }
 
-/// The thickness (mm) that is given together with a fraction.
-fn wall_number(wall: &GradeSpec, environment: &Environment) -> Result<f64, DesignError> {
-    let path = format!("{}.thickness", environment.path);
-    constant(wall, &Quantity::new(path, environment, key_of::<AmountSpec>("thickness")))
+/// Levels at which the pore is found where it varies; between them the level is linear in it.
+const PORES: usize = 17;
+
+/// The level at which the pore is as wide as asked. Where it varies, within about a thousandth.
+fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Environment) -> Result<Level, DesignError> {
+    let path = format!("{}.pore", environment.path);
+    let Some(affine) = map.affine() else {
+        let message = "pore goes with map.affine and map.spartan, whose cells are alike; with this map give a fraction";
+        return Err(DesignError::new(path, message));
+    };
+    let to_phase = &affine.matrix;
+    let level = |pore: f64| {
+        let found = cell.level_of_pore(part, pore, to_phase);
+        found.map_err(|most| {
+            let size = number(map.longest());
+            let message = match most {
+                0.0 => "the void of this cell is closed at every level; give a fraction".to_string(),
+                most => format!(
+                    "pore is {} mm; in these cells of {size} mm it is at most {most:.4} mm, so give a larger wavelength",
+                    number(pore)
+                ),
+            };
+            DesignError::new(&path, message)
+        })
+    };
+    if let Some(pore) = amount.constant() {
+        return Ok(Level::Iso(Grade::Constant(level(pore)?)));
+    }
+    let mut asked = vec![0.0; environment.points.len()];
+    amount.values(environment.points, &mut asked);
+    let spread = Varied::of(&asked);
+    let [from, to] = [level(spread.min)?, level(spread.max)?];
+    let narrower = |t: f64| cell.pores(part, t, to_phase).into_iter().fold(f64::INFINITY, f64::min);
+    let share = |i: usize| i as f64 / (PORES - 1) as f64;
+    let mut stops: Vec<[f64; 2]> = (1..PORES - 1)
+        .into_par_iter()
+        .map(|i| from + (to - from) * share(i))
+        .map(|t| [narrower(t), t])
+        .filter(|[d, _]| spread.min < *d && *d < spread.max)
+        .collect();
+    stops.extend([[spread.min, from], [spread.max, to]]);
+    stops.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    stops.dedup_by(|a, b| a[0] == b[0]);
+    Ok(Level::Iso(Grade::from(Remapped::new(amount.clone(), Stops(stops)))))
+}
+
+/// The thickness or pore (mm) that is given together with a fraction.
+fn length_number((key, spec): (&str, &GradeSpec), environment: &Environment) -> Result<f64, DesignError> {
+    let path = format!("{}.{key}", environment.path);
+    constant(spec, key, &Quantity::new(path, environment, key_of::<AmountSpec>(key)))
 }
 
 /// A number that is the same everywhere.
-fn constant(spec: &GradeSpec, quantity: &Quantity) -> Result<f64, DesignError> {
+fn constant(spec: &GradeSpec, length: &str, quantity: &Quantity) -> Result<f64, DesignError> {
     spec.build(quantity)?.constant().ok_or_else(|| {
-        let message = "fraction and thickness together give one wavelength and are constant; found one that varies";
+        let message = format!(
+            "fraction and {length} together give one wavelength and are constant; found one that varies: give map.phase \
+             a wavelength that varies, and one of the two amounts"
+        );
         DesignError::new(&quantity.path, message)
     })
 }
 
-/// The map of a lattice whose level is a fraction and a thickness: lengths scale with the wavelength, so it is the asked
-/// thickness over the one that cells of 1 mm have at this fraction.
+/// The map of a lattice whose level is a fraction and a thickness or pore: lengths scale with the wavelength, so it is the asked
+/// length over the one that cells of 1 mm have at this fraction.
 pub(super) fn solved_map(
     spec: &LatticeSpec,
-    wall: &GradeSpec,
+    length: (&'static str, &GradeSpec),
     cell: &Arc<Cell>,
     at_map: &Environment,
     at_level: &Environment,
 ) -> Result<Map, DesignError> {
     let path = |key: &str| format!("{}.{key}", at_level.path);
     let amount = &spec.level.amount;
-    let fraction = constant(amount.grade(), &amount.quantity(path(amount.key()), at_level))?;
-    let thickness = wall_number(wall, at_level)?;
-    let unit = spec.map.scaled(1.0, &at_map.path)?.build(at_map)?;
+    if amount.lengths().len() > 1 {
+        let message = "thickness and pore each give the wavelength of a fraction; give one of the two";
+        return Err(DesignError::new(path("pore"), message));
+    }
+    let key = length.0;
+    let fraction = constant(amount.grade(), key, &amount.quantity(path(amount.key()), at_level))?;
+    let asked = length_number(length, at_level)?;
+    let unit = spec.map.scaled(1.0, key, &at_map.path)?.build(at_map)?;
     let part = Part::from(spec.part);
-    let found = if part == Part::Sheet {
+    let found = if key == "pore" {
+        let pores = cell.pores(part, cell.level(part, fraction), &unit.typical());
+        pores.into_iter().reduce(f64::min)
+    } else if part == Part::Sheet {
         mid_surface(cell, path("thickness"))?;
         let lattice = Lattice::new(cell.clone(), unit, part, Level::Thickness(Grade::Constant(1.0)));
         lattice.distance().map(|d| 2.0 * d.iso(part, fraction).0)
     } else {
         cell.thickness(part, cell.iso(part, fraction).0, &unit.typical())
     };
-    let Some(found) = found.filter(|w| *w > 0.0) else {
+    let Some(found) = found.filter(|w| *w > 0.0 && w.is_finite()) else {
+        if key == "pore" {
+            let message =
+                format!("at solid fraction {fraction} no ball passes through the void; give a smaller fraction");
+            return Err(DesignError::new(path(key), message));
+        }
         let whole = cell.connected_fraction(part);
         let ranges = whole.iter().map(|[a, b]| format!("{a:.4} to {b:.4}")).collect::<Vec<_>>().join(" and ");
         let message = format!(
@@ -171,7 +238,7 @@ pub(super) fn solved_map(
         );
         return Err(DesignError::new(path("thickness"), message));
     };
-    spec.map.scaled(thickness / found, &at_map.path)?.build(at_map)
+    spec.map.scaled(asked / found, key, &at_map.path)?.build(at_map)
 }
 
 /// Refuses a cell without a mid-surface.
@@ -195,6 +262,7 @@ impl AmountSpec {
             AmountSpec::Fraction(_) => "fraction",
             AmountSpec::Porosity(_) => "porosity",
             AmountSpec::Iso(_) => "iso",
+            AmountSpec::Pore(_) => "pore",
         }
     }
 
@@ -205,16 +273,23 @@ impl AmountSpec {
             AmountSpec::Fraction(s) => &s.fraction,
             AmountSpec::Porosity(s) => &s.porosity,
             AmountSpec::Iso(s) => &s.iso,
+            AmountSpec::Pore(s) => &s.pore,
         }
     }
 
-    /// The thickness besides a fraction: the wavelength is solved for.
-    pub(super) fn wall(&self) -> Option<&GradeSpec> {
-        match self {
-            AmountSpec::Fraction(s) => s.thickness.as_ref(),
-            AmountSpec::Porosity(s) => s.thickness.as_ref(),
-            AmountSpec::Thickness(_) | AmountSpec::Iso(_) => None,
-        }
+    /// The lengths besides a fraction, by their keys.
+    fn lengths(&self) -> Vec<(&'static str, &GradeSpec)> {
+        let (thickness, pore) = match self {
+            AmountSpec::Fraction(s) => (&s.thickness, &s.pore),
+            AmountSpec::Porosity(s) => (&s.thickness, &s.pore),
+            AmountSpec::Thickness(_) | AmountSpec::Iso(_) | AmountSpec::Pore(_) => return Vec::new(),
+        };
+        [("thickness", thickness), ("pore", pore)].into_iter().filter_map(|(key, s)| Some((key, s.as_ref()?))).collect()
+    }
+
+    /// The thickness or pore besides a fraction, by its key: the wavelength is solved for.
+    pub(super) fn length(&self) -> Option<(&'static str, &GradeSpec)> {
+        self.lengths().first().copied()
     }
 
     /// The quantity under the key `amount`; of a porosity the complement is meant.

@@ -219,10 +219,11 @@ pub(super) fn lattice(
         check_mid(mid, cell.range(), domain.spec.part, &at)?;
         cell = cell.about(mid).map_err(|f| DesignError::fault(&at, f))?;
     }
-    if spec.amount.wall().is_some() {
-        let message =
-            "fraction and thickness together give the wavelength of map.affine and map.spartan; give one of the two";
-        return Err(DesignError::new(format!("{path}.thickness"), message));
+    if let Some((length, _)) = spec.amount.length() {
+        let message = format!(
+            "fraction and {length} together give the wavelength of map.affine and map.spartan; give one of the two"
+        );
+        return Err(DesignError::new(format!("{path}.{length}"), message));
     }
     let key = spec.amount.key();
     let path = format!("{path}.{key}");
@@ -234,6 +235,10 @@ pub(super) fn lattice(
             return Err(DesignError::new(path, message));
         }
         AmountSpec::Thickness(_) => Amount::Thickness,
+        AmountSpec::Pore(_) => {
+            let message = "pore goes with map.affine and map.spartan, whose cells are alike; give a fraction";
+            return Err(DesignError::new(path, message));
+        }
     };
     let mut quantity = spec.amount.quantity(path.clone(), environment);
     let grade = spec.amount.grade().build(&quantity)?;

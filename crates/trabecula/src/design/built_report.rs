@@ -13,6 +13,7 @@ use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Spread};
 use crate::report::*;
 use crate::truss::Beams;
+use geometry::math::Mat3;
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +135,7 @@ const ROUNDING: f64 = 1e-9;
 fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
     let iso = Varied::of_iso(lattice, points);
     let fraction = Varied::of_fraction(lattice, points);
+    let (narrower, sides) = pores(lattice, iso);
     LatticeReport {
         part: word(lattice.part),
         wavelength: lattice.map.wavelength(),
@@ -145,6 +147,8 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         fraction: fraction.varying(),
         porosity: fraction.map(|f| 1.0 - f).varying(),
         thickness: thickness(lattice, iso),
+        pore: narrower,
+        pore_sides: sides,
         folding: lattice.folding(),
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
@@ -210,6 +214,8 @@ fn tiled(it: &Tiled) -> LatticeReport {
         fraction: Varying::Number(solid / volume),
         porosity: Varying::Number(1.0 - solid / volume),
         thickness: None,
+        pore: None,
+        pore_sides: None,
         folding: None,
         connected_fraction: Vec::new(),
         truncation: None,
@@ -301,6 +307,29 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
         .filter_map(|(i, m)| lattice.cell.thickness(lattice.part, level(i), m))
         .collect();
     (!found.is_empty()).then(|| Varied::of(&found).varying())
+}
+
+/// The pore (mm) of the narrower void, and of a sheet those of both sides, where the level and the cells are least and greatest;
+/// `None` where nothing is solid.
+fn pores(lattice: &Lattice, iso: Varied) -> (Option<Varying>, Option<[Varying; 2]>) {
+    let levels = if iso.min == iso.max { vec![iso.min] } else { vec![iso.min, iso.max] };
+    let maps = lattice.map.extremes();
+    let at = |(m, t): (&Mat3, f64)| match lattice.distance() {
+        // What lies d from the mid-surface lies d less half the thickness from the wall.
+        Some(_) => {
+            let bare = lattice.cell.pores(lattice.part, 0.0, m);
+            bare.into_iter().map(|d| (d - 2.0 * t).max(0.0)).collect()
+        }
+        None => lattice.cell.pores(lattice.part, t, m),
+    };
+    let found: Vec<Vec<f64>> = maps.iter().flat_map(|m| levels.iter().map(move |t| (m, *t))).map(at).collect();
+    if found.iter().flatten().any(|d| !d.is_finite()) {
+        return (None, None);
+    }
+    let of = |pick: &dyn Fn(&[f64]) -> f64| Varied::of(&found.iter().map(|v| pick(v)).collect::<Vec<_>>()).varying();
+    let narrower = of(&|v| v.iter().copied().fold(f64::INFINITY, f64::min));
+    let sides = (lattice.part == Part::Sheet).then(|| [of(&|v| v[0]), of(&|v| v[1])]);
+    (Some(narrower), sides)
 }
 
 /// Deviation of a solved map from its target.

@@ -74,7 +74,7 @@ pub struct LatticeSpec {
     /// Position (mm) to phase (turns), such as map.affine with wavelength = 4.
     #[kind(hints("mapping", "transform", "coordinates"))]
     pub map: MapKind,
-    /// How much is solid: exactly one of iso, fraction, porosity, thickness.
+    /// How much is solid: exactly one of iso, fraction, porosity, thickness, pore.
     pub level: LevelSpec,
 }
 
@@ -334,7 +334,8 @@ pub enum PartSpec {
     Upper,
 }
 
-/// How much is solid: one amount, or a fraction and the thickness of its walls, which together give the wavelength.
+/// How much is solid: one amount, or a fraction and the thickness of its walls or the size of its pores, which together give the
+/// wavelength.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Level", noun = "a level")]
 pub struct LevelSpec {
@@ -358,6 +359,8 @@ pub struct LevelSpec {
 pub enum AmountSpec {
     /// A wall's thickness.
     Thickness(ThicknessSpec),
+    /// A pore size.
+    Pore(PoreSpec),
     /// A solid volume fraction.
     Fraction(FractionSpec),
     /// A porosity.
@@ -388,6 +391,9 @@ pub struct FractionSpec {
     /// Thickness of a sheet's wall or narrowest neck of a network: the wavelength is solved for.
     #[kind(unit = "mm", above = 0.0)]
     pub thickness: Option<GradeSpec>,
+    /// Diameter of the largest ball that passes through the void: the wavelength is solved for.
+    #[kind(unit = "mm", above = 0.0)]
+    pub pore: Option<GradeSpec>,
 }
 
 /// A porosity.
@@ -399,6 +405,17 @@ pub struct PorositySpec {
     /// Thickness of a sheet's wall or narrowest neck of a network: the wavelength is solved for.
     #[kind(unit = "mm", above = 0.0)]
     pub thickness: Option<GradeSpec>,
+    /// Diameter of the largest ball that passes through the void: the wavelength is solved for.
+    #[kind(unit = "mm", above = 0.0)]
+    pub pore: Option<GradeSpec>,
+}
+
+/// A pore size.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct PoreSpec {
+    /// Diameter of the largest ball that passes through the void from cell to cell; of a sheet through both sides.
+    #[kind(unit = "mm", above = 0.0, hints("pore_size", "pore_diameter", "window"))]
+    pub pore: GradeSpec,
 }
 
 /// A field value.

@@ -1,20 +1,20 @@
-//! Numbers on a grid, each mapped by a piecewise linear function.
+//! A grade, each number mapped by a piecewise linear function.
 
 use super::{Grade, Quantity, Samples, Stops, Varying};
 use crate::field::Field;
 use crate::kind::DesignError;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
-/// Piecewise linear in numbers on a grid, constant beyond the first and last stop.
+/// Piecewise linear in the numbers of a grade, constant beyond the first and last stop.
 pub struct Remapped {
-    of: Samples,
+    of: Grade,
     stops: Stops,
 }
 
 impl Remapped {
     /// The numbers, and checked stops `[number, value]`.
-    pub fn new(of: Samples, stops: Stops) -> Remapped {
-        Remapped { of, stops }
+    pub fn new(of: impl Into<Grade>, stops: Stops) -> Remapped {
+        Remapped { of: of.into(), stops }
     }
 }
 
@@ -34,16 +34,15 @@ pub(super) fn sampled(samples: Samples, remap: &Option<Stops>, of: &Quantity) ->
 
 impl Field for Remapped {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        for (o, p) in out.iter_mut().zip(points) {
-            *o = self.stops.at(self.of.value_at(*p)).0;
-        }
+        self.of.values(points, out);
+        out.iter_mut().for_each(|v| *v = self.stops.at(*v).0);
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-            let (number, gradient) = self.of.at(*p);
-            let (value, slope) = self.stops.at(number);
-            (*v, *g) = (value, scale(gradient, slope));
+        self.of.gradients(points, values, gradients);
+        for (v, g) in values.iter_mut().zip(gradients) {
+            let (value, slope) = self.stops.at(*v);
+            (*v, *g) = (value, scale(*g, slope));
         }
     }
 
@@ -52,4 +51,8 @@ impl Field for Remapped {
     }
 }
 
-impl Varying for Remapped {}
+impl Varying for Remapped {
+    fn varies(&self) -> [bool; 3] {
+        self.of.varies()
+    }
+}

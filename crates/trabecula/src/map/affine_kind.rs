@@ -19,7 +19,7 @@ pub struct AffineKind {
 /// Edges, angles and offset of the cells.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
 pub struct Cells {
-    /// Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it follows; three
+    /// Cell edge, one number or three. Left out where the level has a fraction and a thickness or a pore, from which it follows; three
     /// numbers are ratios then.
     #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: Option<OneOrThree>,
@@ -33,19 +33,19 @@ pub struct Cells {
 
 impl Cells {
     fn wavelengths(&self, path: &str) -> Result<[f64; 3], DesignError> {
-        let message =
-            "\"wavelength\" is missing: cell edge, mm; only a level with both fraction and thickness goes without";
+        let message = "\"wavelength\" is missing: cell edge, mm; only a level with a fraction and a thickness or pore goes without";
         self.wavelength.map(OneOrThree::three).ok_or_else(|| DesignError::new(path, message))
     }
 
     /// Cells of `scale` mm, or of `scale` times the ratios.
-    fn scaled(&self, scale: f64, path: &str) -> Result<Cells, DesignError> {
+    fn scaled(&self, scale: f64, length: &str, path: &str) -> Result<Cells, DesignError> {
         let wavelength = match self.wavelength {
             None => OneOrThree::One(scale),
             Some(OneOrThree::Three(ratios)) => OneOrThree::Three(ratios.map(|r| r * scale)),
             Some(OneOrThree::One(found)) => {
-                let message =
-                    "fraction and thickness give the wavelength; leave it out, or give one of the two amounts only";
+                let message = format!(
+                    "fraction and {length} give the wavelength; leave it out, or give one of the two amounts only"
+                );
                 let path = format!("{path}.wavelength");
                 return Err(DesignError::new(path, message).found(found.to_string()));
             }
@@ -56,16 +56,21 @@ impl Cells {
 
 impl MapKind {
     /// The map at `path` with cells of `scale` mm, where their size is not given, or `scale` times as large as their ratios.
-    pub(crate) fn scaled(&self, scale: f64, path: &str) -> Result<MapKind, DesignError> {
+    /// `length` is the amount that gives the size.
+    pub(crate) fn scaled(&self, scale: f64, length: &str, path: &str) -> Result<MapKind, DesignError> {
         let path = format!("{path}.{}", self.key());
         match self {
             MapKind::Affine(map) => {
-                Ok(MapKind::Affine(AffineKind { cells: map.cells.scaled(scale, &path)?, skew: map.skew }))
+                Ok(MapKind::Affine(AffineKind { cells: map.cells.scaled(scale, length, &path)?, skew: map.skew }))
             }
-            MapKind::Spartan(map) => Ok(MapKind::Spartan(SpartanKind { cells: map.cells.scaled(scale, &path)? })),
+            MapKind::Spartan(map) => {
+                Ok(MapKind::Spartan(SpartanKind { cells: map.cells.scaled(scale, length, &path)? }))
+            }
             _ => {
-                let message = "fraction and thickness together give the wavelength of map.affine and map.spartan; with this \
-                               map give one of the two amounts";
+                let message = format!(
+                    "fraction and {length} together give the wavelength of map.affine and map.spartan; with this map give \
+                     its wavelength, which may be a grade, and one of the two amounts"
+                );
                 Err(DesignError::new(path, message))
             }
         }

@@ -46,6 +46,12 @@ pub struct LatticeReport {
     pub porosity: Varying,
     /// Minimum wall (sheet) or narrowest neck diameter (lower, upper), mm; None where there is none.
     pub thickness: Option<Varying>,
+    /// Diameter of the largest ball that passes through the void from cell to cell, mm; of a sheet the lesser of its two sides. Zero
+    /// where the void is closed.
+    pub pore: Option<Varying>,
+    /// Of a sheet: the same of the void f < 0 and of the void f > 0, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pore_sides: Option<[Varying; 2]>,
     /// The thickness beyond which a wall of given thickness folds, mm; None for other levels.
     pub folding: Option<f64>,
     /// Intervals of the fraction in which the periodic solid is one connected component.

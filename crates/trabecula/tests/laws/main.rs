@@ -13,6 +13,7 @@ mod local_thickness;
 mod measured;
 mod noisy_stress;
 mod phase;
+mod pore;
 mod simplify;
 mod skin;
 mod smooth;

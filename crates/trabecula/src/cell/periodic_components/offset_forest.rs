@@ -17,7 +17,7 @@ fn minus(a: Int3, b: Int3) -> Int3 {
 }
 
 /// The effect of an edge between two elements.
-pub(super) enum Joined {
+pub(in crate::cell) enum Joined {
     /// They were connected in R³ already.
     Same,
     /// A component became connected with a translate of itself that was none of its translations.
@@ -37,7 +37,7 @@ pub(super) enum Joined {
 }
 
 /// Trees over elements of the torus. Each component has the sublattice of translations of its closed paths.
-pub(super) struct Forest {
+pub(in crate::cell) struct Forest {
     parent: Vec<u32>,
     /// The period of each element relative to its parent.
     shift: Vec<Int3>,
@@ -53,7 +53,7 @@ const ABSENT: u32 = u32::MAX;
 
 impl Forest {
     /// No element present, of `n`.
-    pub(super) fn new(n: usize) -> Forest {
+    pub(in crate::cell) fn new(n: usize) -> Forest {
         Forest {
             parent: (0..n as u32).collect(),
             shift: vec![[0; 3]; n],
@@ -65,30 +65,37 @@ impl Forest {
     }
 
     /// Adds an element, as a component of its own.
-    pub(super) fn insert(&mut self, i: u32) {
+    pub(in crate::cell) fn insert(&mut self, i: u32) {
         self.rank[i as usize] = self.clock;
         self.clock += 1;
     }
 
     /// Whether an element is present.
-    pub(super) fn has(&self, i: u32) -> bool {
+    pub(in crate::cell) fn has(&self, i: u32) -> bool {
         self.rank[i as usize] != ABSENT
     }
 
     /// Whether the element is the eldest of its component.
-    pub(super) fn is_eldest(&mut self, i: u32) -> bool {
+    pub(in crate::cell) fn is_eldest(&mut self, i: u32) -> bool {
         let root = self.find(i).0;
         self.elder[root as usize] == i
     }
 
+    /// The eldest element of the component of an element, and the period of the element relative to it.
+    pub(in crate::cell) fn eldest(&mut self, i: u32) -> (u32, Int3) {
+        let (root, period) = self.find(i);
+        let eldest = self.elder[root as usize];
+        (eldest, minus(period, self.find(eldest).1))
+    }
+
     /// The translations of the component of an element.
-    pub(super) fn translations(&mut self, i: u32) -> Sublattice {
+    pub(in crate::cell) fn translations(&mut self, i: u32) -> Sublattice {
         let root = self.find(i).0;
         self.translations[root as usize]
     }
 
     /// Adds translations to the component of an element.
-    pub(super) fn add_translations(&mut self, i: u32, translations: &Sublattice) {
+    pub(in crate::cell) fn add_translations(&mut self, i: u32, translations: &Sublattice) {
         let root = self.find(i).0;
         self.translations[root as usize].absorb(translations);
     }
@@ -110,13 +117,13 @@ impl Forest {
     }
 
     /// Whether `a`, and `b` moved by `wrap` periods, are connected in R³.
-    pub(super) fn together(&mut self, a: u32, b: u32, wrap: Int3) -> bool {
+    pub(in crate::cell) fn together(&mut self, a: u32, b: u32, wrap: Int3) -> bool {
         let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
         ra == rb && self.translations[ra as usize].contains(minus(plus(ga, wrap), gb))
     }
 
     /// Joins `a` with `b` moved by `wrap` periods.
-    pub(super) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> Joined {
+    pub(in crate::cell) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> Joined {
         let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
         // The period of the root of b relative to the root of a.
         let gap = minus(plus(ga, wrap), gb);

@@ -1,11 +1,11 @@
 //! Sublattices of Z³, by generators in Hermite normal form (up to the entries above the pivots).
 
 /// An integer vector.
-pub(super) type Int3 = [i32; 3];
+pub(in crate::cell) type Int3 = [i32; 3];
 
 /// A subgroup of Z³ as rows in echelon form: row k begins with k zeros and a positive pivot, or is all zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Sublattice([Int3; 3]);
+pub(in crate::cell) struct Sublattice([Int3; 3]);
 
 impl Sublattice {
     /// Adds a generator; whether the subgroup grew.
@@ -55,6 +55,11 @@ impl Sublattice {
             }
         }
         true
+    }
+
+    /// The number of its independent directions.
+    pub(in crate::cell) fn rank(&self) -> usize {
+        (0..3).filter(|k| self.0[*k][*k] != 0).count()
     }
 
     /// Whether it is all of Z³.

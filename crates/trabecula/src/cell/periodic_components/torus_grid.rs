@@ -10,7 +10,7 @@ use geometry::math::{Vec3, norm, sub};
 pub(super) const DIRECTIONS: [Int3; 7] = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
 
 /// The neighbours of a node: ahead along each direction, then behind.
-pub(super) const AROUND: [Int3; 14] = {
+pub(in crate::cell) const AROUND: [Int3; 14] = {
     let mut around = [[0; 3]; 14];
     let mut k = 0;
     while k < 7 {
