@@ -53,6 +53,7 @@ def phase(
     *,
     weight: float | dict | None = None,
     angle_weight: float | None = None,
+    smooth: float | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: Literal["region", "box"] | None = None,
@@ -73,6 +74,9 @@ def phase(
         everything, the error goes where this is small. [optional]
     angle_weight: Weight of an error of angle against the same error of spacing: where no map can follow both, above 1
         cells are nearer to their directions, below 1 to their sizes. [from 0.001 to 1000, default 1.0]
+    smooth: Length over which a direction, a frame or a stress is smoothed, without regard to signs and order, before
+        cells follow it; parts of a stress count by how much they differ between directions. None unless given. [mm,
+        above 0, optional]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     step: Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given. [mm, above
         0, optional]
@@ -91,6 +95,7 @@ def phase(
         rotate=rotate,
         weight=weight,
         angle_weight=angle_weight,
+        smooth=smooth,
         offset=offset,
         step=step,
         domain=domain,
