@@ -115,7 +115,7 @@ pub(crate) fn lines(spec: &FieldKind, path: &str, environment: &Environment) -> 
             return Err(wrong_components(path, array, "a vector has three"));
         }
         let square = |t: &[f64]| t.iter().map(|v| v * v).sum::<f64>();
-        if let Some(n) = array.values.chunks_exact(3).position(|t| !(square(t) > 0.0)) {
+        if let Some(n) = array.values.chunks_exact(3).position(|t| square(t) == 0.0) {
             let what = if array.of_cells { "cell" } else { "point" };
             let message =
                 format!("the array \"{}\" is zero at {what} {n}; it needs a direction everywhere", array.name);

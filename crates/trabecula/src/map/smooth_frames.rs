@@ -158,8 +158,9 @@ impl Octahedral {
         let mut axes = transpose(to);
         for _ in 0..STEPS {
             let next = orthonormal(axes.map(|u| self.convex_gradient(u)));
-            let change = (0..3).map(|i| norm(sub(next[i], axes[i]))).fold(0.0, f64::max);
-            if !(change < 2.0) {
+            let change: f64 = (0..3).map(|i| norm(sub(next[i], axes[i]))).sum();
+            // Not where the gradients span no frame.
+            if change.is_nan() {
                 break;
             }
             axes = next;
@@ -179,9 +180,9 @@ fn orthonormal(m: Mat3) -> Mat3 {
         let inverse = 0.5 / determinant(&x);
         let cofactors = [cross(x[1], x[2]), cross(x[2], x[0]), cross(x[0], x[1])];
         let next = [0, 1, 2].map(|i| add(scale(x[i], 0.5), scale(cofactors[i], inverse)));
-        let change = (0..3).map(|i| norm(sub(next[i], x[i]))).fold(0.0, f64::max);
+        let change: f64 = (0..3).map(|i| norm(sub(next[i], x[i]))).sum();
         x = next;
-        if !(change > 1e-12) {
+        if change.is_nan() || change <= 1e-12 {
             break;
         }
     }
