@@ -34,8 +34,13 @@ CASES = [
         ["map.phase takes a wavelength and an orientation that vary"],
     ),
     # amounts
-    ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["fraction and iso at once", "exactly one of thickness, fraction"]),
-    ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of thickness, fraction"]),
+    (
+        "fraction = 0.3",
+        "fraction = 0.3\niso = 0.2",
+        LEVEL,
+        ["fraction and iso at once", "exactly one of thickness, pore, fraction"],
+    ),
+    ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of thickness, pore, fraction"]),
     ("fraction = 0.3", "porosity = 0", f"{LEVEL}.porosity", ["porosity is 0", "greater than 0 and less than 1"]),
     ("fraction = 0.3", "porosity = 1", f"{LEVEL}.porosity", ["porosity is 1", "less than 1"]),
     ("fraction = 0.3", "porosity = 1.2", f"{LEVEL}.porosity", ["porosity is 1.2"]),

@@ -37,6 +37,7 @@ def test_every_door_gives_the_same(tmp_path):
     assert np.array_equal(lt.load(tmp_path / "wall.json").build().field(points), built.field(points))
     words = [sys.executable, "-m", "trabecula", "check", str(file)]
     report = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)
+    assert report.pop("volume_error") == built.volume_error()
     assert report == built.report()
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert "constant-level sheet of equal fraction" in text and "thickness  0.4000 mm" in text

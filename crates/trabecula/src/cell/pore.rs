@@ -31,6 +31,12 @@ const NOISE: f64 = 0.015;
 /// Ratio of the nodes along each axis of the second grid, where the saddle is not found on the first.
 const FINER: f64 = 1.7;
 
+/// Whether no wave is finer than the finest grid is for.
+pub(super) fn resolves(series: &Series) -> bool {
+    let indices = series.terms().iter().flat_map(|t| t.hkl);
+    indices.map(i32::unsigned_abs).max().is_none_or(|top| WAVE * f64::from(top) <= NODES[1])
+}
+
 /// A void to pass through: f ≥ level (`Upper`) or f ≤ level (`Lower`), in space.
 pub(super) struct Void<'a> {
     pub(super) series: &'a Series,

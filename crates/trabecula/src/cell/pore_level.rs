@@ -10,6 +10,11 @@ const FRACTIONS: [f64; 2] = [0.005, 0.995];
 const NEAR: f64 = 1e-6;
 
 impl Cell {
+    /// Whether the grid on which pores are sought resolves the cell's finest wave: beyond it chambers are too many.
+    pub fn resolves_pores(&self) -> bool {
+        pore::resolves(self.series())
+    }
+
     /// Diameters (mm) of the largest balls that pass through the void of a part at level `iso`, where u = `to_phase` · x: of a
     /// network the one void, of a sheet f < −iso and f > iso. See `pore`.
     pub fn pores(&self, part: Part, iso: f64, to_phase: &Mat3) -> Vec<f64> {
@@ -19,7 +24,7 @@ impl Cell {
     /// Diameter (mm) of the largest ball that passes through the void f ≤ `level` (`Lower`) or f ≥ `level` (`Upper`), where phases
     /// relate to millimetres by u = `to_phase` · x: in as many independent directions as the void is connected with its
     /// translates. Zero where it is in none, infinite where nothing is solid. To about 1e-7 of the diameter; where several passes
-    /// are nearly as wide, to about 0.5 %.
+    /// are nearly as wide, to a quarter of a step of the grid.
     pub fn pore(&self, side: Part, level: f64, to_phase: &Mat3) -> f64 {
         let beyond = |open: f64| if side == Part::Lower { level > open } else { level < open };
         let open = self.openings(side).iter().flatten().take_while(|(at, _)| beyond(*at)).collect::<Vec<_>>();

@@ -310,8 +310,11 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
 }
 
 /// The pore (mm) of the narrower void, and of a sheet those of both sides, where the level and the cells are least and greatest;
-/// `None` where nothing is solid.
+/// `None` where nothing is solid, and of cells whose waves are too fine for it to be found.
 fn pores(lattice: &Lattice, iso: Varied) -> (Option<Varying>, Option<[Varying; 2]>) {
+    if !lattice.cell.resolves_pores() {
+        return (None, None);
+    }
     let levels = if iso.min == iso.max { vec![iso.min] } else { vec![iso.min, iso.max] };
     let maps = lattice.map.extremes();
     let at = |(m, t): (&Mat3, f64)| match lattice.distance() {
