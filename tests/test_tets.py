@@ -466,7 +466,7 @@ def test_coarse_steps_are_warned_of_with_the_step_that_suffices():
     (words,) = (str(w.message) for w in found if "too coarse" in str(w.message))
     whole = solid.report().lattices["a"].tets.volume
     off = coarse.volume / whole / 0.25 - 1
-    assert f"({100 * off:+.1f} %)" in words and "the lattice in 1 piece" in words
+    assert f"({100 * off:+.1f} %)" in words
     enough = float(words.split("use an edge of ")[1].split()[0])
     assert enough > 0.15
     with warnings.catch_warnings():
