@@ -239,29 +239,10 @@ impl ComponentGraph {
             }
         }
         let roots: Vec<usize> = (0..count).filter(|&i| self.surface[i] as usize == i).collect();
-        // The outer boundary of each solid component, and its volume without its cavities.
-        let mut outside: HashMap<u32, usize> = HashMap::new();
-        for &i in roots.iter().filter(|i| whole[**i].volume > 0.0) {
-            let at = outside.entry(find(&mut self.solid, i as u32)).or_insert(i);
-            if whole[i].volume > whole[*at].volume {
-                *at = i;
-            }
-        }
+        let owner = self.owners(&whole, &roots);
         let mut net: Vec<f64> = whole.iter().map(|s| s.volume).collect();
-        let mut owner = vec![NONE; count];
-        for &i in &roots {
-            let positive = whole[i].volume > 0.0;
-            owner[i] = if positive {
-                i as u32
-            } else {
-                // A void that no grid line meets is smaller than a grid step. It has no owner and is filled where anything
-                // is dropped, so that no inverted component can be left over.
-                let solid = find(&mut self.solid, i as u32);
-                outside.get(&solid).map_or(NONE, |o| *o as u32)
-            };
-            if !positive && owner[i] != NONE {
-                net[owner[i] as usize] += whole[i].volume;
-            }
+        for &i in roots.iter().filter(|i| owner[**i] != NONE && owner[**i] as usize != **i) {
+            net[owner[i] as usize] += whole[i].volume;
         }
         let outer = || roots.iter().copied().filter(|&i| whole[i].volume > 0.0);
         let largest = outer().reduce(|a, b| if net[b] > net[a] { b } else { a });
@@ -269,12 +250,30 @@ impl ComponentGraph {
         let [small, dust, crumb] = [SMALL, DUST, CRUMB].map(cells);
         let mut found = Components::default();
         let mut drops = vec![false; count];
+        for i in outer().filter(|&i| Some(i) != largest) {
+            let border = whole[i].area[1] > 0.0;
+            found.others += 1;
+            found.border += u64::from(border);
+            drops[i] = match islands {
+                Islands::Drop => true,
+                Islands::DropSmall => net[i] < if border { small } else { dust },
+                Islands::Keep | Islands::Error => false,
+            };
+            if drops[i] {
+                found.dropped += 1;
+                found.dropped_volume += net[i];
+            }
+        }
         let fills = match islands {
             Islands::DropSmall | Islands::Drop => crumbs(&whole, &roots, crumb),
             Islands::Keep | Islands::Error => Vec::new(),
         };
-        for &i in &fills {
-            drops[i] = true;
+        // A cavity goes with its solid.
+        for i in fills {
+            drops[i] = owner[i] == NONE || !drops[owner[i] as usize];
+            if !drops[i] {
+                continue;
+            }
             found.filled += 1;
             found.filled_volume -= whole[i].volume;
             if owner[i] != NONE {
@@ -286,19 +285,7 @@ impl ComponentGraph {
                 found.largest = net[i];
                 continue;
             }
-            let border = whole[i].area[1] > 0.0;
-            found.others += 1;
-            found.border += u64::from(border);
             found.volume += net[i];
-            drops[i] = match islands {
-                Islands::Drop => true,
-                Islands::DropSmall => net[i] < if border { small } else { dust },
-                Islands::Keep | Islands::Error => false,
-            };
-            if drops[i] {
-                found.dropped += 1;
-                found.dropped_volume += net[i];
-            }
             if found.second.is_none_or(|o| net[i] > o.volume) {
                 let Aabb { min, max } = whole[i].bounds;
                 found.second = Some(Component { volume: net[i], bounds: [min, max] });
@@ -307,7 +294,6 @@ impl ComponentGraph {
         if islands == Islands::Error && found.others > 0 {
             return Err(Fault::new("islands", refusal(&found)));
         }
-        // A cavity goes with its solid.
         let stays = |i: usize| match owner[i] {
             NONE => found.dropped == 0 && !drops[i],
             o => !drops[o as usize] && !drops[i],
@@ -326,16 +312,39 @@ impl ComponentGraph {
         let components = Components { count: solids, cavities: walls.len() as u64, euler, ..found };
         Ok(Resolved { parts, first: self.surface, walls, totals: sum, components, error: None })
     }
+
+    /// For each root of a surface the outer boundary of its solid component: itself, or that around a cavity. A cavity that no
+    /// grid line meets is smaller than a grid step: it has none and is filled where anything is dropped, so that no inverted
+    /// component can be left over.
+    fn owners(&mut self, whole: &[Totals], roots: &[usize]) -> Vec<u32> {
+        let mut outside: HashMap<u32, usize> = HashMap::new();
+        for &i in roots.iter().filter(|i| whole[**i].volume > 0.0) {
+            let at = outside.entry(find(&mut self.solid, i as u32)).or_insert(i);
+            if whole[i].volume > whole[*at].volume {
+                *at = i;
+            }
+        }
+        let mut owner = vec![NONE; whole.len()];
+        for &i in roots {
+            let solid = find(&mut self.solid, i as u32);
+            owner[i] = if whole[i].volume > 0.0 { i as u32 } else { outside.get(&solid).map_or(NONE, |o| *o as u32) };
+        }
+        owner
+    }
+}
+
+/// Whether a box holds another.
+fn encloses(outer: &Aabb, inner: &Aabb) -> bool {
+    (0..3).all(|a| inner.min[a] >= outer.min[a] && inner.max[a] <= outer.max[a])
 }
 
 /// The cavities of less than a volume that can be filled: with nothing in them, and without a part of the region's boundary.
 fn crumbs(whole: &[Totals], roots: &[usize], limit: f64) -> Vec<usize> {
-    let within = |inner: &Aabb, b: &Aabb| (0..3).all(|a| inner.min[a] >= b.min[a] && inner.max[a] <= b.max[a]);
     let least = roots.iter().filter(|i| whole[**i].volume > 0.0 && whole[**i].volume < limit);
     let least: Vec<&Aabb> = least.map(|i| &whole[*i].bounds).collect();
     let tiny = |i: &usize| {
         let Totals { volume, area, bounds, .. } = &whole[*i];
-        *volume < 0.0 && -volume < limit && area[1] == 0.0 && !least.iter().any(|inner| within(inner, bounds))
+        *volume < 0.0 && -volume < limit && area[1] == 0.0 && !least.iter().any(|inner| encloses(bounds, inner))
     };
     roots.iter().copied().filter(tiny).collect()
 }
