@@ -88,8 +88,8 @@ impl<'a> LevelSurface<'a> {
             if length.is_nan() || length > self.edge {
                 return None;
             }
-            // The next step would be its square, and the distance is stationary at the foot.
-            if length <= 1e-5 * self.edge {
+            // The next step would be its square: the distance, stationary at the foot, is known to 1e-12 of itself.
+            if length <= (1e-6 * norm(p)).max(1e-12 * self.edge) {
                 return Some(p);
             }
         }

@@ -223,7 +223,7 @@ pub(super) fn solved_map(
         let lattice = Lattice::new(cell.clone(), unit, part, Level::Thickness(Grade::Constant(1.0)));
         lattice.distance().map(|d| 2.0 * d.iso(part, fraction).0)
     } else {
-        cell.thickness(part, cell.iso(part, fraction).0, &unit.typical())
+        cell.thickness(part, cell.level(part, fraction), &unit.typical())
     };
     let Some(found) = found.filter(|w| *w > 0.0 && w.is_finite()) else {
         if key == "pore" {
