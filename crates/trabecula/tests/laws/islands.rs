@@ -29,7 +29,7 @@ fn union(parts: Vec<Region>) -> Region {
 }
 
 /// Solid angle of a mesh about a point, in turns: 1 inside, 0 outside.
-fn winding(mesh: &Mesh, triangles: &[usize], p: [f64; 3]) -> f64 {
+pub fn winding(mesh: &Mesh, triangles: &[usize], p: [f64; 3]) -> f64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let sum: f64 = triangles
         .iter()
