@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
 import threading
 
-__all__ = ["python", "run", "stop"]
+__all__ = ["bound", "python", "run", "stop"]
 
 #: The children that run, which an interrupt ends.
 running: set[subprocess.Popen] = set()
@@ -46,6 +47,18 @@ def run(command: list[str], folder: str, limit: float) -> str | None:
         said.seek(0)
         lines = said.read().decode("utf-8", "replace").strip().splitlines()
         return f"failed: {lines[-1] if lines else f'exit status {status}'}"
+
+
+def bound(memory: float) -> None:
+    """Lets this process, a child, take at most ``memory`` bytes, where the system can."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        most = int(memory)
+        resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    # Its threads would each reserve memory.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 def stop() -> None:

@@ -101,14 +101,7 @@ def child(name: str, made: str, memory: str) -> None:
     """Reads a file within ``memory`` bytes and writes its arrays; what is wrong with it is the last line of the words."""
     import io
 
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        most = int(float(memory))
-        resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-    # Its threads would each reserve memory.
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    children.bound(float(memory))
     import meshio
     import numpy as np
 

@@ -70,10 +70,10 @@ def grid(
     """Numbers on a grid, from a file; linear between them.
 
     path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
-        tif): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns run along
-        x, rows along y, pictures along z.
-    origin: Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it. [mm,
-        optional]
+        tif, DICOM): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns
+        run along x, rows along y, pictures along z; DICOM as its axes say.
+    origin: Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain
+        it. [mm, optional]
     step: Distance between numbers, one or three. VTI and VTK files contain it. [mm, optional]
     array: Name of the array, where a file has several. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]

@@ -7,7 +7,7 @@ use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use trabecula::design::{Loader, ZonedElements};
+use trabecula::design::{Loader, Scan, ZonedElements};
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
@@ -30,6 +30,10 @@ impl Loader for Folder {
             return Err(format!("no file is named {pattern}"));
         }
         Ok(found)
+    }
+
+    fn scan(&self, path: &str) -> Result<Scan, String> {
+        scan(&self.0.join(Path::new(path)).to_string_lossy())
     }
 
     fn elements(&self, path: &str) -> Result<ZonedElements, String> {
@@ -69,6 +73,19 @@ fn elements(path: &str) -> Result<ZonedElements, String> {
                 kinds: kinds.as_array().to_vec(),
             };
             Ok(ZonedElements { elements, zones: zones.as_array().to_vec(), names })
+        };
+        read().map_err(|e| words(py, &e))
+    })
+}
+
+/// The series of DICOM that Python read.
+fn scan(path: &str) -> Result<Scan, String> {
+    Python::attach(|py| {
+        let read = || -> PyResult<Scan> {
+            let read = py.import("trabecula.dicom")?.getattr("read")?.call1((path,))?;
+            let (shape, origin, step, values): ([usize; 3], [f64; 3], [f64; 3], PyReadonlyArray1<'_, f64>) =
+                read.extract()?;
+            Ok(Scan { shape, values: values.as_array().to_vec(), placed: Some([origin, step]) })
         };
         read().map_err(|e| words(py, &e))
     })

@@ -44,7 +44,7 @@ use crate::truss::Beams;
 use geometry::fault::Fault;
 use geometry::repair::Repaired;
 
-pub use crate::environment::{Loader, NoFiles, ZoneNames, ZonedElements};
+pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use build_blend::Blended;
 pub use build_tets::{TetReport, Tets};

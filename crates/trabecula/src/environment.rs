@@ -2,6 +2,7 @@
 
 mod picture_stack;
 
+pub use picture_stack::Scan;
 pub(crate) use picture_stack::{names_pictures, picture_stack};
 
 use crate::csg_tree::CsgSolid;
@@ -21,6 +22,12 @@ pub trait Loader {
     /// why there are none.
     fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
         Err(format!("{pattern}: folders are not looked into here"))
+    }
+
+    /// The grey values of the DICOM file or series at `path`: a file, a folder with a slash at its end, or a pattern as in
+    /// `list`; or one sentence why not.
+    fn scan(&self, path: &str) -> Result<Scan, String> {
+        Err(format!("{path}: no pictures (png, tif); DICOM is read by the Python package alone"))
     }
 
     /// The finite elements of the file at `path`, which is of none of the formats read here; or one sentence why not.

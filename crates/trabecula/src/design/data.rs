@@ -242,7 +242,7 @@ impl Kind for GroupSpec {
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "FileCell", noun = "a cell from a file")]
 pub struct FileCellSpec {
-    /// Path of the file, relative to the design file: npy, grey pictures (png, tif) or a closed mesh (stl, 3mf, ply, obj, off).
+    /// Path of the file, relative to the design file: npy, grey pictures (png, tif, DICOM) or a closed mesh (stl, 3mf, ply, obj, off).
     /// Pictures lie one above the other: one file, "scan/*.png" with a * for any text, or their folder, "scan/". Of a mesh the
     /// function is the signed distance, positive inside, in edges of the cell.
     pub path: String,

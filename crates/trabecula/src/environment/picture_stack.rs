@@ -1,25 +1,44 @@
-//! Stacks of grey pictures, as a scanner writes them: one file for each layer, or one TIFF of all.
+//! Stacks of grey pictures, as a scanner writes them: one file for each layer, one TIFF of all, or a series of DICOM.
 
 use super::{Loader, extension};
 use crate::kind::DesignError;
 use geometry::formats;
+use geometry::math::Vec3;
 
 /// The formats of pictures.
 const KINDS: [&str; 3] = ["png", "tif", "tiff"];
 
-/// Whether a path names pictures: by its extension, or as a folder, with a slash at its end.
-pub(crate) fn names_pictures(path: &str) -> bool {
-    path.ends_with('/') || KINDS.contains(&extension(path).as_str())
+/// The extension of DICOM, which the loader reads.
+const DICOM: &str = "dcm";
+
+/// Grey values on a grid.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    /// Columns, rows, pictures: along x, y, z.
+    pub shape: [usize; 3],
+    /// x fastest.
+    pub values: Vec<f64>,
+    /// The middle of the first pixel and the distances between pixels and pictures, mm, where the files say so.
+    pub placed: Option<[Vec3; 2]>,
 }
 
-/// The numbers of columns, rows and pictures, and the grey values, x fastest: of the file at `path`, of the files that match it
-/// if its last part has a *, or of the pictures of a folder. Files stand in the order of their names, in which 10 comes after 9,
-/// and each holds one picture or more. `at` is the place of `path` in the design.
-pub(crate) fn picture_stack(path: &str, at: &str, loader: &dyn Loader) -> Result<([usize; 3], Vec<f64>), DesignError> {
+/// Whether a path names pictures: by its extension, or as a folder, with a slash at its end.
+pub(crate) fn names_pictures(path: &str) -> bool {
+    path.ends_with('/') || KINDS.contains(&extension(path).as_str()) || extension(path) == DICOM
+}
+
+/// The grey values of the file at `path`, of the files that match it if its last part has a *, or of the pictures of a folder.
+/// Files stand in the order of their names, in which 10 comes after 9, and each holds one picture or more; those of a DICOM
+/// series in the order of their positions. `at` is the place of `path` in the design.
+pub(crate) fn picture_stack(path: &str, at: &str, loader: &dyn Loader) -> Result<Scan, DesignError> {
     let wrong = |m: String| DesignError::new(at, m).found(path);
-    let mut names = if path.ends_with('/') {
-        let of_a_kind = |kind: &&str| loader.list(&format!("{path}*.{kind}")).ok();
-        KINDS.iter().find_map(of_a_kind).ok_or_else(|| wrong(format!("no pictures (png, tif) in {path}")))?
+    let pictures = |kind: &&str| loader.list(&format!("{path}*.{kind}")).ok();
+    let in_folder = if path.ends_with('/') { KINDS.iter().find_map(pictures) } else { None };
+    if extension(path) == DICOM || path.ends_with('/') && in_folder.is_none() {
+        return loader.scan(path).map_err(wrong);
+    }
+    let mut names = if let Some(names) = in_folder {
+        names
     } else if path.contains('*') {
         loader.list(path).map_err(wrong)?
     } else {
@@ -42,7 +61,7 @@ pub(crate) fn picture_stack(path: &str, at: &str, loader: &dyn Loader) -> Result
         }
     }
     let [w, h] = size.ok_or_else(|| wrong(format!("{path}: no pictures")))?;
-    Ok(([w, h, count], values))
+    Ok(Scan { shape: [w, h, count], values, placed: None })
 }
 
 /// A name as its words and numbers, so that they sort as people count.

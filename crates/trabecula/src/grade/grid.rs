@@ -12,11 +12,11 @@ use geometry::formats::{self, Shape};
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Grid", noun = "a grade on a grid")]
 pub struct GridKind {
-    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif): one
-    /// file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns run along x, rows along y,
-    /// pictures along z.
+    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif,
+    /// DICOM): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns run along x, rows
+    /// along y, pictures along z; DICOM as its axes say.
     path: String,
-    /// Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it.
+    /// Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain it.
     #[kind(unit = "mm")]
     origin: Option<[f64; 3]>,
     /// Distance between numbers, one or three. VTI and VTK files contain it.
@@ -85,16 +85,19 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
                     format!("pictures do not say where they lie; give {key}, {what}"),
                 )
             };
-            let origin = spec.origin.ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
-            let step = spec
-                .step
+            let found = picture_stack(&spec.path, &at, environment.loader)?;
+            let placed = |n: usize| found.placed.map(|p| p[n]);
+            let origin = (spec.origin.or(placed(0)))
+                .ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
+            let step = (spec.step.map(OneOrThree::three).or(placed(1)))
                 .ok_or_else(|| need("step", "the distance between pixels and pictures in mm, one or three"))?;
-            let (shape, values) = picture_stack(&spec.path, &at, environment.loader)?;
-            (origin, step.three(), shape, values)
+            (origin, step, found.shape, found.values)
         }
         _ => {
-            let message =
-                format!("the name must end in npy, vti or vtk, or in png or tif for pictures; found \"{}\"", spec.path);
+            let message = format!(
+                "the name must end in npy, vti or vtk, or in png, tif or dcm for pictures; found \"{}\"",
+                spec.path
+            );
             return Err(DesignError::new(at, message).found(&spec.path));
         }
     };

@@ -37,8 +37,11 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
         return Ok(Cell::new(series).truncated(share));
     }
     misplaced(spec, path, &["period"], "is for a mesh; the period of numbers is their count")?;
+    let mut step = spec.step.map(OneOrThree::three);
     let (shape, mut values) = if names_pictures(&spec.path) {
-        picture_stack(&spec.path, &at, loader)?
+        let found = picture_stack(&spec.path, &at, loader)?;
+        step = step.or(found.placed.map(|[_, step]| step));
+        (found.shape, found.values)
     } else if kind == "npy" {
         let (shape, values) = formats::read_npy(&load()?).map_err(wrong)?;
         let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
@@ -49,11 +52,11 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
     } else {
         let known = formats::Format::listed();
         let message =
-            format!("the name must end in npy, {known}, or in png or tif for pictures; found \"{}\"", spec.path);
+            format!("the name must end in npy, {known}, or in png, tif or dcm for pictures; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     };
     if let Some(threshold) = spec.threshold {
-        values = above(&values, shape, threshold, spec.step).map_err(wrong)?;
+        values = above(&values, shape, threshold, step).map_err(wrong)?;
     } else {
         misplaced(spec, path, &["step"], "goes with threshold; without it no distance is measured")?;
     }
@@ -77,8 +80,8 @@ fn edge(size: [f64; 3]) -> f64 {
 }
 
 /// The signed periodic distance of the numbers above a threshold, in edges of the cell.
-fn above(values: &[f64], shape: [usize; 3], threshold: f64, step: Option<OneOrThree>) -> Result<Vec<f64>, Fault> {
-    let step = step.map_or([1.0; 3], OneOrThree::three);
+fn above(values: &[f64], shape: [usize; 3], threshold: f64, step: Option<Vec3>) -> Result<Vec<f64>, Fault> {
+    let step = step.unwrap_or([1.0; 3]);
     let solid: Vec<bool> = values.iter().map(|v| *v > threshold).collect();
     let mut signed = signed_distances(&solid, shape, step).ok_or_else(|| {
         Fault::new("threshold", format!("all numbers are on one side of {threshold}, so there is no surface"))
