@@ -45,7 +45,8 @@ def read(path: str | os.PathLike[str], limit: float | None = None) -> tuple[list
     name = os.fsdecode(path)
     files = sorted(os.path.abspath(f) for f in found(name))
     if not files:
-        raise ValueError(f"{name}: no pictures (png, tif) and no DICOM files")
+        there = "*" in os.path.basename(name) or os.path.exists(name)
+        raise ValueError(f"{name}: no pictures (png, tif) and no DICOM files" if there else f"{name} does not exist")
     try:
         import pydicom  # noqa: F401
     except ImportError:
