@@ -22,7 +22,7 @@ VOXEL_WRITES = ("npy", "vti")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
 MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
-TET_READS = ("vtu", "vtk", *MESHIO_READS)
+TET_READS = ("vtu", "vtk", "frd", *MESHIO_READS)
 TET_WRITES = ("vtu", *MESHIO_WRITES)
 
 

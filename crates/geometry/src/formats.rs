@@ -8,6 +8,7 @@ use crate::fault::Fault;
 use crate::mesh::Mesh;
 
 mod elements;
+mod frd;
 mod indexed;
 mod join;
 mod npy;
@@ -32,6 +33,19 @@ pub use stl::write_pieces as write_stl_pieces;
 pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;
+
+/// Formats of results on grids and meshes, by the ends of their files' names.
+pub const RESULTS: [&str; 4] = ["vtu", "vtk", "vti", "frd"];
+
+/// Reads a result of a kind of [`RESULTS`]. Of an FRD, which holds many steps, only the array of this name has its numbers.
+///
+/// **Errors**: what the format does not allow; truncated files; other kinds.
+pub fn read_result(bytes: &[u8], kind: &str, array: &str) -> Result<Data, Fault> {
+    match kind {
+        "frd" => frd::read(bytes, array),
+        _ => read_vtk(bytes),
+    }
+}
 
 /// A format of mesh files. A new one is a file in this folder and a row in [`FORMATS`].
 pub struct Format {

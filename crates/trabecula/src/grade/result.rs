@@ -15,16 +15,58 @@ const UNCOVERED: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Field", noun = "a field of a result")]
 pub struct FieldKind {
-    /// Path of the file (vtu, vtk, vti), relative to the design file.
+    /// Path of the file (vtu, vtk, vti; frd of CalculiX), relative to the design file.
     path: String,
-    /// Name of the array, of points or cells.
+    /// Name of the array, of points or cells. In an FRD "STRESS" is that of the last step, "STRESS@2" that of the second.
     array: String,
     /// Unit of the file's coordinates (mm unless given).
     unit: Option<Unit>,
     /// Which of its components, from 0, where it has several.
     component: Option<u32>,
+    /// A number made of all its components.
+    invariant: Option<Invariant>,
     /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
+}
+
+/// A number that does not depend on the axes in which a vector or a tensor is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
+#[kind(noun = "invariant")]
+pub enum Invariant {
+    /// The length of a vector; of a tensor the root of the sum of the squares of its nine components.
+    Magnitude,
+    /// The equivalent stress of von Mises, never negative.
+    #[kind(rename = "von_mises")]
+    VonMises,
+    /// The mean of the three normal components: positive in tension, negative in compression.
+    Mean,
+}
+
+impl Invariant {
+    /// Of the components of a vector (three) or a tensor (six, normal ones first, or nine, row by row).
+    fn of(self, t: &[f64]) -> f64 {
+        let (normal, shear) = match t {
+            [xx, xy, xz, yx, yy, yz, zx, zy, zz] => {
+                ([*xx, *yy, *zz], [xy, xz, yx, yz, zx, zy].map(|s| s * s).iter().sum::<f64>())
+            }
+            [xx, yy, zz, rest @ ..] => ([*xx, *yy, *zz], 2.0 * rest.iter().map(|s| s * s).sum::<f64>()),
+            _ => return f64::NAN,
+        };
+        let [x, y, z] = normal;
+        match self {
+            Invariant::Magnitude => (x * x + y * y + z * z + shear).sqrt(),
+            Invariant::VonMises => {
+                let differences = (x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2);
+                (0.5 * differences + 1.5 * shear).sqrt()
+            }
+            Invariant::Mean => (x + y + z) / 3.0,
+        }
+    }
+
+    /// Whether it is defined for so many components.
+    fn takes(self, components: usize) -> bool {
+        matches!(components, 6 | 9) || components == 3 && self == Invariant::Magnitude
+    }
 }
 
 impl BuildGrade for FieldKind {
@@ -67,11 +109,27 @@ pub(super) fn percent(share: f64) -> String {
 
 fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
     let made = columns(spec, path, environment, |array| {
-        let chosen = component(spec, path, array)?;
-        Ok((1, move |t: &[f64], _| t[chosen]))
+        let invariant = invariant(spec, path, array)?;
+        let chosen = if invariant.is_none() { component(spec, path, array)? } else { 0 };
+        Ok((1, move |t: &[f64], _| invariant.map_or_else(|| t[chosen], |i| i.of(t))))
     })?;
     let one = made.into_iter().next();
     one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
+}
+
+/// The invariant that is meant, if one is.
+fn invariant(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<Option<Invariant>, DesignError> {
+    let Some(invariant) = spec.invariant else { return Ok(None) };
+    let at = format!("{path}.invariant");
+    if spec.component.is_some() {
+        return Err(DesignError::new(at, "component and invariant each make one number; give one of the two"));
+    }
+    if !invariant.takes(array.components) {
+        let needed = if invariant == Invariant::Magnitude { "three, six or nine" } else { "six or nine" };
+        let message = format!("the array \"{}\" has {} components; it needs {needed}", array.name, array.components);
+        return Err(DesignError::new(at, message));
+    }
+    Ok(Some(invariant))
 }
 
 /// The component that is meant.
@@ -82,7 +140,11 @@ fn component(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<usi
         (None, 1) => Ok(0),
         (None, n) => Err(DesignError::new(
             &at,
-            format!("the array \"{}\" has {n} components; give component, from 0 to {}", array.name, n - 1),
+            format!(
+                "the array \"{}\" has {n} components; give component, from 0 to {}, or an invariant",
+                array.name,
+                n - 1
+            ),
         )),
         (Some(c), n) if (c as usize) < n => Ok(c as usize),
         (Some(c), n) => Err(DesignError::new(
@@ -146,11 +208,12 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     let at = format!("{path}.path");
     let file = environment.load(&spec.path, &at)?;
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
-    if !["vtu", "vtk", "vti"].contains(&extension(&spec.path).as_str()) {
-        let message = format!("the name must end in vtu, vtk or vti; found \"{}\"", spec.path);
+    let kind = extension(&spec.path);
+    if !formats::RESULTS.contains(&kind.as_str()) {
+        let message = format!("the name must end in {}; found \"{}\"", formats::RESULTS.join(", "), spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     }
-    let data = formats::read_vtk(&file).map_err(wrong)?;
+    let data = formats::read_result(&file, &kind, &spec.array).map_err(wrong)?;
     let array = pick(&data.arrays, Some(&spec.array))
         .map_err(|m| DesignError::new(format!("{path}.array"), m).found(&spec.array))?;
     if let Some(n) = array.values.iter().position(|v| !v.is_finite()) {

@@ -73,9 +73,9 @@ pub(super) fn from_file(
         DesignError::new(&at, message).found(&file.path)
     };
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
-    let ZonedElements { elements, zones, names } = if kind == "vtu" || kind == "vtk" {
+    let ZonedElements { elements, zones, names } = if ["vtu", "vtk", "frd"].contains(&kind.as_str()) {
         let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
-        let data = formats::read_vtk(&bytes).map_err(wrong)?;
+        let data = formats::read_result(&bytes, &kind, "").map_err(wrong)?;
         let Shape::Mesh(elements) = data.shape else {
             let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
             return Err(DesignError::new(at, message).found(&file.path));
