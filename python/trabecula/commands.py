@@ -38,12 +38,11 @@ def new(args) -> None:
     known_cell(args.cell, cell.names())
     if args.beams:
         known_cell(args.beams, unit_cells.names())
-    if os.path.exists(args.file) and not args.force and not os.path.isdir(args.file):
-        raise Refused(f"{args.file} exists; choose another name, or replace it with --force")
-    check_place(args.file)
     beside = os.path.join(os.path.dirname(args.file), SCHEMA_FILE) if args.schema else None
-    if beside:
-        check_place(beside)
+    for name in filter(None, (args.file, beside)):
+        if os.path.isfile(name) and not args.force and not (name == beside and holds(name, _core.schema())):
+            raise Refused(f"{name} exists; choose another name or folder, or replace it with --force")
+        check_place(name)
     part = None
     if args.part:
         low, high = region_of_file(args.part).bounds
@@ -59,11 +58,17 @@ def new(args) -> None:
     say(f"{args.file} written; next: trabecula check {args.file}")
 
 
+def holds(name: str, text: str) -> bool:
+    """Whether a file holds this text."""
+    with open(name, "rb") as file:
+        return file.read() == text.encode()
+
+
 def check(args) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
-    error = solid.volume_error() if report.chord is None else None
+    error = solid.volume_error(report.spacing) if report.chord is None else None
     found = transitions(solid, args.transitions, tell=not args.json)
     draw(found, args.transitions)
     if args.json:
@@ -73,6 +78,8 @@ def check(args) -> None:
             figures["warnings"] += found.warnings
         return put_json(figures)
     expect = [] if error is None else [f"        volume error to expect of a mesh at that spacing {error:.1g}"]
+    if report.chord is None and (coarser := solid.spacing()) > report.spacing:
+        expect.append(f"        mesh takes {coarser:.3g} mm, or there would be more than 20 million triangles")
     print("\n".join(map(str, [report, *expect, *found])))
 
 
@@ -95,10 +102,8 @@ def mesh(args) -> None:
     made["seconds"] = round(time.perf_counter() - start, 3)
     others = made["islands"]
     if others and others["dropped"]:
-        small = ""
-        if args.islands == "drop-small":
-            small = "at the region's boundary, smaller than eight grid cells and a thousandth of the largest, "
-        say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
+        pieces = counted(others["dropped"], "small piece" if args.islands == "drop-small" else "piece")
+        say(f"{pieces} dropped: {others['dropped_volume']:.3g} mm³ in all")
     if others and others["filled"]:
         filled = counted(others["filled"], "closed void")
         say(f"{filled} smaller than a grid cell filled: {others['filled_volume']:.3g} mm³ in all")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import os
 import warnings
@@ -126,7 +127,7 @@ class Solid(Picture):
         """The figures without meshing: level, fraction and thickness of each lattice, lengths and counts of beams, the region,
         the blend and the warnings. ``str(report)`` is what ``trabecula check`` prints.
         """
-        return self._report
+        return copy.deepcopy(self._report)
 
     @cached_property
     def _report(self) -> DesignReport:
@@ -512,8 +513,10 @@ class Solid(Picture):
         chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None and kind != "stl":
             made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
+            summary = made.summary()
+            accept(summary)
             made.write(path)
-            return made.summary()
+            return summary
         if chord is not None:
             return self._stream_beams(path, self._chord(chord, edge, per_cell, islands), threads)
         spacing = self.spacing(edge, per_cell)

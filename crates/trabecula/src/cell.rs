@@ -21,6 +21,7 @@ pub use distance::Distance;
 pub use named::{Named, catalogue, named};
 use periodic_components::{Openings, openings};
 pub use periodic_components::{connected, necks};
+pub use pore_level::NoPore;
 pub use series::{Series, Term};
 
 use std::sync::OnceLock;

@@ -91,6 +91,12 @@ impl<'a> Search<'a> {
         [node % nx, node / nx % ny, node / nx / ny]
     }
 
+    /// The steps along an axis from one index to another, by the shorter way round.
+    pub(super) fn between(&self, axis: usize, from: usize, to: usize) -> i32 {
+        let n = self.shape[axis] as i32;
+        (to as i32 - from as i32 + n / 2).rem_euclid(n) - n / 2
+    }
+
     /// The phase of a node.
     pub(super) fn phase(&self, node: usize) -> Vec3 {
         let i = self.index(node);

@@ -47,6 +47,8 @@ pub(super) struct Void<'a> {
     /// becomes so.
     pub(super) rank: usize,
     pub(super) saddle: Vec3,
+    /// The phases of the saddles of f at which parts of the void join that are open at the level.
+    pub(super) necks: Vec<Vec3>,
 }
 
 /// A pass between two chambers of the void, or between a chamber and a translate of its own.
@@ -71,6 +73,8 @@ struct Nodes<'a> {
     /// Radius (mm) of the largest ball near a node; zero in the solid.
     radii: Vec<f64>,
     step: f64,
+    /// The node nearest to each neck of the void, and the vector (mm) from it to the neck.
+    necks: Vec<(u32, Vec3)>,
 }
 
 impl Void<'_> {
@@ -102,7 +106,8 @@ impl Void<'_> {
         let radii =
             radii.map(|i| if open(f[i]) { largest_near(&search, &feet, i, 0.5 * step).1 } else { 0.0 }).collect();
         let surface = LevelSurface::new(series, 0.0, self.to_phase, 3.0 * step);
-        let nodes = Nodes { search: &search, surface, feet, radii, step };
+        let necks = self.necks.iter().map(|u| search.nearest_node(*u)).collect();
+        let nodes = Nodes { search: &search, surface, feet, radii, step, necks };
         let (radius, sure) = nodes.bottleneck(self.rank).unwrap_or_else(|| (nodes.at(self.saddle), true));
         (2.0 * radius, sure)
     }
@@ -222,9 +227,8 @@ impl Nodes<'_> {
             if open.is_empty() {
                 return Some((radius, passes[last].found));
             }
-            let found: Vec<Option<f64>> = open.par_iter().map(|p| self.sharp(p.node)).collect();
+            let found: Vec<Option<f64>> = open.par_iter().map(|p| self.narrow(p).or_else(|| self.sharp(p))).collect();
             for (pass, found) in open.iter_mut().zip(found) {
-                let found = found.filter(|r| (r - pass.radius).abs() < EXCESS * self.step);
                 pass.found = found.is_some();
                 let radius = found.unwrap_or(pass.radius);
                 excess = excess.max(pass.radius - radius);
@@ -251,10 +255,31 @@ impl Nodes<'_> {
         passes.len() - 1
     }
 
-    /// Radius at the saddle of the distance near a node: from the largest ball near it, or from the node itself.
-    fn sharp(&self, node: u32) -> Option<f64> {
-        let ball = largest_near(self.search, &self.feet, node as usize, 0.5 * self.step).0;
-        [ball, [0.0; 3]].into_iter().find_map(|from| self.saddle(node, from))
+    /// Radius at the saddle of the distance near the node of a pass: from the largest ball near it, or from the node itself.
+    fn sharp(&self, pass: &Pass) -> Option<f64> {
+        let ball = largest_near(self.search, &self.feet, pass.node as usize, 0.5 * self.step).0;
+        let found = [ball, [0.0; 3]].into_iter().find_map(|from| self.saddle(pass.node, from));
+        found.filter(|r| (r - pass.radius).abs() < EXCESS * self.step)
+    }
+
+    /// Radius of a pass that is narrower than the grid's step, at the neck of the void near it: the ball of a node may then lie
+    /// in the chamber next to it. As the neck closes, the saddle of f is that of the distance, where the surface is nearly a circle
+    /// and patches of it decide little: of the two the narrower.
+    fn narrow(&self, pass: &Pass) -> Option<f64> {
+        if pass.radius > self.step {
+            return None;
+        }
+        let here = self.search.index(pass.node as usize);
+        let off = |(node, from): &(u32, Vec3)| {
+            let there = self.search.index(*node as usize);
+            let apart = [0, 1, 2].map(|a| self.search.between(a, here[a], there[a]));
+            (0..3).fold(*from, |s, a| add(s, scale(self.search.spacing()[a], f64::from(apart[a]))))
+        };
+        let near = self.necks.iter().map(|n| (norm(off(n)), n)).filter(|(d, _)| *d < 1.5 * self.step);
+        let (_, (node, from)) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let measured = self.measured(*node, *from);
+        let radius = self.saddle(*node, *from).map_or(measured, |r| r.min(measured));
+        (radius < pass.radius + NOISE * self.step).then_some(radius)
     }
 
     /// Radius at the saddle of the distance near a point `from` (mm) a node.
@@ -276,7 +301,12 @@ impl Nodes<'_> {
     /// Radius at the saddle of the distance near a phase; the distance itself where there is none.
     fn at(&self, u: Vec3) -> f64 {
         let (node, from) = self.search.nearest_node(u);
-        let measured = || norm(self.surface.nearest(u, sub(self.feet[node as usize], from)));
-        self.saddle(node, from).unwrap_or_else(measured)
+        self.saddle(node, from).unwrap_or_else(|| self.measured(node, from))
+    }
+
+    /// The distance to the surface at a point `from` (mm) a node.
+    fn measured(&self, node: u32, from: Vec3) -> f64 {
+        let u = self.surface.moved(self.search.phase(node as usize), from);
+        norm(self.surface.nearest(u, sub(self.feet[node as usize], from)))
     }
 }

@@ -1,13 +1,25 @@
 //! The level at which the largest ball that passes through the void has a given diameter.
 
 use super::{Cell, Part, pore};
-use geometry::math::{Mat3, scale};
+use geometry::math::{Mat3, Vec3, scale};
 use geometry::progress::checkpoint;
 
 /// Solid fractions between which a level is sought: below and above, cells are specks of solid or void.
 const FRACTIONS: [f64; 2] = [0.005, 0.995];
 /// Share of the diameter to which it is met.
 const NEAR: f64 = 1e-6;
+
+/// Share of the diameter that a pore may be off.
+const MET: f64 = 1e-3;
+
+/// Why no level has a pore: the greatest or the least (mm) that the cell has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NoPore {
+    /// All are narrower; 0 where the void is closed at every level.
+    AtMost(f64),
+    /// All are wider, but for those that are closed.
+    AtLeast(f64),
+}
 
 impl Cell {
     /// Whether the grid on which pores are sought resolves the cell's finest wave: beyond it chambers are too many.
@@ -24,7 +36,7 @@ impl Cell {
     /// Diameter (mm) of the largest ball that passes through the void f ≤ `level` (`Lower`) or f ≥ `level` (`Upper`), where phases
     /// relate to millimetres by u = `to_phase` · x: in as many independent directions as the void is connected with its
     /// translates. Zero where it is in none, infinite where nothing is solid. To about 1e-7 of the diameter; where several passes
-    /// are nearly as wide, to a quarter of a step of the grid.
+    /// are nearly as wide, and in cells so stretched that a ball is narrower than a step of the grid, to a quarter of a step.
     pub fn pore(&self, side: Part, level: f64, to_phase: &Mat3) -> f64 {
         let beyond = |open: f64| if side == Part::Lower { level > open } else { level < open };
         let open = self.openings(side).iter().flatten().take_while(|(at, _)| beyond(*at)).collect::<Vec<_>>();
@@ -32,17 +44,20 @@ impl Cell {
             return 0.0;
         };
         let to_plain = core::array::from_fn(|a| scale(to_phase[a], f64::from(self.repeats[a])));
-        let void =
-            pore::Void { series: &self.plain, side, level, to_phase: &to_plain, rank: open.len(), saddle: *saddle };
+        let plain =
+            |(at, neck): &(Vec3, f64)| beyond(*neck).then(|| [0, 1, 2].map(|a| at[a] * f64::from(self.repeats[a])));
+        let necks = self.necks(side).iter().filter_map(plain).collect();
+        let (rank, saddle) = (open.len(), *saddle);
+        let void = pore::Void { series: &self.plain, side, level, to_phase: &to_plain, rank, saddle, necks };
         void.pore()
     }
 
     /// The level at which the narrower void of a part lets a ball of diameter `pore` (mm) pass, where u = `to_phase` · x. Of several
-    /// that with the void connected in most directions. Where the pore jumps past what is asked for, it is more than that.
+    /// that with the void connected in most directions.
     ///
     /// # Errors
-    /// The largest pore (mm) that the cell has, where it is less.
-    pub fn level_of_pore(&self, part: Part, pore: f64, to_phase: &Mat3) -> Result<f64, f64> {
+    /// The largest pore (mm) that the cell has, where it is less; the least, where it jumps past what is asked for.
+    pub fn level_of_pore(&self, part: Part, pore: f64, to_phase: &Mat3) -> Result<f64, NoPore> {
         // How much is solid grows with this number; a level is it, or its negative.
         let sign = if part == Part::Upper { -1.0 } else { 1.0 };
         let narrower = |amount: f64| {
@@ -61,7 +76,7 @@ impl Cell {
             .collect();
         ends.sort_by(|a, b| a.0.total_cmp(&b.0));
         ends.push((full, false));
-        let (mut from, mut most) = (least, 0.0f64);
+        let (mut from, mut most, mut fewest) = (least, 0.0f64, f64::INFINITY);
         for (end, closed) in ends {
             let (mut lo, mut hi) = ((from + tiny, narrower(from + tiny)), (end, 0.0));
             from = end;
@@ -73,6 +88,7 @@ impl Cell {
                 hi.1 = narrower(end);
             }
             if hi.1 > pore {
+                fewest = fewest.min(hi.1);
                 continue;
             }
             // Squares of diameters are nearly linear; the end that stays counts less (Anderson and Björck's rule).
@@ -93,9 +109,12 @@ impl Cell {
                 }
                 last = new;
             }
-            return Ok(sign * lo.0);
+            if lo.1 <= (1.0 + MET) * pore {
+                return Ok(sign * lo.0);
+            }
+            fewest = fewest.min(lo.1);
         }
-        Err(most)
+        Err(if fewest.is_finite() { NoPore::AtLeast(fewest) } else { NoPore::AtMost(most) })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::built_report::Varied;
 use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
-use crate::cell::{Cell, Part};
+use crate::cell::{Cell, NoPore, Part};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::{Grade, Quantity, Remapped, Stops, key_of};
@@ -145,13 +145,15 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
     let to_phase = &affine.matrix;
     let level = |pore: f64| {
         let found = cell.level_of_pore(part, pore, to_phase);
-        found.map_err(|most| {
-            let size = number(map.longest());
-            let message = match most {
-                0.0 => "the void of this cell is closed at every level; give a fraction".to_string(),
-                most => format!(
-                    "pore is {} mm; in these cells of {size} mm it is at most {most:.4} mm, so give a larger wavelength",
-                    number(pore)
+        found.map_err(|why| {
+            let (asked, size) = (number(pore), number(map.longest()));
+            let message = match why {
+                NoPore::AtMost(0.0) => "the void of this cell is closed at every level; give a fraction".to_string(),
+                NoPore::AtMost(most) => format!(
+                    "pore is {asked} mm; in these cells of {size} mm it is at most {most:.4} mm, so give a larger wavelength"
+                ),
+                NoPore::AtLeast(least) => format!(
+                    "pore is {asked} mm; in these cells of {size} mm it is at least {least:.4} mm, so give a smaller wavelength"
                 ),
             };
             DesignError::new(&path, message)
@@ -162,17 +164,22 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
     }
     let mut asked = vec![0.0; environment.points.len()];
     amount.values(environment.points, &mut asked);
-    let spread = Varied::of(&asked);
-    let [from, to] = [level(spread.min)?, level(spread.max)?];
+    let (sampled, bound) = (Varied::of(&asked), amount.bound(&environment.region.bounds()));
+    // As far as the grade may go between the points, where cells can.
+    let end = |loose: f64, sampled: f64| match cell.level_of_pore(part, loose, to_phase) {
+        Ok(t) if loose > 0.0 => Ok((loose, t)),
+        _ => level(sampled).map(|t| (sampled, t)),
+    };
+    let [(least, from), (most, to)] = [end(bound.lo, sampled.min)?, end(bound.hi, sampled.max)?];
     let narrower = |t: f64| cell.pores(part, t, to_phase).into_iter().fold(f64::INFINITY, f64::min);
     let share = |i: usize| i as f64 / (PORES - 1) as f64;
     let mut stops: Vec<[f64; 2]> = (1..PORES - 1)
         .into_par_iter()
         .map(|i| from + (to - from) * share(i))
         .map(|t| [narrower(t), t])
-        .filter(|[d, _]| spread.min < *d && *d < spread.max)
+        .filter(|[d, _]| least < *d && *d < most)
         .collect();
-    stops.extend([[spread.min, from], [spread.max, to]]);
+    stops.extend([[least, from], [most, to]]);
     stops.sort_by(|a, b| a[0].total_cmp(&b[0]));
     stops.dedup_by(|a, b| a[0] == b[0]);
     Ok(Level::Iso(Grade::from(Remapped::new(amount.clone(), Stops(stops)))))

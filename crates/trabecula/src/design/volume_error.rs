@@ -22,6 +22,9 @@ use crate::solid::Solid;
 /// Most steps on a wavelength that are meshed; at finer spacings the error is taken to fall with the second power.
 const MOST: f64 = 64.0;
 
+/// Longest wavelength that is meshed, in shortest ones: a cell that is more stretched is smoother along it.
+const STRETCH: f64 = 4.0;
+
 /// Corners of the periods that are meshed, in wavelengths: one in step with the grid, one not.
 const CORNERS: [Vec3; 2] = [[0.0; 3], [0.382, 0.618, 0.236]];
 
@@ -40,15 +43,16 @@ fn of_lattice(lattice: &Lattice, points: &[Vec3], edge: f64) -> f64 {
         None => [lattice.map.wavelength(); 3],
     };
     let shortest = wavelengths.into_iter().fold(f64::INFINITY, f64::min);
+    let wavelengths = wavelengths.map(|w| w.min(STRETCH * shortest));
     let meshed = edge.max(shortest / MOST);
     let cases = [min, max].into_iter().take(if min == max { 1 } else { 2 });
     let cases: Vec<(f64, Vec3)> = cases.flat_map(|f| CORNERS.map(|c| (f, c))).collect();
     let off = |(fraction, corner): &(f64, Vec3)| {
         let made = period(lattice, *fraction, wavelengths, *corner, meshed);
-        (made / wavelengths.iter().product::<f64>() - fraction).abs()
+        (made / wavelengths.iter().product::<f64>() / fraction - 1.0).abs()
     };
     let worst = cases.par_iter().map(off).reduce(|| 0.0, f64::max);
-    worst / (0.5 * (min + max)) * (edge / meshed).powi(2)
+    worst * (edge / meshed).powi(2)
 }
 
 /// The volume (mm³) that a mesh of one period has; 0 where the grid finds no surface.

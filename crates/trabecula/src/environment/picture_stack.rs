@@ -8,6 +8,8 @@ use geometry::math::Vec3;
 /// The formats of pictures.
 const KINDS: [&str; 3] = ["png", "tif", "tiff"];
 
+/// Most pixels of a stack: each takes 8 bytes here.
+const MOST: usize = 1 << 29;
 /// The extension of DICOM, which the loader reads.
 const DICOM: &str = "dcm";
 
@@ -32,13 +34,20 @@ pub(crate) fn names_pictures(path: &str) -> bool {
 /// series in the order of their positions. `at` is the place of `path` in the design.
 pub(crate) fn picture_stack(path: &str, at: &str, loader: &dyn Loader) -> Result<Scan, DesignError> {
     let wrong = |m: String| DesignError::new(at, m).found(path);
-    let pictures = |kind: &&str| loader.list(&format!("{path}*.{kind}")).ok();
-    let in_folder = if path.ends_with('/') { KINDS.iter().find_map(pictures) } else { None };
-    if extension(path) == DICOM || path.ends_with('/') && in_folder.is_none() {
+    let in_folder = if path.ends_with('/') { loader.list(&format!("{path}*")).unwrap_or_default() } else { Vec::new() };
+    let of_kind = |kinds: &[&str]| in_folder.iter().filter(|n| kinds.contains(&extension(n).as_str())).count();
+    let counts = [of_kind(&KINDS[..1]), of_kind(&KINDS[1..])];
+    if extension(path) == DICOM || path.ends_with('/') && counts == [0, 0] {
         return loader.scan(path).map_err(wrong);
     }
-    let mut names = if let Some(names) = in_folder {
-        names
+    if counts.iter().all(|c| *c > 0) {
+        let [png, tif] = counts;
+        return Err(wrong(format!(
+            "{path} holds {png} png and {tif} tif; name those of one stack with a * in the last part"
+        )));
+    }
+    let mut names: Vec<String> = if path.ends_with('/') {
+        in_folder.into_iter().filter(|n| KINDS.contains(&extension(n).as_str())).collect()
     } else if path.contains('*') {
         loader.list(path).map_err(wrong)?
     } else {
@@ -58,6 +67,11 @@ pub(crate) fn picture_stack(path: &str, at: &str, loader: &dyn Loader) -> Result
             }
             values.extend(picture.values);
             count += 1;
+            if values.len() > MOST {
+                return Err(wrong(format!(
+                    "more than {MOST} pixels in all; crop the pictures, or average several pixels to one"
+                )));
+            }
         }
     }
     let [w, h] = size.ok_or_else(|| wrong(format!("{path}: no pictures")))?;

@@ -6,11 +6,11 @@ use std::collections::BinaryHeap;
 use rayon::prelude::*;
 
 use super::phase_grid::Grid;
-use super::smooth_frames::Smoothing;
+use super::smooth_frames::{LEAST_AVERAGE, Smoothing};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{
-    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
+    IDENTITY, Mat3, Vec3, cross, determinant, dot, eigen, norm, product, rotation, scale, sub, transpose, unit,
 };
 use geometry::progress::checkpoint;
 
@@ -70,7 +70,13 @@ impl Axis {
         let own = smoothing.map(|_| found.clone());
         if let Some(smoothing) = smoothing {
             let tensors: Vec<[f64; 6]> = found.iter().map(|v| square(*v)).collect();
-            found = along(&smoothing.axes(grid, &tensors), nodes, key)?;
+            let averages = smoothing.axes(grid, &tensors);
+            let size = |t: &[f64; 6]| t[0] + t[1] + t[2];
+            let least = LEAST_AVERAGE * averages.iter().map(size).fold(0.0, f64::max);
+            // Far from the region nothing is left of the averages: a node there keeps its own direction.
+            let kept =
+                averages.into_iter().zip(tensors).map(|(mean, own)| if size(&mean) > least { mean } else { own });
+            found = along(&kept.collect::<Vec<_>>(), nodes, key)?;
         }
         match (self, own) {
             (Axis::Vector(_), None) => {}
@@ -121,15 +127,21 @@ impl Orientation {
             }
             Orientation::Stress(of) => {
                 let values = columns(of, nodes, "stress")?;
-                let (mut frames, gaps) = principal_frames(&values, None)?;
+                let found: Vec<Principal> = values.par_iter().map(Principal::of).collect();
+                let range = range(&found);
+                if range == 0.0 {
+                    return Err(no_principal());
+                }
+                let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
+                let of_part: Vec<Vec3> = found.iter().map(|p| scale(p.gaps(), 1.0 / range)).collect();
                 if let Some(smoothing) = smoothing {
-                    let averages = smoothing.frames(grid, &frames, &gaps);
+                    let averages = smoothing.frames(grid, &frames, &of_part);
                     comb(grid, &mut frames, |n| averages.confidence(n), |n, _, to| averages.settled(n, to));
                     return Ok(Frames { at_nodes: frames, trust: Some(averages.trust()) });
                 }
                 let turns = cube();
-                let least = |n: usize| gaps[n][0].min(gaps[n][1]).min(gaps[n][2]);
-                comb(grid, &mut frames, least, |n, f, to| settled(f, &gaps[n], to, &turns));
+                let least = |n: usize| of_part[n].into_iter().fold(f64::INFINITY, f64::min);
+                comb(grid, &mut frames, least, |n, f, to| settled(f, &found[n].own_gaps(range), to, &turns));
                 sure(frames)
             }
         }
@@ -164,16 +176,15 @@ impl Orientation {
         }
     }
 
-    /// The greatest difference of two principal values of a stress at points, against which directions are more or less sure; 0 for other
-    /// orientations.
+    /// The range of a stress at points, against which directions are more or less sure; 0 for other orientations.
     pub(super) fn stress_range(&self, points: &[Vec3]) -> Result<f64, Fault> {
         let Orientation::Stress(of) = self else { return Ok(0.0) };
         let values = columns(of, points, "stress")?;
-        Ok(values.par_iter().map(|t| difference(&principal(t).1)).reduce(|| 0.0, f64::max))
+        Ok(range(&values.par_iter().map(Principal::of).collect::<Vec<_>>()))
     }
 
-    /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is the greatest difference of two
-    /// principal values in the part.
+    /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is that of a stress
+    /// in the part.
     pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3], range: f64) -> Result<Vec<Mat3>, Fault> {
         let signed = |of: &Axis, key: &str, axis: usize| -> Result<Vec<Vec3>, Fault> {
             let mut found = of.vectors(points, key)?;
@@ -195,9 +206,14 @@ impl Orientation {
             Orientation::Frame { x, z } => squared(signed(x, "frame.x", 0)?, signed(z, "frame.z", 2)?, points),
             Orientation::Stress(of) => {
                 let (values, turns) = (columns(of, points, "stress")?, cube());
-                let (frames, gaps) = principal_frames(&values, Some(range))?;
-                let all = frames.iter().zip(&gaps).zip(like);
-                Ok(all.map(|((f, gaps), l)| settled(f, gaps, l, &turns)).collect())
+                if range == 0.0 {
+                    return Err(no_principal());
+                }
+                let of = |(t, like): (&[f64; 6], &Mat3)| {
+                    let p = Principal::of(t);
+                    settled(&p.frame, &p.own_gaps(range), like, &turns)
+                };
+                Ok(values.par_iter().zip(like).map(of).collect())
             }
         }
     }
@@ -210,33 +226,66 @@ pub(super) struct Frames {
     pub trust: Option<Vec<f64>>,
 }
 
-/// The principal frames of tensors, and the gaps of their values over the greatest difference of two in the part, that of these tensors
-/// unless given: where little is carried no direction is sure.
-fn principal_frames(values: &[[f64; 6]], range: Option<f64>) -> Result<(Vec<Mat3>, Vec<Vec3>), Fault> {
-    let all: Vec<(Mat3, Vec3)> = values.par_iter().map(principal).collect();
-    let range = range.unwrap_or_else(|| all.iter().fold(0.0, |m, (_, v)| m.max(difference(v))));
-    if range == 0.0 {
-        let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
-        return Err(Fault::new("stress", message));
-    }
-    let gap = |v: &Vec3, i: usize| (v[i] - v[(i + 1) % 3]).abs().min((v[i] - v[(i + 2) % 3]).abs()) / range;
-    Ok(all.into_iter().map(|(f, v)| (f, [gap(&v, 0), gap(&v, 1), gap(&v, 2)])).unzip())
+/// A gap between principal values, over the greatest value, below which they count as equal.
+const DOUBT: f64 = 0.05;
+/// A share of the range in the part: a stress that is less counts as one of this size, so that its rounding has no
+/// direction.
+const LEAST: f64 = 1e-3;
+
+/// The principal directions of a symmetric tensor, as a right-handed frame, and its principal values.
+struct Principal {
+    frame: Mat3,
+    values: Vec3,
 }
 
-/// The greatest difference of three values.
-fn difference([a, b, c]: &Vec3) -> f64 {
-    (a - b).abs().max((b - c).abs()).max((c - a).abs())
+impl Principal {
+    /// Of the tensor 11, 22, 33, 23, 13, 12.
+    fn of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Principal {
+        let (values, axes) = eigen(&[[*xx, *xy, *xz], [*xy, *yy, *yz], [*xz, *yz, *zz]]);
+        let frame = transpose(&axes);
+        Principal { frame: if determinant(&frame) < 0.0 { frame.map(|r| r.map(|c| -c)) } else { frame }, values }
+    }
+
+    /// The greatest difference of two values.
+    fn difference(&self) -> f64 {
+        let [a, b, c] = self.values;
+        (a - b).abs().max((b - c).abs()).max((c - a).abs())
+    }
+
+    /// How far each value is from the nearest other.
+    fn gaps(&self) -> Vec3 {
+        let v = self.values;
+        [0, 1, 2].map(|i| (v[i] - v[(i + 1) % 3]).abs().min((v[i] - v[(i + 2) % 3]).abs()))
+    }
+
+    /// The same over the greatest value; `range` is that in the part.
+    fn own_gaps(&self, range: f64) -> Vec3 {
+        let size = self.values.iter().fold(LEAST * range, |m, v| m.max(v.abs()));
+        scale(self.gaps(), 1.0 / size)
+    }
+}
+
+/// The difference of two principal values that counts as large in a part: √3 times the root of the mean square of the greatest ones,
+/// which is the greatest of all in a bent beam. A peak at a corner hardly changes it, nor do parts that carry nothing.
+fn range(found: &[Principal]) -> f64 {
+    let squares: f64 = found.iter().map(|p| p.difference().powi(2)).sum();
+    (3.0 * squares / found.len() as f64).sqrt()
+}
+
+fn no_principal() -> Fault {
+    let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
+    Fault::new("stress", message)
 }
 
 /// The principal directions of the greatest values of tensors v vᵀ or sums of such.
 fn along(tensors: &[[f64; 6]], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
     let one = |(t, p): (&[f64; 6], &Vec3)| {
-        let (axes, values) = principal(t);
+        let Principal { frame, values } = Principal::of(t);
         let i = (0..3).fold(0, |m, i| if values[i] > values[m] { i } else { m });
-        if values[i] < 1e-12 {
+        if values[i] < 1e-12 * (t[0] + t[1] + t[2]).max(f64::MIN_POSITIVE) {
             return Err(no_direction(key, *p));
         }
-        Ok([axes[0][i], axes[1][i], axes[2][i]])
+        Ok([frame[0][i], frame[1][i], frame[2][i]])
     };
     tensors.par_iter().zip(points).map(one).collect()
 }
@@ -336,35 +385,6 @@ fn turned_from_z(d: Vec3) -> Mat3 {
     }
     let s = 1.0 / (1.0 + z);
     transpose(&[[1.0 - x * x * s, -x * y * s, -x], [-x * y * s, 1.0 - y * y * s, -y], [x, y, z]])
-}
-
-/// A gap between principal values, over the greatest difference in the part, below which they count as equal.
-const DOUBT: f64 = 0.05;
-
-/// The principal directions of a symmetric tensor, as a right-handed frame, and its principal values.
-fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
-    let [xx, yy, zz, yz, xz, xy] = *t;
-    let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let mut v = IDENTITY;
-    // Jacobi's rotations: a few sweeps bring the off-diagonal entries to rounding.
-    for _ in 0..8 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q].abs() <= 1e-300 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = if theta >= 0.0 { 1.0 } else { -1.0 } / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
-            let mut r = IDENTITY;
-            (r[p][p], r[q][q], r[p][q], r[q][p]) = (c, c, t * c, -t * c);
-            a = product(&transpose(&r), &product(&a, &r));
-            v = product(&v, &r);
-        }
-    }
-    if determinant(&v) < 0.0 {
-        v = v.map(|row| row.map(|c| -c));
-    }
-    (v, [a[0][0], a[1][1], a[2][2]])
 }
 
 /// The 24 rotations of a cube.

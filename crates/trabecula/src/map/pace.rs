@@ -4,7 +4,7 @@
 //! nodes are: at a point p, for a spacing h along an axis e, what a grid misses is |K(p) − (K(p − e h/2) + K(p + e h/2))/2| / |K|,
 //! h² |K″| / 8 where K is smooth. It is taken at points throughout the region, so that no period of K can hide from it.
 
-use super::frame::in_mm;
+use super::frame::{Orientation, in_mm};
 use super::phase::{Wanted, wavelengths};
 use super::phase_grid::Grid;
 use super::spline;
@@ -62,10 +62,16 @@ pub(super) fn choose(
     let enough = grid.step.into_iter().fold(f64::INFINITY, f64::min);
     let enough = rounded_down(enough);
     let fits = count(bounds.size().map(|s| nodes_along(s, enough))) <= NODES[1];
+    let of = &wanted.orientation;
+    let slower = match of {
+        Orientation::Angles(_) => "let it vary more slowly",
+        _ if wanted.smooth.is_some() || missed[axis].key != of.key() => "let it vary more slowly",
+        _ => "smooth it over about a wavelength (smooth, in mm), or let it vary more slowly",
+    };
     let remedy = match (left.iter().any(Missed::much), step) {
-        (false, _) if fits => format!("let it vary more slowly, or give step = {}", number(enough)),
-        (false, Some(_)) => "let it vary more slowly, or leave step out".into(),
-        _ => "let it vary more slowly".to_string(),
+        (false, _) if fits => format!("{slower}, or give step = {}", number(enough)),
+        (false, Some(_)) => format!("{slower}, or leave step out"),
+        _ => slower.to_string(),
     };
     let lost = |missed: &[Missed; 3]| {
         let wrong = missed.iter().any(|m| m.lost > FALSE[1]);

@@ -14,10 +14,10 @@ use super::poisson::Poisson;
 use geometry::math::{Mat3, Vec3, add, cross, determinant, norm, scale, sub, transpose};
 use geometry::progress::checkpoint;
 
-/// A gap between principal values, over the greatest difference of any two in the part, at which a direction is half trusted.
+/// A gap between principal values, over the range of a stress in the part, at which a direction is half trusted.
 const HALF_TRUSTED: f64 = 0.05;
 /// A share of the largest average below which a node has none: rounding of the transforms.
-const LEAST_AVERAGE: f64 = 1e-9;
+pub(super) const LEAST_AVERAGE: f64 = 1e-9;
 /// Most steps to the nearest frame, and the change at which they end.
 const STEPS: usize = 60;
 const CHANGE: f64 = 1e-10;

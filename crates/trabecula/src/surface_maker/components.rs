@@ -341,10 +341,16 @@ fn encloses(outer: &Aabb, inner: &Aabb) -> bool {
 /// The cavities of less than a volume that can be filled: with nothing in them, and without a part of the region's boundary.
 fn crumbs(whole: &[Totals], roots: &[usize], limit: f64) -> Vec<usize> {
     let least = roots.iter().filter(|i| whole[**i].volume > 0.0 && whole[**i].volume < limit);
-    let least: Vec<&Aabb> = least.map(|i| &whole[*i].bounds).collect();
+    let mut least: Vec<&Aabb> = least.map(|i| &whole[*i].bounds).collect();
+    least.sort_by(|a, b| a.min[0].total_cmp(&b.min[0]));
+    // Only solids that begin within a cavity, in x, can lie in it.
+    let within = |b: &Aabb| {
+        let from = least.partition_point(|inner| inner.min[0] < b.min[0]);
+        least[from..].iter().take_while(|inner| inner.min[0] <= b.max[0]).any(|inner| encloses(b, inner))
+    };
     let tiny = |i: &usize| {
         let Totals { volume, area, bounds, .. } = &whole[*i];
-        *volume < 0.0 && -volume < limit && area[1] == 0.0 && !least.iter().any(|inner| encloses(bounds, inner))
+        *volume < 0.0 && -volume < limit && area[1] == 0.0 && !within(bounds)
     };
     roots.iter().copied().filter(tiny).collect()
 }

@@ -120,9 +120,7 @@ impl Spool<'_> {
         }
         compact::compact(self.triangles, 0, TRIANGLE, &kept, |_| true)?;
         let numbers = Numbers::new(used);
-        let stays = |v: u64| (1, numbers.used[v as usize / 64] >> (v % 64) & 1 == 1);
-        let vertices: Vec<(u64, bool)> = (0..self.counts[0]).map(stays).collect();
-        compact::compact(self.vertices, 0, VERTEX, &compact::ranges(&vertices), |_| true)?;
+        compact::compact(self.vertices, 0, VERTEX, &numbers.ranges(), |_| true)?;
         self.counts = [numbers.count, kept.iter().map(|r| r.end - r.start).sum()];
         Ok(numbers)
     }
@@ -144,6 +142,26 @@ impl Numbers {
         });
         let before = before.collect();
         Numbers { used, before, count }
+    }
+
+    /// The set as ranges.
+    fn ranges(&self) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        for (n, word) in self.used.iter().enumerate() {
+            let (mut rest, mut at) = (*word, 64 * n as u64);
+            while rest != 0 {
+                let skip = u64::from(rest.trailing_zeros());
+                let length = u64::from((rest >> skip).trailing_ones());
+                let start = at + skip;
+                match ranges.last_mut() {
+                    Some(last) if last.end == start => last.end += length,
+                    _ => ranges.push(start..start + length),
+                }
+                at = start + length;
+                rest = if skip + length == 64 { 0 } else { rest >> (skip + length) };
+            }
+        }
+        ranges
     }
 
     fn of(&self, v: u32) -> u32 {

@@ -48,11 +48,6 @@ fn sums(of: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     of.fold([0.0; 2], |[sum, area], [v, a]| [sum + v * a, area + a])
 }
 
-fn mean(of: impl Iterator<Item = [f64; 2]>) -> f64 {
-    let [sum, area] = sums(of);
-    sum / area
-}
-
 impl Tiling {
     /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, by its area. `None` for other parts, for
     /// transitions, and where there is no mid-surface.
@@ -89,16 +84,21 @@ impl Tiling {
         })
     }
 
+    /// As many tetrahedra as are enough for a mean over their pieces of the mid-surface.
+    fn many(&self, pieces: &[Piece]) -> Vec<usize> {
+        let step = (self.map.len() * pieces.len()).div_ceil(PIECES).max(1);
+        (0..self.map.len()).step_by(step).collect()
+    }
+
     /// The volume of walls over the area of their mid-surface, mm.
     fn mean_wall(&self, pieces: &[Piece]) -> f64 {
-        let step = (self.map.len() * pieces.len()).div_ceil(PIECES).max(1);
         let first_order = |tets: Vec<usize>| {
             let found = tets.par_iter().map(|t| sums(pieces.iter().map(|p| self.first_order(*t, p))));
             let found: Vec<[f64; 2]> = found.collect();
             let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
             sum / area
         };
-        let everywhere = first_order((0..self.map.len()).step_by(step).collect());
+        let everywhere = first_order(self.many(pieces));
         self.realised(pieces) * everywhere / first_order(self.some())
     }
 
@@ -111,8 +111,13 @@ impl Tiling {
             let n = self.map.tet(t).map(|n| asked[(n as usize).min(asked.len() - 1)]);
             [(0..4).map(|i| p.at[i] * n[i]).sum::<f64>(), self.first_order(t, p)[1]]
         };
-        let all = (0..self.map.len()).flat_map(|t| pieces.iter().map(move |p| (t, p)));
-        let wanted = if let [one] = asked { *one } else { mean(all.map(|(t, p)| at(t, p))) };
+        let everywhere = || {
+            let some = self.many(&pieces);
+            let found: Vec<[f64; 2]> = some.par_iter().map(|t| sums(pieces.iter().map(|p| at(*t, p)))).collect();
+            let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
+            sum / area
+        };
+        let wanted = if let [one] = asked { *one } else { everywhere() };
         for _ in 0..ROUNDS {
             checkpoint();
             let by = wanted / self.mean_wall(&pieces);

@@ -110,12 +110,12 @@ fn channels() {
 #[test]
 fn the_primitives_pore_is_its_neck() {
     let cell = cell("primitive");
-    for t in [-0.5, 0.0, 0.5f64] {
+    for t in [-0.5, 0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.999_999f64] {
         let found = cell.pore(Part::Upper, t, &cubic(1.0));
         let diagonal = 2.0 * 2f64.sqrt() * ((1.0 + t) / 2.0).acos() / TAU;
         let neck = cell.thickness(Part::Upper, t, &cubic(1.0)).expect("a neck");
         assert!(
-            (found - neck).abs() < 1e-8 && found <= diagonal + 1e-9 && found > 0.98 * diagonal,
+            (found - neck).abs() < 1e-8 * neck.max(diagonal) && found <= diagonal + 1e-9 && found > 0.98 * diagonal,
             "{t}: {found} {neck}"
         );
     }
@@ -172,8 +172,17 @@ fn designs_have_the_pore_asked_for() {
             other => panic!("a range, found {other:?}"),
         }
         let refused = of("wavelength = 4", "pore = 4").expect_err("refused").to_string();
-        assert!(refused.contains("at most"), "{refused}");
+        assert!(refused.contains("at most") && refused.contains("larger wavelength"), "{refused}");
     }
+    // Between slabs the gap shrinks to that of a solid fraction of 0.995; it is met down to there.
+    let slabs = |pore: f64| {
+        built(&format!(
+            "cell.series.terms = [{{ hkl = [1, 0, 0], amplitude = 1 }}]\npart = \"lower\"\nmap.affine.wavelength = 10\nlevel.pore = {pore}"
+        ))
+    };
+    assert!((number(slabs(0.06).expect("built").report().lattices["core"].pore) - 0.06).abs() < 1e-4);
+    let refused = slabs(0.001).err().expect("refused").to_string();
+    assert!(refused.contains("at least") && refused.contains("smaller wavelength"), "{refused}");
     // An even wall of thickness w takes w from the pore of its bare mid-surface.
     let pore = |w: f64| {
         let made =

@@ -58,7 +58,8 @@ pub(in crate::cell) fn critical(f: Function, start: Vec3, reach: f64) -> Option<
             return (norm(g[0]) <= 1e-5 * largest).then(|| Critical {
                 values,
                 axes: vectors,
-                at,
+                // The next step would be its square.
+                at: add(at, step),
                 level: v[0],
                 falling: values.iter().filter(|v| **v < -1e-3 * largest).count(),
                 flat: values.iter().filter(|v| v.abs() <= 1e-3 * largest).count(),

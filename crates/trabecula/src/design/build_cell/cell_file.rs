@@ -20,6 +20,9 @@ use geometry::repair::Repair;
 /// Nodes along an axis of the grid on which a mesh of one cell is sampled.
 const NODES: usize = 64;
 
+/// Most numbers of a file, whose transform and distances take some 50 bytes each.
+const MOST: usize = 1 << 27;
+
 /// The cell that a file makes; `path` is that of its table.
 pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Result<Cell, DesignError> {
     let at = format!("{path}.path");
@@ -55,6 +58,16 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
             format!("the name must end in npy, {known}, or in png, tif or dcm for pictures; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     };
+    if let Some(n) = values.iter().position(|v| !v.is_finite()) {
+        return Err(wrong(Fault::new("", format!("number {n} is {}; all must be finite", values[n]))));
+    }
+    let [x, y, z] = shape;
+    if values.len() > MOST {
+        let message = format!(
+            "{x} × {y} × {z} numbers; a cell takes {MOST} at most (512³): crop them, or average several to one"
+        );
+        return Err(wrong(Fault::new("", message)));
+    }
     if let Some(threshold) = spec.threshold {
         values = above(&values, shape, threshold, step).map_err(wrong)?;
     } else {

@@ -33,7 +33,10 @@ fn combed_frames_are_smooth_through_a_crossing_of_principal_values() {
     let turns = cube();
     assert_eq!(turns.len(), 24);
     let values: Vec<[f64; 6]> = nodes.iter().map(|p| tensor(*p)).collect();
-    let (mut frames, gaps) = principal_frames(&values, None).expect("a tensor");
+    let found: Vec<Principal> = values.iter().map(Principal::of).collect();
+    let range = found.iter().map(Principal::difference).fold(0.0, f64::max);
+    let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
+    let gaps: Vec<Vec3> = found.iter().map(|p| p.own_gaps(range)).collect();
     comb(&g, &mut frames, |n| gaps[n][0].min(gaps[n][1]).min(gaps[n][2]), |n, f, to| settled(f, &gaps[n], to, &turns));
     let by = product(&transpose(&frame(nodes[0])), &frames[0]);
     for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
