@@ -9,6 +9,7 @@ use crate::math::{Vec3, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 use crate::repair::{self, Boundary, Repair, Repaired};
 
+mod disc;
 mod normals;
 pub mod periodic;
 pub mod triangle;
@@ -179,10 +180,7 @@ struct Recent([u32; 4]);
 
 impl Recent {
     fn nearest(&mut self, tree: &TriangleBvh, p: Vec3) -> Nearest {
-        let square = |t: u32| tree.triangles()[t as usize].nearest(p).0;
-        let each = self.0.map(|t| (square(t), t));
-        let seed = each.into_iter().fold(each[0], |least, one| if one.0 < least.0 { one } else { least }).1;
-        let hit = tree.nearest(p, seed);
+        let hit = tree.nearest(p, tree.seed(p, self.0));
         if !self.0.contains(&hit.triangle) {
             self.0.rotate_right(1);
             self.0[0] = hit.triangle;

@@ -25,7 +25,7 @@ mod tests;
 mod volume_error;
 mod warn;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde_json::Value as Json;
 
@@ -140,6 +140,8 @@ pub struct Built {
     pub warnings: Vec<Warning>,
     /// What was repaired in each mesh of the region, by the path of its table; clean meshes too.
     pub repairs: Vec<(String, Repaired)>,
+    /// Computed at first use.
+    figures: OnceLock<DesignReport>,
 }
 
 impl Design {
@@ -258,7 +260,10 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
 impl Built {
     /// The figures of the design, without meshing it.
     pub fn report(&self) -> DesignReport {
-        built_report::report(self)
+        // Nobody waits for another's: it is made in parallel.
+        let figures = self.figures.get().cloned().unwrap_or_else(|| built_report::report(self));
+        self.figures.set(figures.clone()).ok();
+        figures
     }
 
     /// The surface maker whose resolution is a grid spacing: cutting of tetrahedra for an explicit tiling, marching cubes for

@@ -6,8 +6,6 @@ use crate::math::{Aabb, Vec3};
 
 /// Children of a node.
 const WIDTH: usize = 4;
-/// Most entries at a time: every level leaves three of them, and there are fewer than a hundred levels.
-const STACK: usize = 320;
 /// The number of no child.
 const NONE: u32 = u32::MAX;
 /// Set in the number of a child that is an item.
@@ -112,37 +110,42 @@ impl WideBvh {
     #[inline]
     pub fn nearest(&self, p: Vec3, limit: f64, mut visit: impl FnMut(usize) -> f64) {
         let at: [f32; 3] = [0, 1, 2].map(|a| (p[a] - self.origin[a]) as f32);
-        let rounded = |limit: f64| (limit * (1.0 + SLACK)) as f32;
         let mut limit = rounded(limit);
-        let mut stack = [(0.0f32, 0u32); STACK];
-        let mut top = usize::from(!self.nodes.is_empty());
-        while top > 0 {
-            top -= 1;
-            let (near, child) = stack[top];
-            if near > limit {
-                continue;
+        if let Some(root) = self.nodes.first() {
+            self.below(root, at, &mut limit, &mut visit);
+        }
+    }
+
+    /// The same below a node. Recursion is no deeper than the tree, which has fewer than a hundred levels.
+    fn below(&self, node: &Node, at: [f32; 3], limit: &mut f32, visit: &mut impl FnMut(usize) -> f64) {
+        let squares = square_distances(node, at);
+        // Numbers that are not negative are ordered as their bits are.
+        let of = |i: usize| u64::from(squares[i].to_bits()) << 32 | u64::from(node.child[i]);
+        for (square, child) in sorted([0, 1, 2, 3].map(of)).map(|key| (f32::from_bits((key >> 32) as u32), key as u32))
+        {
+            if square > *limit || child == NONE {
+                return;
             }
             if child & ITEM != 0 {
-                limit = rounded(visit((child & !ITEM) as usize));
-                continue;
-            }
-            let node = &self.nodes[child as usize];
-            let squares = square_distances(node, at);
-            let from = top;
-            for (square, child) in squares.into_iter().zip(node.child) {
-                if square <= limit && child != NONE {
-                    // Farther ones lie deeper.
-                    let mut slot = top;
-                    while slot > from && stack[slot - 1].0 < square {
-                        stack[slot] = stack[slot - 1];
-                        slot -= 1;
-                    }
-                    stack[slot] = (square, child);
-                    top += 1;
-                }
+                *limit = rounded(visit((child & !ITEM) as usize));
+            } else {
+                self.below(&self.nodes[child as usize], at, limit, visit);
             }
         }
     }
+}
+
+/// A squared distance with room for the error of those to boxes.
+fn rounded(limit: f64) -> f32 {
+    (limit * (1.0 + SLACK)) as f32
+}
+
+/// Four numbers in order, without branches.
+#[inline(always)]
+fn sorted([a, b, c, d]: [u64; WIDTH]) -> [u64; WIDTH] {
+    let (a, b, c, d) = (a.min(b), a.max(b), c.min(d), c.max(d));
+    let (least, b, c, most) = (a.min(c), b.min(d), a.max(c), b.max(d));
+    [least, b.min(c), b.max(c), most]
 }
 
 /// Squared distances of a point from the boxes of a node. A function of its own, so that it becomes vector arithmetic.

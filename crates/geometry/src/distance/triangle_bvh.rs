@@ -1,5 +1,6 @@
 //! The nearest triangle to a point.
 
+use super::disc::Disc;
 use super::triangle::{Feature, Triangle};
 use crate::bvh::{Bvh, Node, Split, WideBvh};
 use crate::math::{Aabb, Vec3, norm, sub};
@@ -31,6 +32,7 @@ pub struct TriangleBvh {
     bvh: Bvh,
     wide: WideBvh,
     triangles: Vec<Triangle>,
+    discs: Vec<Disc>,
     rounding: f64,
 }
 
@@ -44,7 +46,8 @@ impl TriangleBvh {
         let triangles: Vec<Triangle> = bvh.order().iter().map(|i| triangles[*i as usize]).collect();
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::bounds).collect();
         let wide = WideBvh::new(&bvh, &boxes);
-        TriangleBvh { bvh, wide, triangles, rounding: 16.0 * f64::EPSILON * largest }
+        let discs = triangles.iter().map(Disc::new).collect();
+        TriangleBvh { bvh, wide, triangles, discs, rounding: 16.0 * f64::EPSILON * largest }
     }
 
     /// The rounding that a distance to the mesh carries, mm.
@@ -75,6 +78,9 @@ impl TriangleBvh {
         let reach = |square: f64| self.reach(p, square);
         let mut limit = reach(square);
         self.wide.nearest(p, limit, |k| {
+            if self.discs[k].is_beyond(p, limit) {
+                return limit;
+            }
             let (square, away, feature) = self.triangles[k].nearest(p);
             let k = k as u32;
             if square < best.square || (square == best.square && k < best.triangle) {
@@ -86,6 +92,12 @@ impl TriangleBvh {
             limit
         });
         best
+    }
+
+    /// That of some triangles which lies nearest by its middle: a seed.
+    pub fn seed(&self, p: Vec3, of: [u32; 4]) -> u32 {
+        let each = of.map(|k| (self.discs[k as usize].square_from_center(p), k));
+        each.into_iter().fold(each[0], |least, one| if one.0 < least.0 { one } else { least }).1
     }
 
     /// The squared distance to which boxes are searched if the nearest triangle yet is at a squared distance of `square`: they
@@ -109,8 +121,10 @@ impl TriangleBvh {
         let reach = self.at_most(center, hit.square.sqrt() + 2.0 * radius);
         let limit = reach * reach;
         self.wide.nearest(center, limit, |k| {
-            let square = self.triangles[k].nearest(center).0;
-            if square <= limit {
+            if !self.discs[k].is_beyond(center, limit)
+                && let square = self.triangles[k].nearest(center).0
+                && square <= limit
+            {
                 found.of.push((square.sqrt(), k as u32));
             }
             if found.of.len() > most { -1.0 } else { limit }
@@ -127,6 +141,9 @@ impl TriangleBvh {
         for &(d, k) in &candidates.of {
             if d - off > most {
                 break;
+            }
+            if self.discs[k as usize].is_beyond(p, most * most) {
+                continue;
             }
             let (square, away, feature) = self.triangles[k as usize].nearest(p);
             if square < best.square || (square == best.square && k < best.triangle) {

@@ -1,6 +1,6 @@
 //! Data to solid: values are checked, lattices and regions are combined, and likely mistakes are warned of.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::build_cell::cell;
 use super::data::*;
@@ -99,7 +99,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut solid = Solid::new(region.clone(), Some(field), wavelength);
     solid.transition = blend.as_ref().and_then(|b| b.width);
     let solid = filled.into_iter().fold(solid, Solid::with);
-    Ok(Built { solid, lattices, tilings, beams: graphs, blend, skin, warnings, repairs })
+    Ok(Built { solid, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures: OnceLock::new() })
 }
 
 /// Refuses a region that is empty, unbounded or too far away.

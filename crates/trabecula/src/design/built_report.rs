@@ -39,9 +39,7 @@ impl Varied {
             lattice.isos(&points[..1], &mut t);
             return Varied::of(&t);
         }
-        let mut values = vec![0.0; points.len()];
-        lattice.isos(points, &mut values);
-        Varied::of(&values)
+        Varied::of(&sample::values(points, |points, out| lattice.isos(points, out)))
     }
 
     /// The solid fraction of the cell at the points.
@@ -49,11 +47,7 @@ impl Varied {
         match &lattice.level {
             Level::Fraction(g) => match g.constant() {
                 Some(v) => Varied { min: v, max: v },
-                None => {
-                    let mut values = vec![0.0; points.len()];
-                    g.values(points, &mut values);
-                    Varied::of(&values)
-                }
+                None => Varied::of(&sample::values(points, |points, out| g.values(points, out))),
             },
             // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
             Level::Iso(_) | Level::Thickness(_) => Varied::of_iso(lattice, points).map(|t| lattice.fraction(t)),

@@ -1,5 +1,7 @@
 //! Points inside a region, by a deterministic low-discrepancy sequence (Halton).
 
+use rayon::prelude::*;
+
 use crate::region::Region;
 use geometry::math::{Aabb, Vec3};
 
@@ -37,6 +39,19 @@ pub(super) fn nodes(region: &Region) -> Vec<Vec3> {
     let grid = (0..count).map(|i| [at(i % (N + 1), 0), at(i / (N + 1) % (N + 1), 1), at(i / (N + 1).pow(2), 2)]);
     let reach = 1e-9 * size.into_iter().fold(0.0, f64::max);
     grid.filter(|p| region.value(*p) <= reach).collect()
+}
+
+/// The values at points of a field, in parallel.
+pub(super) fn values(points: &[Vec3], fill: impl Fn(&[Vec3], &mut [f64]) + Sync) -> Vec<f64> {
+    const BATCH: usize = 256;
+    let mut values = vec![0.0; points.len()];
+    // The first one alone: tables that are made at first use are made in parallel, and must not come to wait for themselves.
+    if let [first, ..] = points {
+        fill(&[*first], &mut values[..1]);
+    }
+    let batches = points.par_chunks(BATCH).zip(values.par_chunks_mut(BATCH));
+    batches.for_each(|(points, values)| fill(points, values));
+    values
 }
 
 /// Those of the points `from` to `from + tries` of the sequence that are inside.

@@ -23,8 +23,7 @@ const FINEST: usize = 24;
 
 /// Refuses a lattice that leaves the region empty or solid everywhere.
 pub(super) fn check(lattice: &Lattice, environment: &Environment, spec: &LatticeSpec) -> Result<(), DesignError> {
-    let mut values = vec![0.0; environment.points.len()];
-    lattice.values(environment.points, &mut values);
+    let values = sample::values(environment.points, |points, out| lattice.values(points, out));
     let path = format!("{}.level.{}", environment.path, spec.level.amount.key());
     if values.iter().any(|v| v.is_nan()) {
         return Err(DesignError::new(path, "the level is not a number somewhere in the region"));
@@ -35,8 +34,7 @@ pub(super) fn check(lattice: &Lattice, environment: &Environment, spec: &Lattice
     }
     // Too few samples for a sparse lattice or a thin gap: sampled more finely before refusing.
     let (points, _) = sample::inside(environment.region, 50 * sample::COUNT);
-    let mut values = vec![0.0; points.len()];
-    lattice.values(&points, &mut values);
+    let mut values = sample::values(&points, |points, out| lattice.values(points, out));
     let solid = values.iter().filter(|v| **v <= 0.0).count();
     if solid > 0 && solid < values.len() {
         return Ok(());

@@ -18,12 +18,11 @@ mod fragments;
 mod simplex_cut;
 
 use std::cell::Cell;
-use std::collections::HashSet;
 use std::ops::Range;
 
 use geometry::math::{Vec3, add, scale};
 use geometry::mesh::{Mesh, is_embedded};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::cube_table::{CASES, EDGES};
 use super::feature_edges::{DividedFaces, EdgeStore};
@@ -32,8 +31,7 @@ use super::sign_words::Signs;
 use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
 pub(super) use fragments::Fragments;
-use simplex_cut::section;
-pub(super) use simplex_cut::{CutVertex, Simplex};
+pub(super) use simplex_cut::{CutVertex, Simplex, section};
 
 /// Vertices and triangles that marching cubes does not make.
 #[derive(Default)]
@@ -65,7 +63,7 @@ pub(super) struct FeatureCells<'a> {
     pub extra: &'a mut FeatureMesh,
     pub edges: &'a EdgeStore,
     /// Nodes at which the surfaces are perturbed.
-    pub perturbed_nodes: HashSet<usize>,
+    pub perturbed_nodes: FxHashSet<usize>,
     pub divided_faces: DividedFaces,
     /// Buffers for the simplex that is being cut.
     pub fragments: Cell<Fragments>,
@@ -312,27 +310,47 @@ impl FeatureCells<'_> {
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
         // All cells are tested before any node is perturbed: the result for a cell must not depend on other cells, which an
         // adjacent tile may not have.
-        let mut perturbed_nodes = HashSet::new();
+        let mut perturbed_nodes = FxHashSet::default();
+        let mut ends = Vec::with_capacity(cells.len());
         for c in &cells {
             let first = self.extra.triangles.len();
             self.cell(*c);
             if self.self_intersects_rounded(first) {
-                let node = self.nodes.index(*c);
-                let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| node + self.offset(corner));
-                perturbed_nodes.extend(corners);
+                perturbed_nodes.extend(self.corners_of(*c));
             }
             if !mine(c) {
                 self.extra.triangles.truncate(first);
             }
+            ends.push(self.extra.triangles.len());
+        }
+        if perturbed_nodes.is_empty() {
+            return;
         }
         self.perturbed_nodes = perturbed_nodes;
-        if !self.perturbed_nodes.is_empty() {
-            self.positions.truncate(self.positions.len() - self.extra.keys.len());
-            self.extra.clear();
-            for c in cells.iter().filter(|c| mine(c)) {
+        let plain = self.positions.len() - self.extra.keys.len();
+        let positions = self.positions.split_off(plain);
+        let before = std::mem::take(&mut *self.extra);
+        let mut first = 0;
+        for (c, end) in cells.iter().zip(ends).filter(|(c, _)| mine(c)) {
+            if self.corners_of(*c).iter().any(|n| self.perturbed_nodes.contains(n)) {
                 self.cell(*c);
+            } else {
+                for (t, sides) in &before.triangles[first..end] {
+                    let again = t.map(|v| match (v as usize).checked_sub(plain) {
+                        Some(v) => self.vertex_at(before.keys[v], positions[v]),
+                        None => v,
+                    });
+                    self.extra.triangles.push((again, *sides));
+                }
             }
+            first = end;
         }
+    }
+
+    /// The nodes at the corners of a cell.
+    fn corners_of(&self, cell: [usize; 3]) -> [usize; 8] {
+        let node = self.nodes.index(cell);
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| node + self.offset(corner))
     }
 
     /// Whether the triangles from `first` on intersect after rounding to single precision.

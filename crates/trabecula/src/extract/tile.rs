@@ -24,9 +24,10 @@ mod plain_triangles;
 mod volume_balance;
 
 use std::cell::Cell;
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
 
 use crate::field::Block;
 use crate::implicit::{Pair, Surface};
@@ -400,7 +401,7 @@ fn features<'a>(
         positions: &mut s.positions,
         extra: &mut s.extra,
         edges: &s.edges,
-        perturbed_nodes: HashSet::new(),
+        perturbed_nodes: FxHashSet::default(),
         divided_faces: DividedFaces::none(local.live.len()),
         fragments: Cell::default(),
     };

@@ -286,7 +286,7 @@ impl FeatureCells<'_> {
 
 /// The polygon in which the plane of one surface cuts a tetrahedron, right-handed or not, by the corners at which the surface is
 /// negative: for each vertex the two corners between which it lies, as bits.
-pub(super) fn section(right: bool, negative: usize) -> &'static [u8] {
+pub(in crate::extract) fn section(right: bool, negative: usize) -> &'static [u8] {
     static SECTIONS: LazyLock<[[Vec<u8>; 16]; 2]> = LazyLock::new(|| {
         let mut cut = Fragments::default();
         [false, true].map(|right| {

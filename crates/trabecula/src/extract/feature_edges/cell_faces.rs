@@ -62,8 +62,36 @@ impl CellFace {
 
 const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The surfaces that are negative in a polygon, and the ids and positions of its corners.
-type Polygon = (u64, Vec<(VertexId, Vec3)>);
+/// Polygons one after the other: the ids and positions of their corners; for each the surfaces that are negative in it and where
+/// its corners end.
+#[derive(Default)]
+pub(super) struct Polygons {
+    corners: Vec<(VertexId, Vec3)>,
+    ends: Vec<(u64, usize)>,
+}
+
+impl Polygons {
+    /// Whether all polygons of a face keep their orientation in single precision. Together they fill the face, so then they do
+    /// not overlap.
+    fn are_sound(&self, axis: usize) -> bool {
+        let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
+        let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
+        starts.zip(&self.ends).all(|(start, (_, end))| {
+            let ring = &self.corners[start..*end];
+            let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
+            (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
+        })
+    }
+}
+
+/// Buffers for the division of one face after the other.
+#[derive(Default)]
+pub(super) struct FaceScratch {
+    flat: Vec<[f64; 2]>,
+    polygon: Vec<usize>,
+    positions: Vec<[f64; 2]>,
+    fragments: Polygons,
+}
 
 /// Most attempts to divide a face that self-intersects in single precision.
 const TRIES: usize = 8;
@@ -121,11 +149,8 @@ impl FeatureCells<'_> {
             for (n, (key, position)) in order.into_iter().filter_map(|n| Some((n, points[n]?))) {
                 solid = !solid;
                 boundary.push((corners.len(), Some(solid)));
-                let id = self.point(key, position, |k| {
-                    let share = k.share_of(node, along, position);
-                    let surfaces = 0..k.local.live.len();
-                    surfaces.map(|f| k.value_along(f, node, along, share)).collect()
-                });
+                let share = self.share_of(node, along, position);
+                let id = self.point(key, position, |k, f| k.value_along(f, node, along, share));
                 let code = 4 + 2 * i + n;
                 corners.push(Corner { id, code, key });
             }
@@ -135,8 +160,9 @@ impl FeatureCells<'_> {
         }
         let contours = self.contours_of((low, axis), &ring, &mut corners, &boundary);
         let solid = self.signs.is_negative(surface, low);
+        let mut scratch = std::mem::take(&mut self.divided_faces.scratch);
         let mut face = CellFace {
-            parts: self.parts(axis, &corners, &boundary, &contours, (solid, 0)),
+            parts: self.parts(axis, &corners, &boundary, &contours, (solid, 0), &mut scratch),
             corners,
             names: Vec::new(),
             ends: Vec::new(),
@@ -144,39 +170,33 @@ impl FeatureCells<'_> {
             tries: 0,
         };
         let at = (low, axis);
-        let mut fragments = self.cut_parts(at, surface, &face);
-        while !is_sound(&fragments, axis) && face.tries < TRIES {
+        self.cut_parts(at, surface, &face, &mut scratch.fragments);
+        while !scratch.fragments.are_sound(axis) && face.tries < TRIES {
             face.tries += 1;
             for i in 0..face.corners.len() {
                 face.corners[i].id = self.perturbed(low, &face.corners[i], face.tries);
             }
             let again = (solid, face.tries);
-            face.parts = self.parts(axis, &face.corners, &boundary, &contours, again);
-            fragments = self.cut_parts(at, surface, &face);
+            face.parts = self.parts(axis, &face.corners, &boundary, &contours, again, &mut scratch);
+            self.cut_parts(at, surface, &face, &mut scratch.fragments);
         }
-        face.ends.reserve(fragments.len());
-        face.names.reserve(fragments.iter().map(|p| p.1.len()).sum());
-        for (negative, ring) in fragments {
-            for (key, position) in ring {
-                if key.is_between() {
-                    self.vertex_at(key, position);
-                }
-                face.names.push(key);
-            }
-            face.ends.push((negative, face.names.len()));
+        for &(key, position) in scratch.fragments.corners.iter().filter(|c| c.0.is_between()) {
+            self.vertex_at(key, position);
         }
+        face.names = scratch.fragments.corners.iter().map(|c| c.0).collect();
+        face.ends = scratch.fragments.ends.clone();
+        self.divided_faces.scratch = scratch;
         let contours = contours.iter().map(|c| self.crossed(at, surface, &face, c));
         face.contours = contours.collect();
         Some(face)
     }
 
-    fn point(&mut self, key: VertexId, position: Vec3, values: impl Fn(&Self) -> Vec<f64>) -> usize {
+    fn point(&mut self, key: VertexId, position: Vec3, value: impl Fn(&Self, usize) -> f64) -> usize {
         if let Some(id) = self.divided_faces.numbers.get(&key) {
             return *id;
         }
-        let values = values(self);
         let line = (0..3).find(|a| key.is_along(*a)).map(|a| (key.node(), a));
-        let id = self.add_point(position, line, values);
+        let id = self.add_point(position, line, value);
         self.divided_faces.numbers.insert(key, id);
         id
     }
@@ -197,7 +217,7 @@ impl FeatureCells<'_> {
                 let end = |corners: &[Corner], key: VertexId| corners.iter().position(|c| c.key == key);
                 let mut path: Vec<usize> = end(corners, c.from).into_iter().collect();
                 for &(key, position) in &c.via {
-                    let id = self.point(key, position, |k| k.values_between(position, ring));
+                    let id = self.point(key, position, |k, f| k.value_between(f, position, ring));
                     path.push(corners.len());
                     corners.push(Corner { id, code: 12 + via, key });
                     via += 1;
@@ -221,15 +241,18 @@ impl FeatureCells<'_> {
         boundary: &[(usize, Option<bool>)],
         contours: &[Vec<usize>],
         (solid, tries): (bool, usize),
+        FaceScratch { flat, polygon, positions, .. }: &mut FaceScratch,
     ) -> Vec<FaceTriangle> {
-        let flat: Vec<[f64; 2]> = corners.iter().map(|c| drop_axis(self.position_of(c.id), axis)).collect();
+        flat.clear();
+        flat.extend(corners.iter().map(|c| drop_axis(self.position_of(c.id), axis)));
         let is_on_contour = |a: usize, b: usize| {
             contours.iter().any(|c| c.windows(2).any(|w| (w[0], w[1]) == (a, b) || (w[1], w[0]) == (a, b)))
         };
-        let mut parts = Vec::new();
+        let mut parts = Vec::with_capacity(corners.len());
         let mut add = |polygon: &[usize], inside: bool| {
-            let positions: Vec<[f64; 2]> = polygon.iter().map(|c| flat[*c]).collect();
-            for t in triangles(&positions, tries) {
+            positions.clear();
+            positions.extend(polygon.iter().map(|c| flat[*c]));
+            for t in triangles(positions, tries) {
                 let t = t.map(|i| polygon[i]);
                 let mut sorted = t;
                 sorted.sort_by_key(|c| corners[*c].code);
@@ -244,8 +267,9 @@ impl FeatureCells<'_> {
             }
         };
         if contours.is_empty() {
-            let all: Vec<usize> = boundary.iter().map(|b| b.0).collect();
-            add(&all, solid);
+            polygon.clear();
+            polygon.extend(boundary.iter().map(|b| b.0));
+            add(polygon, solid);
             return parts;
         }
         // A solid polygon runs along the boundary from where that enters the solid, and back along a contour; a void one along
@@ -254,7 +278,7 @@ impl FeatureCells<'_> {
             let start = |c: &Vec<usize>| if inside { c[0] } else { c[c.len() - 1] };
             let mut open: Vec<usize> = contours.iter().map(start).collect();
             while let Some(first) = open.pop() {
-                let mut polygon = Vec::new();
+                polygon.clear();
                 let mut enter = first;
                 loop {
                     let mut i = boundary.iter().position(|b| b.0 == enter).unwrap_or(0);
@@ -281,16 +305,16 @@ impl FeatureCells<'_> {
                     }
                     open.retain(|c| *c != enter);
                 }
-                add(&polygon, inside);
+                add(polygon, inside);
             }
         }
         parts
     }
 
-    /// The triangles of a face cut by all surfaces but one: the surfaces that are negative, ids and positions,
-    /// counter-clockwise about the face's axis.
-    fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace) -> Vec<Polygon> {
-        let mut fragments = Vec::with_capacity(face.parts.len());
+    /// Finds the triangles of a face cut by all surfaces but one, counter-clockwise about the face's axis.
+    fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace, found: &mut Polygons) {
+        found.corners.clear();
+        found.ends.clear();
         let mut cut = self.fragments.take();
         for part in &face.parts {
             let [a, b, c] = part.corners.map(|c| face.corners[c].id);
@@ -299,16 +323,15 @@ impl FeatureCells<'_> {
             let ring = if part.left { [0, 1, 2] } else { [2, 1, 0] };
             self.cut_triangle(&simplex, ring, signs, &mut cut);
             for (negative, _, ring) in cut.facets() {
-                let ring = ring.iter().map(|v| {
+                found.corners.extend(ring.iter().map(|v| {
                     let vertex = cut.vertices[usize::from(*v)];
                     let key = self.face_vertex_id(at, face, &part.corners, vertex);
                     (key, self.face_vertex_position(key, face, &simplex, vertex))
-                });
-                fragments.push((negative, ring.collect()));
+                }));
+                found.ends.push((negative, found.corners.len()));
             }
         }
         self.fragments.set(cut);
-        fragments
     }
 
     /// The position of a cut vertex of a triangle in a face.
@@ -383,14 +406,4 @@ impl FeatureCells<'_> {
         }
         path
     }
-}
-
-/// Whether all polygons of a face keep their orientation in single precision. Together they fill the face, so then they do not
-/// overlap.
-fn is_sound(fragments: &[Polygon], axis: usize) -> bool {
-    let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
-    fragments.iter().all(|(_, ring)| {
-        let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
-        (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
-    })
 }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use super::boundary_loops::{Step, boundary_loops};
 use super::cell_faces::{CellFace, FaceTriangle};
 use super::surface_patch::{BoundaryLoop, Patch, Patches};
-use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle};
+use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle, section};
 use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, scale};
@@ -192,8 +192,7 @@ impl FeatureCells<'_> {
     pub(super) fn inner_point(&mut self, cell: [usize; 3], position: Vec3) -> usize {
         let node = self.nodes.index(cell);
         let around = [0, 1, 2, 3, 4, 5, 6, 7].map(|c| node + self.offset(c));
-        let values = self.values_between(position, &around);
-        self.add_point(position, None, values)
+        self.add_point(position, None, |k, f| k.value_between(f, position, &around))
     }
 
     /// Adds the surface in some tetrahedra of a cell.
@@ -213,6 +212,20 @@ impl FeatureCells<'_> {
                 if tet.inside && sides.behind != sides.ahead {
                     self.fill_patch(node, sides, bases, tet, &mut names);
                 }
+                continue;
+            }
+            if mixed.is_power_of_two() && !tet.on_patch.contains(&true) {
+                let f = mixed.trailing_zeros() as usize;
+                let sides = self.sides(cell, negative, f);
+                if sides.behind == sides.ahead {
+                    continue;
+                }
+                let pattern = (0..4).fold(0, |w, c| w | usize::from(self.is_negative(f, tet.simplex.nodes[c])) << c);
+                let corners = section(tet.right, pattern).iter();
+                let vertices = corners.map(|corners| CutVertex { corners: *corners, surfaces: mixed });
+                ring.clear();
+                ring.extend(vertices.map(|vertex| self.vertex_name(node, bases, tet, vertex, &mut names)));
+                self.fan(&ring, sides);
                 continue;
             }
             self.cut(&tet.simplex, tet.right, (negative, mixed), on_surface, &mut fragments);

@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 use rustc_hash::FxHashMap;
 
-use super::cell_faces::{CellFace, Corner};
+use super::cell_faces::{CellFace, Corner, FaceScratch};
 use super::{EdgeStore, OtherSurfaces, SurfaceContext};
 use crate::extract::feature_cells::FeatureCells;
 use crate::extract::vertex_id::VertexId;
@@ -35,6 +35,7 @@ pub(in crate::extract) struct DividedFaces {
     pub(super) numbers: FxHashMap<VertexId, usize>,
     /// Divided faces, by their lowest node and the axis normal to them.
     pub faces: FxHashMap<(usize, usize), Rc<CellFace>>,
+    pub(super) scratch: FaceScratch,
 }
 
 impl DividedFaces {
@@ -188,11 +189,19 @@ impl FeatureCells<'_> {
         Some(at_ends[usize::from(passed)])
     }
 
-    /// Adds an extra point; returns its number, which continues those of the nodes.
-    pub(super) fn add_point(&mut self, position: Vec3, line: Option<(usize, usize)>, values: Vec<f64>) -> usize {
+    /// Adds an extra point with a value of each live surface; returns its number, which continues those of the nodes.
+    pub(super) fn add_point(
+        &mut self,
+        position: Vec3,
+        line: Option<(usize, usize)>,
+        value: impl Fn(&Self, usize) -> f64,
+    ) -> usize {
+        for f in 0..self.local.live.len() {
+            let v = value(self, f);
+            self.divided_faces.values.push(v);
+        }
         self.divided_faces.positions.push(position);
         self.divided_faces.lines.push(line);
-        self.divided_faces.values.extend(values);
         let id = self.nodes.count() + self.divided_faces.positions.len() - 1;
         self.divided_faces.first.push(id);
         id
@@ -208,29 +217,24 @@ impl FeatureCells<'_> {
         let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
             return corner.id;
         };
-        let surfaces = 0..self.local.live.len();
-        let perturbed = surfaces.map(|f| {
-            let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
-            self.clamped_from_zero(f, self.divided_faces.value(point, f) * (1.0 + 0.7 * self.noise(seed, low)))
-        });
-        let values = perturbed.collect();
-        let id = self.add_point(self.divided_faces.positions[point], self.divided_faces.lines[point], values);
+        let perturbed = |k: &Self, f: usize| {
+            let seed = k.local.live[f] + 64 * (corner.code + 16 * attempt);
+            k.clamped_from_zero(f, k.divided_faces.value(point, f) * (1.0 + 0.7 * k.noise(seed, low)))
+        };
+        let id = self.add_point(self.divided_faces.positions[point], self.divided_faces.lines[point], perturbed);
         let first = self.divided_faces.first[point];
         self.divided_faces.first[id - self.nodes.count()] = first;
         id
     }
 
-    /// The values of all live surfaces at a position, clamped to those of some nodes. The fitted surface needs none.
-    pub(super) fn values_between(&self, position: Vec3, around: &[usize]) -> Vec<f64> {
-        let value = |f: usize| {
-            let at = around.iter().map(|n| self.value(f, *n));
-            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-            if (low <= 0.0) == (high <= 0.0) || self.is_fitted(f) {
-                return low;
-            }
-            let id = self.local.live[f];
-            self.clamped_from_zero(f, self.grid.surfaces[id].field.value(position).clamp(low, high))
-        };
-        (0..self.local.live.len()).map(value).collect()
+    /// The value of a live surface at a position, clamped to those at some nodes. The fitted surface needs none.
+    pub(super) fn value_between(&self, f: usize, position: Vec3, around: &[usize]) -> f64 {
+        let at = around.iter().map(|n| self.value(f, *n));
+        let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        if (low <= 0.0) == (high <= 0.0) || self.is_fitted(f) {
+            return low;
+        }
+        let id = self.local.live[f];
+        self.clamped_from_zero(f, self.grid.surfaces[id].field.value(position).clamp(low, high))
     }
 }

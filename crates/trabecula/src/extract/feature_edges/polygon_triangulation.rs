@@ -11,6 +11,9 @@ use geometry::mesh::exact::orient2d;
 /// once.
 pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
     let n = ring.len();
+    if n == 3 {
+        return vec![[0, 1, 2]];
+    }
     let area: f64 = (0..n)
         .map(|i| {
             let (p, q) = (ring[i], ring[(i + 1) % n]);
