@@ -99,17 +99,21 @@ def field(
     array: str,
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     component: int | None = None,
+    invariant: Literal["magnitude", "von_mises", "mean"] | None = None,
     remap: Stops | None = None,
 ) -> dict:
     """An array of a result on a mesh of volume elements, from a file.
 
-    path: Path of the file (vtu, vtk, vti), relative to the design file.
-    array: Name of the array, of points or cells.
+    path: Path of the file (vtu, vtk, vti; frd of CalculiX), relative to the design file.
+    array: Name of the array, of points or cells. In an FRD "STRESS" is that of the last step, "STRESS@2" that of the
+        second.
     unit: Unit of the file's coordinates (mm unless given). [optional]
     component: Which of its components, from 0, where it has several. [from 0, optional]
+    invariant: A number made of all its components. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"field": settings(path=os.fspath(path), array=array, unit=unit, component=component, remap=pairs(remap))}
+    given = settings(path=os.fspath(path), array=array, unit=unit, component=component, invariant=invariant, remap=pairs(remap))
+    return {"field": given}
 
 
 @named

@@ -58,9 +58,6 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
             format!("the name must end in npy, {known}, or in png, tif or dcm for pictures; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     };
-    if let Some(n) = values.iter().position(|v| !v.is_finite()) {
-        return Err(wrong(Fault::new("", format!("number {n} is {}; all must be finite", values[n]))));
-    }
     let [x, y, z] = shape;
     if values.len() > MOST {
         let message = format!(
@@ -69,6 +66,10 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
         return Err(wrong(Fault::new("", message)));
     }
     if let Some(threshold) = spec.threshold {
+        if let Some(n) = values.iter().position(|v| !v.is_finite()) {
+            let at = [n % x, n / x % y, n / x / y];
+            return Err(wrong(Fault::new("", format!("the number at {at:?} is {}; all must be finite", values[n]))));
+        }
         values = above(&values, shape, threshold, step).map_err(wrong)?;
     } else {
         misplaced(spec, path, &["step"], "goes with threshold; without it no distance is measured")?;
