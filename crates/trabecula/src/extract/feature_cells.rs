@@ -437,10 +437,9 @@ impl FeatureCells<'_> {
         let mut steps: Vec<(VertexId, VertexId)> = Vec::new();
         let on = |k: &VertexId| k.surfaces().any(|f| f == surface);
         let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
-        let fitted = self.divided_faces.faces.get(&(low, axis));
+        let fitted = self.divided_faces.face((low, axis));
         if let Some(facet) = fitted.filter(|_| self.is_fitted(surface)) {
-            let contours = facet.contours.iter();
-            steps.extend(contours.flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
+            steps.extend(facet.contours().flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
         } else {
             let mut add = |negative: u64, ring: &[VertexId]| {
                 if negative >> surface & 1 == 1 {

@@ -79,6 +79,7 @@ pub(super) struct Scratch {
     moments: Vec<(f32, f32)>,
     extra: FeatureMesh,
     edges: EdgeStore,
+    divided_faces: DividedFaces,
 }
 
 /// Numbers of the vertices of one surface: those on x-edges, then y, then z, each in node order.
@@ -280,6 +281,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
         // Contours are grid-aligned between the points that stay.
         let (mut features, vertices, _) = features(s, grid, &local, &nodes);
         snap(&mut features, vertices);
+        s.divided_faces = features.divided_faces;
     }
     edges(s, grid, &local, &nodes);
     if snapped {
@@ -391,6 +393,8 @@ fn features<'a>(
     nodes: &'a Nodes,
 ) -> (FeatureCells<'a>, &'a [Vertex], &'a [Seam]) {
     s.extra.clear();
+    let mut divided_faces = std::mem::take(&mut s.divided_faces);
+    divided_faces.clear(local.live.len());
     let features = FeatureCells {
         nodes,
         grid,
@@ -402,7 +406,7 @@ fn features<'a>(
         extra: &mut s.extra,
         edges: &s.edges,
         perturbed_nodes: FxHashSet::default(),
-        divided_faces: DividedFaces::none(local.live.len()),
+        divided_faces,
         fragments: Cell::default(),
     };
     (features, &s.vertices, &s.plain.seams)
@@ -443,6 +447,7 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: 
     for flat in 0..local.grid_planes.len() {
         planar_caps::close(&mut features, flat, own);
     }
+    s.divided_faces = features.divided_faces;
 }
 
 impl View<'_> {

@@ -71,9 +71,9 @@ impl FeatureCells<'_> {
         let mut steps = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let low = node + self.offset(usize::from(upper) << axis);
-            if let Some(face) = self.divided_faces.faces.get(&(low, axis)) {
-                steps.extend(face.contours.iter().map(|c| {
-                    let mut path = c.clone();
+            if let Some(face) = self.divided_faces.face((low, axis)) {
+                steps.extend(face.contours().map(|c| {
+                    let mut path = c.to_vec();
                     if !upper {
                         path.reverse();
                     }

@@ -5,7 +5,6 @@
 //! signs at its points: its grid edges stay as they are.
 
 use std::ops::Range;
-use std::rc::Rc;
 
 use super::polygon_triangulation::triangles;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex};
@@ -14,7 +13,8 @@ use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
 use geometry::mesh::exact::{drop_axis, orient2d};
 
-/// A cell face, cut along its contours and into triangles.
+/// A cell face, cut along its contours and into triangles. Its buffers serve for one block after the other.
+#[derive(Default)]
 pub(in crate::extract) struct CellFace {
     /// Its nodes and the points in it.
     pub(super) corners: Vec<Corner>,
@@ -23,8 +23,9 @@ pub(in crate::extract) struct CellFace {
     /// for each fragment the surfaces that are negative in it and where its ids end.
     names: Vec<VertexId>,
     ends: Vec<(u64, usize)>,
-    /// The contours, with the points where other surfaces cross them.
-    pub contours: Vec<Vec<VertexId>>,
+    /// The contours, with the points where other surfaces cross them, and where each ends.
+    along: Vec<VertexId>,
+    along_ends: Vec<usize>,
     /// How many times it was divided again.
     pub(super) tries: usize,
 }
@@ -58,6 +59,12 @@ impl CellFace {
         let each = starts.zip(&self.ends);
         each.map(|(start, (negative, end))| (*negative, &self.names[start..*end]))
     }
+
+    /// The contours, with the points where other surfaces cross them.
+    pub fn contours(&self) -> impl Iterator<Item = &[VertexId]> {
+        let starts = [0].into_iter().chain(self.along_ends.iter().copied());
+        starts.zip(&self.along_ends).map(|(start, end)| &self.along[start..*end])
+    }
 }
 
 const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -90,6 +97,7 @@ pub(super) struct FaceScratch {
     flat: Vec<[f64; 2]>,
     polygon: Vec<usize>,
     positions: Vec<[f64; 2]>,
+    parts: Vec<FaceTriangle>,
     fragments: Polygons,
 }
 
@@ -121,22 +129,23 @@ impl FeatureCells<'_> {
                         continue;
                     }
                     let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
-                    if !self.divided_faces.faces.contains_key(&(low, axis))
-                        && let Some(face) = self.divide_face((low, axis), surface)
-                    {
-                        self.divided_faces.faces.insert((low, axis), Rc::new(face));
+                    if self.divided_faces.face((low, axis)).is_none() {
+                        let mut face = self.divided_faces.take_next();
+                        let is_crossed = self.divide_face((low, axis), surface, &mut face);
+                        self.divided_faces.put_next(face, is_crossed.then_some((low, axis)));
                     }
                 }
             }
         }
     }
 
-    /// Divides a face; none if the surface does not cross it.
-    fn divide_face(&mut self, (low, axis): (usize, usize), surface: usize) -> Option<CellFace> {
+    /// Divides a face; false if the surface does not cross it.
+    fn divide_face(&mut self, (low, axis): (usize, usize), surface: usize, face: &mut CellFace) -> bool {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
         let ring = [low, low + du, low + du + dv, low + dv];
-        let mut corners: Vec<Corner> = Vec::with_capacity(8);
+        let mut corners = std::mem::take(&mut face.corners);
+        corners.clear();
         // Counter-clockwise: nodes, and crossings with whether the boundary enters the solid there.
         let mut boundary: Vec<(usize, Option<bool>)> = Vec::with_capacity(8);
         let mut solid = self.signs.is_negative(surface, low);
@@ -156,39 +165,42 @@ impl FeatureCells<'_> {
             }
         }
         if boundary.len() == 4 {
-            return None;
+            face.corners = corners;
+            return false;
         }
         let contours = self.contours_of((low, axis), &ring, &mut corners, &boundary);
         let solid = self.signs.is_negative(surface, low);
         let mut scratch = std::mem::take(&mut self.divided_faces.scratch);
-        let mut face = CellFace {
-            parts: self.parts(axis, &corners, &boundary, &contours, (solid, 0), &mut scratch),
-            corners,
-            names: Vec::new(),
-            ends: Vec::new(),
-            contours: Vec::new(),
-            tries: 0,
-        };
+        (face.corners, face.tries) = (corners, 0);
         let at = (low, axis);
-        self.cut_parts(at, surface, &face, &mut scratch.fragments);
-        while !scratch.fragments.are_sound(axis) && face.tries < TRIES {
+        loop {
+            self.parts(axis, &face.corners, &boundary, &contours, (solid, face.tries), &mut scratch);
+            std::mem::swap(&mut face.parts, &mut scratch.parts);
+            self.cut_parts(at, surface, face, &mut scratch.fragments);
+            if scratch.fragments.are_sound(axis) || face.tries == TRIES {
+                break;
+            }
             face.tries += 1;
             for i in 0..face.corners.len() {
                 face.corners[i].id = self.perturbed(low, &face.corners[i], face.tries);
             }
-            let again = (solid, face.tries);
-            face.parts = self.parts(axis, &face.corners, &boundary, &contours, again, &mut scratch);
-            self.cut_parts(at, surface, &face, &mut scratch.fragments);
         }
         for &(key, position) in scratch.fragments.corners.iter().filter(|c| c.0.is_between()) {
             self.vertex_at(key, position);
         }
-        face.names = scratch.fragments.corners.iter().map(|c| c.0).collect();
-        face.ends = scratch.fragments.ends.clone();
+        face.names.clear();
+        face.names.extend(scratch.fragments.corners.iter().map(|c| c.0));
+        std::mem::swap(&mut face.ends, &mut scratch.fragments.ends);
         self.divided_faces.scratch = scratch;
-        let contours = contours.iter().map(|c| self.crossed(at, surface, &face, c));
-        face.contours = contours.collect();
-        Some(face)
+        let (mut along, mut ends) = (std::mem::take(&mut face.along), std::mem::take(&mut face.along_ends));
+        along.clear();
+        ends.clear();
+        for contour in &contours {
+            self.crossed(at, surface, face, contour, &mut along);
+            ends.push(along.len());
+        }
+        (face.along, face.along_ends) = (along, ends);
+        true
     }
 
     fn point(&mut self, key: VertexId, position: Vec3, value: impl Fn(&Self, usize) -> f64) -> usize {
@@ -232,7 +244,7 @@ impl FeatureCells<'_> {
         (0..ends.len()).filter(|i| ends[*i].1).map(next).collect()
     }
 
-    /// The triangles between the boundary of a face and its contours, others for each attempt where there are others. `solid`
+    /// Finds the triangles between the boundary of a face and its contours, others for each attempt where there are others. `solid`
     /// is whether the surface is negative at the face's first node.
     fn parts(
         &self,
@@ -241,14 +253,14 @@ impl FeatureCells<'_> {
         boundary: &[(usize, Option<bool>)],
         contours: &[Vec<usize>],
         (solid, tries): (bool, usize),
-        FaceScratch { flat, polygon, positions, .. }: &mut FaceScratch,
-    ) -> Vec<FaceTriangle> {
+        FaceScratch { flat, polygon, positions, parts, .. }: &mut FaceScratch,
+    ) {
         flat.clear();
         flat.extend(corners.iter().map(|c| drop_axis(self.position_of(c.id), axis)));
         let is_on_contour = |a: usize, b: usize| {
             contours.iter().any(|c| c.windows(2).any(|w| (w[0], w[1]) == (a, b) || (w[1], w[0]) == (a, b)))
         };
-        let mut parts = Vec::with_capacity(corners.len());
+        parts.clear();
         let mut add = |polygon: &[usize], inside: bool| {
             positions.clear();
             positions.extend(polygon.iter().map(|c| flat[*c]));
@@ -269,8 +281,7 @@ impl FeatureCells<'_> {
         if contours.is_empty() {
             polygon.clear();
             polygon.extend(boundary.iter().map(|b| b.0));
-            add(polygon, solid);
-            return parts;
+            return add(polygon, solid);
         }
         // A solid polygon runs along the boundary from where that enters the solid, and back along a contour; a void one along
         // the boundary from where that leaves the solid, and on along a contour.
@@ -308,7 +319,6 @@ impl FeatureCells<'_> {
                 add(polygon, inside);
             }
         }
-        parts
     }
 
     /// Finds the triangles of a face cut by all surfaces but one, counter-clockwise about the face's axis.
@@ -386,9 +396,16 @@ impl FeatureCells<'_> {
         VertexId::between(low, 7 & !(1 << axis), &codes[..count], surfaces)
     }
 
-    /// A contour with the points where other surfaces cross it.
-    fn crossed(&mut self, at: (usize, usize), surface: usize, face: &CellFace, contour: &[usize]) -> Vec<VertexId> {
-        let mut path = vec![face.corners[contour[0]].key];
+    /// Adds a contour with the points where other surfaces cross it.
+    fn crossed(
+        &self,
+        at: (usize, usize),
+        surface: usize,
+        face: &CellFace,
+        contour: &[usize],
+        path: &mut Vec<VertexId>,
+    ) {
+        path.push(face.corners[contour[0]].key);
         for w in contour.windows(2) {
             let mut ends = [w[0], w[1]];
             ends.sort_by_key(|c| face.corners[*c].code);
@@ -404,6 +421,5 @@ impl FeatureCells<'_> {
             }));
             path.push(face.corners[w[1]].key);
         }
-        path
     }
 }

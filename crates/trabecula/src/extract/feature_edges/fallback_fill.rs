@@ -59,7 +59,7 @@ impl FeatureCells<'_> {
         let mut all = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let low = node + self.offset(usize::from(upper) << axis);
-            let fitted = self.divided_faces.faces.get(&(low, axis));
+            let fitted = self.divided_faces.face((low, axis));
             let fragments = match fitted {
                 Some(face) => face.fragments().map(|(n, ring)| (n, ring.to_vec())).collect(),
                 None => self.face_fragments(cell, axis, upper),

@@ -1,9 +1,7 @@
 //! The surface in fitted cells: cones, subvolumes, or as a last resort the fallback fill.
 
-use std::rc::Rc;
-
 use super::boundary_loops::{Step, boundary_loops};
-use super::cell_faces::{CellFace, FaceTriangle};
+use super::cell_faces::FaceTriangle;
 use super::surface_patch::{BoundaryLoop, Patch, Patches};
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle, section};
 use crate::extract::sampling_grid::Sides;
@@ -34,8 +32,8 @@ pub(super) struct Base {
     pub inside: bool,
     on_patch: [bool; 3],
     face: (usize, usize),
-    /// The divided face and the triangle's corners in it, if the face is divided.
-    pub divided: Option<(Rc<CellFace>, [usize; 3])>,
+    /// The number of the divided face and the triangle's corners in it, if the face is divided.
+    pub divided: Option<(usize, [usize; 3])>,
 }
 
 impl<'b> Tet<'b> {
@@ -162,14 +160,15 @@ impl FeatureCells<'_> {
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let low = node + self.offset(usize::from(upper) << axis);
             let face = (low, axis);
-            if let Some(fit) = self.divided_faces.faces.get(&face) {
+            if let Some(number) = self.divided_faces.number(face) {
+                let fit = self.divided_faces.numbered(number);
                 bases.extend(fit.parts.iter().map(|p: &FaceTriangle| Base {
                     ids: p.corners.map(|c| fit.corners[c].id),
                     left: p.left == upper,
                     inside: p.inside,
                     on_patch: p.on_contour,
                     face,
-                    divided: Some((fit.clone(), p.corners)),
+                    divided: Some((number, p.corners)),
                 }));
                 continue;
             }
@@ -291,9 +290,10 @@ impl FeatureCells<'_> {
 
     /// The id of a cut vertex of a triangle in a face.
     fn base_key(&self, base: &Base, simplex: &Simplex, vertex: CutVertex) -> VertexId {
-        let Some((face, corners)) = &base.divided else {
+        let Some((number, corners)) = &base.divided else {
             return self.key(simplex, vertex);
         };
+        let face = self.divided_faces.numbered(*number);
         let is_of = |c: &usize| {
             let mut of = (0..4).filter(|i| vertex.corners >> i & 1 == 1);
             of.any(|i| simplex.nodes[i] == base.ids[*c])

@@ -9,8 +9,6 @@
 //! points inside a face or a cell their values lie between those of the nodes around. So no surface appears where an adjacent
 //! cell does not expect it.
 
-use std::rc::Rc;
-
 use rustc_hash::FxHashMap;
 
 use super::cell_faces::{CellFace, Corner, FaceScratch};
@@ -33,15 +31,53 @@ pub(in crate::extract) struct DividedFaces {
     /// The grid edge on which each point lies, if it does: lower node and axis.
     lines: Vec<Option<(usize, usize)>>,
     pub(super) numbers: FxHashMap<VertexId, usize>,
-    /// Divided faces, by their lowest node and the axis normal to them.
-    pub faces: FxHashMap<(usize, usize), Rc<CellFace>>,
+    /// The numbers of divided faces, by their lowest node and the axis normal to them.
+    faces: FxHashMap<(usize, usize), usize>,
+    /// The divided faces, and others whose buffers are free.
+    list: Vec<CellFace>,
     pub(super) scratch: FaceScratch,
 }
 
 impl DividedFaces {
-    /// No points, for this number of live surfaces.
-    pub fn none(live: usize) -> DividedFaces {
-        DividedFaces { live, ..DividedFaces::default() }
+    /// Forgets all points and faces, for this number of live surfaces.
+    pub fn clear(&mut self, live: usize) {
+        self.live = live;
+        self.positions.clear();
+        self.values.clear();
+        self.first.clear();
+        self.lines.clear();
+        self.numbers.clear();
+        self.faces.clear();
+    }
+
+    /// The number of a divided face, by its lowest node and the axis normal to it.
+    pub(super) fn number(&self, face: (usize, usize)) -> Option<usize> {
+        self.faces.get(&face).copied()
+    }
+
+    pub(super) fn numbered(&self, number: usize) -> &CellFace {
+        &self.list[number]
+    }
+
+    /// A divided face, by its lowest node and the axis normal to it.
+    pub fn face(&self, face: (usize, usize)) -> Option<&CellFace> {
+        Some(self.numbered(self.number(face)?))
+    }
+
+    /// The face whose buffers are for the next one that is divided.
+    pub(super) fn take_next(&mut self) -> CellFace {
+        let next = self.faces.len();
+        self.list.get_mut(next).map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Puts it back; it counts if it has a name.
+    pub(super) fn put_next(&mut self, face: CellFace, name: Option<(usize, usize)>) {
+        let next = self.faces.len();
+        match self.list.get_mut(next) {
+            Some(place) => *place = face,
+            None => self.list.push(face),
+        }
+        self.faces.extend(name.map(|name| (name, next)));
     }
 
     pub fn position(&self, point: usize) -> Vec3 {

@@ -70,7 +70,7 @@ impl FeatureCells<'_> {
         patches: &[(&[usize], &Patch)],
     ) -> Option<Vec<Tet<'b>>> {
         // Points of faces that were divided again have other values in that face.
-        let is_perturbed = |b: &Base| b.divided.as_ref().is_some_and(|(s, _)| s.tries > 0);
+        let is_perturbed = |b: &Base| b.divided.is_some_and(|(n, _)| self.divided_faces.numbered(n).tries > 0);
         if bases.iter().any(is_perturbed) {
             return None;
         }
