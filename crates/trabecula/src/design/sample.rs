@@ -61,37 +61,43 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
     for first in (from..from + tries).step_by(BATCH) {
         let points: Vec<Vec3> = (first..(first + BATCH).min(from + tries)).map(|i| halton(bounds, i)).collect();
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        let mut inside = vec![false; points.len()];
-        mark_inside(region, &points, &mut order, &mut inside);
-        kept.extend(points.iter().zip(inside).filter(|(_, inside)| *inside).map(|(p, _)| *p));
+        // What regions compute at first use is computed before they are asked in parallel, as in `values`.
+        region.value(points[0]);
+        let mut inside = those_inside(region, &points, &mut order);
+        inside.sort_unstable();
+        kept.extend(inside.into_iter().map(|i| points[i as usize]));
     }
     kept
 }
 
-/// Marks those of the points `of` that are inside. Most are by the bound over a box: distances are evaluated near the surface
+/// Those of the points `of` that are inside. Most are known by the bound over a box: distances are evaluated near the surface
 /// alone, and for points that follow each other closely.
-fn mark_inside(region: &Region, points: &[Vec3], of: &mut [u32], inside: &mut [bool]) {
+fn those_inside(region: &Region, points: &[Vec3], of: &mut [u32]) -> Vec<u32> {
     const FEW: usize = 8;
+    /// More are divided among threads.
+    const PARALLEL: usize = 512;
     let at = |i: &u32| points[*i as usize];
     if of.len() <= FEW {
         let mut values = [0.0; FEW];
         let here: Vec<Vec3> = of.iter().map(at).collect();
         region.values(&here, &mut values[..of.len()]);
-        of.iter().zip(values).for_each(|(i, v)| inside[*i as usize] = v < 0.0);
-        return;
+        return of.iter().zip(values).filter(|(_, v)| *v < 0.0).map(|(i, _)| *i).collect();
     }
     let bounds = of.iter().fold(Aabb::EMPTY, |b, i| b.with(at(i)));
     let range = region.bound(&bounds);
     if range.hi < 0.0 || range.lo >= 0.0 {
-        return of.iter().for_each(|i| inside[*i as usize] = range.hi < 0.0);
+        return if range.hi < 0.0 { of.to_vec() } else { Vec::new() };
     }
     let size = bounds.size();
     let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
     let middle = of.len() / 2;
     of.select_nth_unstable_by(middle, |a, b| at(a)[longest].total_cmp(&at(b)[longest]));
+    let parallel = of.len() > PARALLEL;
     let (low, high) = of.split_at_mut(middle);
-    mark_inside(region, points, low, inside);
-    mark_inside(region, points, high, inside);
+    let (mut low, mut high) = (|| those_inside(region, points, low), || those_inside(region, points, high));
+    let (mut found, more) = if parallel { rayon::join(low, high) } else { (low(), high()) };
+    found.extend(more);
+    found
 }
 
 /// Point `i` of Halton's sequence in the box.
