@@ -165,7 +165,7 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
     let mut asked = vec![0.0; environment.points.len()];
     amount.values(environment.points, &mut asked);
     let (sampled, bound) = (Varied::of(&asked), amount.bound(&environment.region.bounds()));
-    // As far as the grade may go between the points, where cells can.
+    // Between the points the grade may go up to its bounds; cells follow it where they can.
     let end = |loose: f64, sampled: f64| match cell.level_of_pore(part, loose, to_phase) {
         Ok(t) if loose > 0.0 => Ok((loose, t)),
         _ => level(sampled).map(|t| (sampled, t)),

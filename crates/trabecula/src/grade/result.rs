@@ -63,7 +63,7 @@ impl Invariant {
         }
     }
 
-    /// Whether it is defined for so many components.
+    /// Whether it is defined for this number of components.
     fn takes(self, components: usize) -> bool {
         matches!(components, 6 | 9) || components == 3 && self == Invariant::Magnitude
     }
