@@ -17,6 +17,7 @@ use super::foot_point::LevelSurface;
 use super::nearest::Search;
 use super::periodic_components::{AROUND, Forest, Int3, present};
 use super::series::Series;
+use super::thickness::distance;
 use super::throat::throat;
 use geometry::math::{Mat3, Vec3, add, dot, inverse, norm, scale, sub, transpose, unit};
 
@@ -28,6 +29,8 @@ const EFFORT: f64 = 4e6;
 /// Share of a grid step by which values at the nodes may be too great, and by which they are uneven.
 const EXCESS: f64 = 0.25;
 const NOISE: f64 = 0.015;
+/// Share of a neck's radius within which two saddles are one.
+const SAME: f64 = 1e-3;
 /// Ratio of the nodes along each axis of the second grid, where the saddle is not found on the first.
 const FINER: f64 = 1.7;
 
@@ -67,6 +70,9 @@ struct Pass {
 
 /// The nodes of a grid on the torus, and what of the void each stands for.
 struct Nodes<'a> {
+    void: &'a Void<'a>,
+    /// f less the void's level.
+    series: &'a Series,
     search: &'a Search<'a>,
     surface: LevelSurface<'a>,
     feet: Vec<Vec3>,
@@ -107,7 +113,7 @@ impl Void<'_> {
             radii.map(|i| if open(f[i]) { largest_near(&search, &feet, i, 0.5 * step).1 } else { 0.0 }).collect();
         let surface = LevelSurface::new(series, 0.0, self.to_phase, 3.0 * step);
         let necks = self.necks.iter().map(|u| search.nearest_node(*u)).collect();
-        let nodes = Nodes { search: &search, surface, feet, radii, step, necks };
+        let nodes = Nodes { void: self, series, search: &search, surface, feet, radii, step, necks };
         let (radius, sure) = nodes.bottleneck(self.rank).unwrap_or_else(|| (nodes.at(self.saddle), true));
         (2.0 * radius, sure)
     }
@@ -263,8 +269,7 @@ impl Nodes<'_> {
     }
 
     /// Radius of a pass that is narrower than the grid's step, at the neck of the void near it: the ball of a node may then lie
-    /// in the chamber next to it. As the neck closes, the saddle of f is that of the distance, where the surface is nearly a circle
-    /// and patches of it decide little: of the two the narrower.
+    /// in the chamber next to it.
     fn narrow(&self, pass: &Pass) -> Option<f64> {
         if pass.radius > self.step {
             return None;
@@ -277,8 +282,7 @@ impl Nodes<'_> {
         };
         let near = self.necks.iter().map(|n| (norm(off(n)), n)).filter(|(d, _)| *d < 1.5 * self.step);
         let (_, (node, from)) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let measured = self.measured(*node, *from);
-        let radius = self.saddle(*node, *from).map_or(measured, |r| r.min(measured));
+        let radius = self.neck(*node, *from);
         (radius < pass.radius + NOISE * self.step).then_some(radius)
     }
 
@@ -301,12 +305,16 @@ impl Nodes<'_> {
     /// Radius at the saddle of the distance near a phase; the distance itself where there is none.
     fn at(&self, u: Vec3) -> f64 {
         let (node, from) = self.search.nearest_node(u);
-        self.saddle(node, from).unwrap_or_else(|| self.measured(node, from))
+        self.neck(node, from)
     }
 
-    /// The distance to the surface at a point `from` (mm) a node.
-    fn measured(&self, node: u32, from: Vec3) -> f64 {
+    /// Radius of a neck whose saddle of f lies `from` (mm) a node. As it closes, that saddle is the distance's too, the surface is
+    /// nearly a circle, and patches of it decide little: where they agree the distance at that saddle, or else the narrower.
+    fn neck(&self, node: u32, from: Vec3) -> f64 {
         let u = self.surface.moved(self.search.phase(node as usize), from);
-        norm(self.surface.nearest(u, sub(self.feet[node as usize], from)))
+        let sign = if self.void.side == Part::Lower { 1.0 } else { -1.0 };
+        let measured = distance(self.series, u, 0.0, sign, self.void.to_phase).unwrap_or(f64::INFINITY);
+        let other = self.saddle(node, from).filter(|r| (r / measured - 1.0).abs() > SAME);
+        other.map_or(measured, |r| r.min(measured))
     }
 }

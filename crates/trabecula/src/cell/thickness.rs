@@ -183,7 +183,7 @@ fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
 
 /// Distance (mm) from a solid point to the surface f = iso: the least of the feet on it from all crossings of the surface with
 /// the edges of a grid about the point, within the shortest of some rays. `None` where no ray meets the surface.
-fn distance(series: &Series, u: Vec3, iso: f64, sign: f64, to_phase: &Mat3) -> Option<f64> {
+pub(super) fn distance(series: &Series, u: Vec3, iso: f64, sign: f64, to_phase: &Mat3) -> Option<f64> {
     let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| series.gradients(u, v, g);
     let speed = spectral_norm(to_phase);
     // Points of a sphere on a Fibonacci spiral.
