@@ -133,7 +133,7 @@ def test_a_scan_is_a_cell(tmp_path):
         solid("scan/", threshold=250)
     with pytest.raises(lt.DesignError, match="period is for a mesh"):
         solid("scan/", period=6)
-    with pytest.raises(lt.DesignError, match="no pictures"):
+    with pytest.raises(lt.DesignError, match="does not exist"):
         solid("empty/")
 
 
