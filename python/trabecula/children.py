@@ -6,9 +6,11 @@ import contextlib
 import os
 import subprocess
 import sys
+import tempfile
 import threading
+from collections.abc import Sequence
 
-__all__ = ["bound", "python", "run", "stop"]
+__all__ = ["arrays", "bound", "python", "run", "stop"]
 
 #: The children that run, which an interrupt ends.
 running: set[subprocess.Popen] = set()
@@ -47,6 +49,23 @@ def run(command: list[str], folder: str, limit: float) -> str | None:
         said.seek(0)
         lines = said.read().decode("utf-8", "replace").strip().splitlines()
         return f"failed: {lines[-1] if lines else f'exit status {status}'}"
+
+
+def arrays(module: str, keys: Sequence[str], given: Sequence[str], name: str, reader: str, memory: float, limit: float) -> list:
+    """The arrays ``keys`` that a module of this package makes of what is ``given``, as a child of at most ``limit`` seconds and
+    ``memory`` bytes: it is run with these texts, the file that it writes them to, and the bytes. Raises ValueError with one
+    sentence on ``name``, the file that the package ``reader`` reads.
+    """
+    import numpy as np
+
+    with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
+        made = os.path.join(folder, "made.npz")
+        outcome = run(python(module, *given, made, str(memory)), folder, limit)
+        if outcome is not None:
+            failed, words = outcome.startswith("failed: "), outcome.removeprefix("failed: ")
+            raise ValueError(f"{name} cannot be read: {words if failed else f'{reader} {words}; is it damaged?'}")
+        with np.load(made) as found:
+            return [found[key] for key in keys]
 
 
 def bound(memory: float) -> None:

@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import children
@@ -38,38 +39,31 @@ def read(path: str | os.PathLike[str], limit: float | None = None) -> tuple[list
 
     ``path`` is a file, a folder, or has a * in its last part. Pictures stand in the order of their positions. Read in a process
     of its own, of at most ``limit`` seconds (20 and 1 for each MB, unless given) and of bounded memory. Raises ValueError for
-    what is no series of parallel pictures at equal distances along the axes.
+    what is no series of parallel pictures at equal distances along the axes. Source: DICOM PS3.3, C.7.6.2 and C.7.6.16.
     """
-    import numpy as np
-
     name = os.fsdecode(path)
-    files = sorted(os.path.abspath(f) for f in found(name))
+    files = sorted(os.path.abspath(f) for f in matching(name))
     if not files:
         there = "*" in os.path.basename(name) or os.path.exists(name)
         raise ValueError(f"{name}: no pictures (png, tif) and no DICOM files" if there else f"{name} does not exist")
-    try:
-        import pydicom  # noqa: F401
-    except ImportError:
+    if find_spec("pydicom") is None:
         raise ValueError(
             f"{name}: DICOM is read by pydicom, which is not installed: pip install 'trabecula[dicom]' "
             "(png and tif need nothing more)"
-        ) from None
+        )
     size = sum(map(os.path.getsize, files))
     seconds = 20 + 1e-6 * size if limit is None else limit
     with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
-        names, made = os.path.join(folder, "names"), os.path.join(folder, "made.npz")
+        # More names than a command line takes.
+        names = os.path.join(folder, "names")
         with open(names, "w", encoding="utf-8", errors="surrogateescape") as out:
             out.write("\0".join(files))
-        outcome = children.run(children.python("dicom", names, made, str(BASE + PER_BYTE * size)), folder, seconds)
-        if outcome is not None:
-            failed, words = outcome.startswith("failed: "), outcome.removeprefix("failed: ")
-            raise ValueError(f"{name} cannot be read: {words if failed else f'pydicom {words}; is it damaged?'}")
-        with np.load(made) as arrays:
-            shape, origin, step, values = (arrays[key] for key in KEYS)
-            return shape.tolist(), origin.tolist(), step.tolist(), values
+        memory = BASE + PER_BYTE * size
+        shape, origin, step, values = children.arrays("dicom", KEYS, [names], name, "pydicom", memory, seconds)
+    return shape.tolist(), origin.tolist(), step.tolist(), values
 
 
-def found(path: str) -> list[str]:
+def matching(path: str) -> list[str]:
     """The files of a folder, those that match the * of a path, or the file itself."""
     if os.path.isdir(path):
         path = os.path.join(path, "*")

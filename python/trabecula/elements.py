@@ -75,8 +75,6 @@ def read(
     Read in a process of its own, of at most ``limit`` seconds (20 and 2 for each MB, unless given) and of bounded memory:
     damaged files make readers hang. Raises ValueError for what cannot be read.
     """
-    import numpy as np
-
     name = os.path.abspath(os.fsdecode(path))
     kind = kind_of(name)
     if kind not in MESHIO_READS:
@@ -86,15 +84,9 @@ def read(
     needed(kind)
     size = os.path.getsize(name)
     seconds = 20 + 2e-6 * size if limit is None else limit
-    with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
-        made = os.path.join(folder, "made.npz")
-        outcome = children.run(children.python("elements", name, made, str(BASE + PER_BYTE * size)), folder, seconds)
-        if outcome is not None:
-            failed, words = outcome.startswith("failed: "), outcome.removeprefix("failed: ")
-            raise ValueError(f"{name} cannot be read: {words if failed else f'meshio {words}; is it damaged?'}")
-        with np.load(made) as found:
-            *arrays, named, names = (found[key] for key in KEYS)
-            return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
+    memory = BASE + PER_BYTE * size
+    *arrays, named, names = children.arrays("elements", KEYS, [name], name, "meshio", memory, seconds)
+    return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
 
 
 def child(name: str, made: str, memory: str) -> None:

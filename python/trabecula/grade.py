@@ -74,7 +74,7 @@ def grid(
         run along x, rows along y, pictures along z; DICOM as its axes say.
     origin: Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain
         it. [mm, optional]
-    step: Distance between numbers, one or three. VTI and VTK files contain it. [mm, optional]
+    step: Distance between numbers, one or three. VTI, VTK and DICOM files contain it. [mm, optional]
     array: Name of the array, where a file has several. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """

@@ -2,6 +2,8 @@
 //!
 //! Source: K. Wittig, CalculiX GraphiX manual, "Result Format (.frd)". Columns are fixed; neighbouring numbers may touch.
 
+use std::collections::BTreeSet;
+
 use rustc_hash::FxHashMap;
 
 use super::elements::Elements;
@@ -28,11 +30,15 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<Data, Fault> {
                 let step = whole(field(line, 58, 5)).unwrap_or(0);
                 file.result(&mut lines, wide(line).map_err(at)?, step)?;
             }
-            b"9999" => break,
+            b"9999" => return file.finish(),
             _ => {}
         }
     }
-    file.finish()
+    Err(fault(if file.elements.points.is_empty() {
+        "no nodes: is this a result of CalculiX?"
+    } else {
+        "the file ends before its last line, 9999; was it cut off?"
+    }))
 }
 
 /// Whether numbers of nodes have ten columns rather than five.
@@ -70,7 +76,10 @@ struct File<'a> {
     elements: Elements,
     /// Index of each node by its number.
     index: FxHashMap<u32, u32>,
+    /// The arrays of all steps, without numbers.
     arrays: Vec<(u32, Array)>,
+    /// The array that is wanted, of the last step that has it.
+    found: Option<Array>,
 }
 
 impl File<'_> {
@@ -159,7 +168,10 @@ impl File<'_> {
                 }
             }
         }
-        self.arrays.push((step, array));
+        self.arrays.push((step, Array { values: Vec::new(), ..array.clone() }));
+        if self.wants(&array.name, step) {
+            self.found = Some(array);
+        }
         Ok(())
     }
 
@@ -169,36 +181,38 @@ impl File<'_> {
         wanted == name && (of.is_empty() || of.parse() == Ok(step))
     }
 
-    fn finish(mut self) -> Result<Data, Fault> {
-        if self.elements.points.is_empty() {
-            return Err(fault("no nodes: is this a result of CalculiX?"));
-        }
+    /// Refuses an array that has no numbers at a node of an element; other nodes get zero.
+    fn complete(&self, array: &mut Array) -> Result<(), Fault> {
         let mut used = vec![false; self.elements.points.len()];
         self.elements.connectivity.iter().for_each(|n| used[*n as usize] = true);
-        let steps = self.arrays.iter().map(|a| a.0).collect::<std::collections::BTreeSet<u32>>();
-        let mut arrays: Vec<Array> = Vec::new();
-        for (step, mut array) in core::mem::take(&mut self.arrays) {
-            if let Some(tuples) = (!array.values.is_empty()).then(|| array.values.chunks_exact_mut(array.components)) {
-                let mut missing = 0;
-                for (tuple, used) in tuples.zip(&used) {
-                    if tuple.iter().any(|v| v.is_nan()) {
-                        missing += usize::from(*used);
-                        tuple.fill(0.0);
-                    }
-                }
-                if missing > 0 {
-                    let message = format!("{} has no numbers at {} of elements", array.name, counted(missing, "node"));
-                    return Err(fault(message));
-                }
+        let mut missing = 0;
+        for (tuple, used) in array.values.chunks_exact_mut(array.components.max(1)).zip(used) {
+            if tuple.iter().any(|v| v.is_nan()) {
+                missing += usize::from(used);
+                tuple.fill(0.0);
             }
+        }
+        match missing {
+            0 => Ok(()),
+            n => Err(fault(format!("{} has no numbers at {} of elements", array.name, counted(n, "node")))),
+        }
+    }
+
+    fn finish(mut self) -> Result<Data, Fault> {
+        let steps = self.arrays.iter().map(|a| a.0).collect::<BTreeSet<u32>>();
+        let mut arrays: Vec<Array> = Vec::new();
+        for (step, array) in core::mem::take(&mut self.arrays) {
             if steps.len() > 1 {
                 arrays.push(Array { name: format!("{}@{step}", array.name), ..array.clone() });
             }
             // The last step has the plain name.
-            match arrays.iter_mut().find(|a| a.name == array.name) {
-                Some(known) => *known = array,
-                None => arrays.push(array),
-            }
+            arrays.retain(|a| a.name != array.name);
+            arrays.push(array);
+        }
+        if let Some(mut found) = self.found.take() {
+            self.complete(&mut found)?;
+            arrays.retain(|a| a.name != self.name);
+            arrays.push(Array { name: self.name.to_string(), ..found });
         }
         self.elements.check()?;
         Ok(Data { shape: Shape::Mesh(self.elements), arrays })
@@ -267,14 +281,14 @@ mod tests {
         [-x, -y, -z, x - 1.0, y, -2.0 * z]
     }
 
+    /// Numbers of twelve columns, as C writes %12.5E.
     fn columns(of: &[f64]) -> String {
-        of.iter()
-            .map(|v| {
-                let (mantissa, exponent) =
-                    format!("{v:.5e}").split_once('e').map(|(m, e)| (m.to_string(), e.to_string())).unwrap();
-                format!("{:>12}", format!("{mantissa}E{:+03}", exponent.parse::<i32>().unwrap()))
-            })
-            .collect()
+        let one = |v: &f64| {
+            let text = format!("{v:.5E}");
+            let (mantissa, exponent) = text.split_once('E').expect("an exponent");
+            format!("{:>12}", format!("{mantissa}E{:+03}", exponent.parse::<i32>().expect("a whole number")))
+        };
+        of.iter().map(one).collect()
     }
 
     #[test]
@@ -290,8 +304,10 @@ mod tests {
                 for (p, t) in elements.points.iter().zip(array.values.chunks(6)) {
                     assert_eq!(t, stress(p, step), "{name} at {p:?}");
                 }
-                let names: Vec<_> = data.arrays.iter().map(|a| (a.name.as_str(), a.components)).collect();
-                assert_eq!(names[..3], [("DISP@1", 3), ("DISP", 3), ("STRESS@1", 6)]);
+                let mut names: Vec<_> = data.arrays.iter().map(|a| (a.name.as_str(), a.components)).collect();
+                names.sort_unstable();
+                let all = [("DISP", 3), ("DISP@1", 3), ("DISP@2", 3), ("STRESS", 6), ("STRESS@1", 6), ("STRESS@2", 6)];
+                assert_eq!(names, all);
                 // The two cubes of side one and the half of one.
                 let (mesh, _) = elements.tet_mesh(true).expect("solid");
                 let volume: f64 =
@@ -321,9 +337,8 @@ mod tests {
         let cut =
             text.lines().filter(|l| !l.starts_with(" -1         3") || l.len() < 60).collect::<Vec<_>>().join("\n");
         assert!(refused(&cut).contains("STRESS has no numbers at 1 node of elements"), "{}", refused(&cut));
-        for n in (0..text.len()).step_by(37) {
-            // Whatever is left of a file, it is read or refused.
-            let _ = read(&text.as_bytes()[..n], "STRESS");
+        for n in (0..text.len() - 5).step_by(37) {
+            assert!(read(&text.as_bytes()[..n], "STRESS").is_err(), "{n} of {}", text.len());
         }
     }
 }

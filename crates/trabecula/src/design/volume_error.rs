@@ -49,10 +49,17 @@ fn of_lattice(lattice: &Lattice, points: &[Vec3], edge: f64) -> f64 {
     let cases: Vec<(f64, Vec3)> = cases.flat_map(|f| CORNERS.map(|c| (f, c))).collect();
     let off = |(fraction, corner): &(f64, Vec3)| {
         let made = period(lattice, *fraction, wavelengths, *corner, meshed);
-        (made / wavelengths.iter().product::<f64>() / fraction - 1.0).abs()
+        (made / wavelengths.iter().product::<f64>() - fraction).abs()
     };
     let worst = cases.par_iter().map(off).reduce(|| 0.0, f64::max);
-    worst * (edge / meshed).powi(2)
+    let mean = match min == max {
+        true => min,
+        false => {
+            let all = sample::values(points, |points, out| lattice.fractions(points, out));
+            all.iter().sum::<f64>() / all.len() as f64
+        }
+    };
+    worst / mean * (edge / meshed).powi(2)
 }
 
 /// The volume (mm³) that a mesh of one period has; 0 where the grid finds no surface.

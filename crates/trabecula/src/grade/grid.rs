@@ -19,7 +19,7 @@ pub struct GridKind {
     /// Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain it.
     #[kind(unit = "mm")]
     origin: Option<[f64; 3]>,
-    /// Distance between numbers, one or three. VTI and VTK files contain it.
+    /// Distance between numbers, one or three. VTI, VTK and DICOM files contain it.
     #[kind(unit = "mm")]
     step: Option<OneOrThree>,
     /// Name of the array, where a file has several.

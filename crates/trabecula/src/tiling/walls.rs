@@ -48,6 +48,13 @@ fn sums(of: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     of.fold([0.0; 2], |[sum, area], [v, a]| [sum + v * a, area + a])
 }
 
+/// The mean of something, weighted by area, over the pieces of the mid-surface in some tetrahedra; summed in their order.
+fn mean(tets: &[usize], pieces: &[Piece], of: impl Fn(usize, &Piece) -> [f64; 2] + Sync) -> f64 {
+    let found: Vec<[f64; 2]> = tets.par_iter().map(|t| sums(pieces.iter().map(|p| of(*t, p)))).collect();
+    let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
+    sum / area
+}
+
 impl Tiling {
     /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, by its area. `None` for other parts, for
     /// transitions, and where there is no mid-surface.
@@ -92,14 +99,8 @@ impl Tiling {
 
     /// The volume of walls over the area of their mid-surface, mm.
     fn mean_wall(&self, pieces: &[Piece]) -> f64 {
-        let first_order = |tets: Vec<usize>| {
-            let found = tets.par_iter().map(|t| sums(pieces.iter().map(|p| self.first_order(*t, p))));
-            let found: Vec<[f64; 2]> = found.collect();
-            let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
-            sum / area
-        };
-        let everywhere = first_order(self.many(pieces));
-        self.realised(pieces) * everywhere / first_order(self.some())
+        let first_order = |tets: &[usize]| mean(tets, pieces, |t, p| self.first_order(t, p));
+        self.realised(pieces) * first_order(&self.many(pieces)) / first_order(&self.some())
     }
 
     /// The sheet whose walls are on average as thick as asked (mm; one number, or one for each node, of which the mean over the
@@ -111,13 +112,7 @@ impl Tiling {
             let n = self.map.tet(t).map(|n| asked[(n as usize).min(asked.len() - 1)]);
             [(0..4).map(|i| p.at[i] * n[i]).sum::<f64>(), self.first_order(t, p)[1]]
         };
-        let everywhere = || {
-            let some = self.many(&pieces);
-            let found: Vec<[f64; 2]> = some.par_iter().map(|t| sums(pieces.iter().map(|p| at(*t, p)))).collect();
-            let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
-            sum / area
-        };
-        let wanted = if let [one] = asked { *one } else { everywhere() };
+        let wanted = if let [one] = asked { *one } else { mean(&self.many(&pieces), &pieces, at) };
         for _ in 0..ROUNDS {
             checkpoint();
             let by = wanted / self.mean_wall(&pieces);

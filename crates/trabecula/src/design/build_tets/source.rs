@@ -73,7 +73,7 @@ pub(super) fn from_file(
         DesignError::new(&at, message).found(&file.path)
     };
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
-    let ZonedElements { elements, zones, names } = if ["vtu", "vtk", "frd"].contains(&kind.as_str()) {
+    let ZonedElements { elements, zones, names } = if formats::RESULTS.contains(&kind.as_str()) {
         let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
         let data = formats::read_result(&bytes, &kind, "").map_err(wrong)?;
         let Shape::Mesh(elements) = data.shape else {
