@@ -9,7 +9,7 @@ mod cavity;
 mod components;
 mod triangle_quality;
 
-pub use crate::mesh::{is_embedded, self_intersections};
+pub use crate::mesh::self_intersections;
 pub use cavity::{Cavity, cavities};
 use components::Components;
 pub use components::non_manifold_vertices;
