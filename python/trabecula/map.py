@@ -48,7 +48,7 @@ def spartan(
 
 @named
 def phase(
-    wavelength: float | dict | Sequence[float | dict],
+    wavelength: float | dict | Sequence[float | dict] | None = None,
     rotate: Sequence[float | dict] | None = None,
     *,
     weight: float | dict | None = None,
@@ -68,7 +68,8 @@ def phase(
     """Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At
     most one of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 
-    wavelength: Cell edge, one number or three; each may vary. [mm, above 0]
+    wavelength: Cell edge, one number or three; each may vary. Left out where the level has a fraction and a thickness
+        or a pore, from which it follows wherever they vary; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. Each may vary. [degrees, optional]
     weight: Weight of the cell's shape here, compared with other positions (0 or more): where no map can follow
         everything, the error goes where this is small. [optional]

@@ -15,6 +15,7 @@ mod formula;
 mod grid;
 mod linear;
 mod polyline;
+mod product;
 mod quantity;
 mod radial;
 mod rbf;
@@ -32,6 +33,7 @@ pub use depth::Depth;
 pub use formula::Formula;
 pub use linear::Linear;
 pub use polyline::Polyline;
+pub use product::Product;
 pub(crate) use quantity::{BuildGrade, Quantity, key_of};
 pub use radial::Radial;
 pub use rbf::Rbf;
@@ -196,6 +198,7 @@ mod tests {
             Polyline::new(chain(), false, None, None).unwrap().into(),
             Polyline::new(chain(), true, Some([0.1, -0.2, 1.0]), None).unwrap().into(),
             Rbf::new(chain(), &values, Some(1.1), None).unwrap().into(),
+            Product::of(formula("x + y*z - 0.1"), grid().into()),
         ]
     }
 

@@ -34,6 +34,7 @@ use std::sync::Arc;
 
 use crate::environment::Environment;
 use crate::field::Block;
+use crate::grade::Grade;
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3};
@@ -59,12 +60,57 @@ pub enum MapKind {
 pub(crate) trait BuildMap {
     /// The map. `path` is that of the kind's table.
     fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError>;
+
+    /// The Jacobian (turns per mm) of cells of 1 mm, or of the ratios of their edges, where their size is left out, as the level's
+    /// fraction and `length` give it.
+    fn unit(&self, length: &str, path: &str, _: &Environment) -> Result<Mat3, DesignError> {
+        Err(not_sized(length, path))
+    }
+
+    /// The map with cells that are `edge` (mm) times as large as those of `unit`.
+    fn sized(&self, _edge: &Grade, length: &str, path: &str, _: &Environment) -> Result<Map, DesignError> {
+        Err(not_sized(length, path))
+    }
 }
+
+/// Explains that cells of this map have a size of their own.
+fn not_sized(length: &str, path: &str) -> DesignError {
+    let message = format!(
+        "fraction and {length} together give the wavelength of map.affine, map.spartan and map.phase; with this map give its \
+         wavelength, and one of the two amounts"
+    );
+    DesignError::new(path, message)
+}
+
+/// Explains that a cell edge was given twice.
+fn given_twice(length: &str, path: &str) -> DesignError {
+    let message =
+        format!("fraction and {length} give the wavelength; leave it out, or give one of the two amounts only");
+    DesignError::new(format!("{path}.wavelength"), message)
+}
+
+/// Explains that a cell edge was left out.
+const NO_WAVELENGTH: &str =
+    "\"wavelength\" is missing: cell edge, mm; only a level with a fraction and a thickness or pore goes without";
 
 impl MapKind {
     /// The map at `environment.path`.
     pub(crate) fn build(&self, environment: &Environment) -> Result<Map, DesignError> {
-        self.family().build(&format!("{}.{}", environment.path, self.key()), environment)
+        self.family().build(&self.path(environment), environment)
+    }
+
+    /// As `BuildMap::unit`.
+    pub(crate) fn unit(&self, length: &str, environment: &Environment) -> Result<Mat3, DesignError> {
+        self.family().unit(length, &self.path(environment), environment)
+    }
+
+    /// As `BuildMap::sized`.
+    pub(crate) fn sized(&self, edge: &Grade, length: &str, environment: &Environment) -> Result<Map, DesignError> {
+        self.family().sized(edge, length, &self.path(environment), environment)
+    }
+
+    fn path(&self, environment: &Environment) -> String {
+        format!("{}.{}", environment.path, self.key())
     }
 }
 

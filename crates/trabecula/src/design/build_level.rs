@@ -3,10 +3,10 @@
 use super::built_report::Varied;
 use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
-use crate::cell::{Cell, NoPore, Part};
+use crate::cell::{Cell, Distance, NoPore, Part};
 use crate::environment::Environment;
 use crate::field::Field;
-use crate::grade::{Grade, Quantity, Remapped, Stops, key_of};
+use crate::grade::{Grade, Product, Quantity, Remapped, Stops, key_of};
 use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
@@ -80,7 +80,7 @@ pub(super) fn level(
         }
     }
     if let (Some(length @ ("thickness", _)), PartSpec::Sheet) = (length, part) {
-        return Ok(Level::Thickness(Grade::Constant(length_number(length, environment)?)));
+        return Ok(Level::Thickness(length_grade(length, environment)?));
     }
     if key == "pore" {
         return pore(&amount, part.into(), cell, map, environment);
@@ -186,21 +186,14 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
 }
 
 /// The thickness or pore (mm) that is given together with a fraction.
-fn length_number((key, spec): (&str, &GradeSpec), environment: &Environment) -> Result<f64, DesignError> {
+fn length_grade((key, spec): (&str, &GradeSpec), environment: &Environment) -> Result<Grade, DesignError> {
     let path = format!("{}.{key}", environment.path);
-    constant(spec, key, &Quantity::new(path, environment, key_of::<AmountSpec>(key)))
+    spec.build(&Quantity::new(path, environment, key_of::<AmountSpec>(key)))
 }
 
-/// A number that is the same everywhere.
-fn constant(spec: &GradeSpec, length: &str, quantity: &Quantity) -> Result<f64, DesignError> {
-    spec.build(quantity)?.constant().ok_or_else(|| {
-        let message = format!(
-            "fraction and {length} together give one wavelength and are constant; found one that varies: give map.phase \
-             a wavelength that varies, and one of the two amounts"
-        );
-        DesignError::new(&quantity.path, message)
-    })
-}
+/// Fractions at which the length of cells of 1 mm is found where the fraction varies; between them the wavelength of a given length
+/// is linear in the fraction.
+const FRACTIONS: usize = 65;
 
 /// The map of a lattice whose level is a fraction and a thickness or pore: lengths scale with the wavelength, so it is the asked
 /// length over the one that cells of 1 mm have at this fraction.
@@ -218,34 +211,54 @@ pub(super) fn solved_map(
         return Err(DesignError::new(path("pore"), message));
     }
     let key = length.0;
-    let fraction = constant(amount.grade(), key, &amount.quantity(path(amount.key()), at_level))?;
-    let asked = length_number(length, at_level)?;
-    let unit = spec.map.scaled(1.0, key, &at_map.path)?.build(at_map)?;
+    let fraction = amount.grade().build(&amount.quantity(path(amount.key()), at_level))?;
+    let asked = length_grade(length, at_level)?;
+    let to_phase = spec.map.unit(key, at_map)?;
     let part = Part::from(spec.part);
-    let found = if key == "pore" {
-        let pores = cell.pores(part, cell.level(part, fraction), &unit.typical());
-        pores.into_iter().reduce(f64::min)
-    } else if part == Part::Sheet {
-        mid_surface(cell, path("thickness"))?;
-        let lattice = Lattice::new(cell.clone(), unit, part, Level::Thickness(Grade::Constant(1.0)));
-        lattice.distance().map(|d| 2.0 * d.iso(part, fraction).0)
-    } else {
-        cell.thickness(part, cell.level(part, fraction), &unit.typical())
-    };
-    let Some(found) = found.filter(|w| *w > 0.0 && w.is_finite()) else {
-        if key == "pore" {
-            let message =
-                format!("at solid fraction {fraction} no ball passes through the void; give a smaller fraction");
-            return Err(DesignError::new(path(key), message));
+    let wall = match (key, part) {
+        ("thickness", Part::Sheet) => {
+            mid_surface(cell, path(key))?;
+            Some(Distance::new(cell.series(), &to_phase))
         }
-        let whole = cell.connected_fraction(part);
-        let ranges = whole.iter().map(|[a, b]| format!("{a:.4} to {b:.4}")).collect::<Vec<_>>().join(" and ");
-        let message = format!(
-            "at solid fraction {fraction} the network is not connected and has no neck; it is in one piece at fractions {ranges}"
-        );
-        return Err(DesignError::new(path("thickness"), message));
+        _ => None,
     };
-    spec.map.scaled(asked / found, key, &at_map.path)?.build(at_map)
+    // Wavelength over length, at a fraction.
+    let ratio = |fraction: f64| {
+        let found = match (&wall, key) {
+            (Some(wall), _) => Some(2.0 * wall.iso(part, fraction).0),
+            (None, "pore") => cell.pores(part, cell.level(part, fraction), &to_phase).into_iter().reduce(f64::min),
+            (None, _) => cell.thickness(part, cell.level(part, fraction), &to_phase),
+        };
+        found.filter(|w| *w > 0.0 && w.is_finite()).map(|w| 1.0 / w).ok_or(fraction)
+    };
+    let none = |fraction| DesignError::new(path(key), no_length(key, part, cell, fraction));
+    let ratio = match fraction.constant() {
+        Some(fraction) => Grade::Constant(ratio(fraction).map_err(none)?),
+        None => {
+            let mut found = vec![0.0; at_level.points.len()];
+            fraction.values(at_level.points, &mut found);
+            let Varied { min, max } = Varied::of(&found);
+            let at = |i: usize| min + (max - min) * i as f64 / (FRACTIONS - 1) as f64;
+            let stops = (0..FRACTIONS).into_par_iter().map(|i| Ok([at(i), ratio(at(i))?]));
+            let mut stops = stops.collect::<Result<Vec<_>, f64>>().map_err(none)?;
+            stops.dedup_by(|a, b| a[0] == b[0]);
+            Grade::from(Remapped::new(fraction, Stops(stops)))
+        }
+    };
+    spec.map.sized(&Product::of(asked, ratio), key, at_map)
+}
+
+/// Explains that a part has no such length at a fraction.
+fn no_length(key: &str, part: Part, cell: &Cell, fraction: f64) -> String {
+    let fraction = number(fraction);
+    if key == "pore" {
+        return format!("at solid fraction {fraction} no ball passes through the void; give a smaller fraction");
+    }
+    let whole = cell.connected_fraction(part);
+    let ranges = whole.iter().map(|[a, b]| format!("{a:.4} to {b:.4}")).collect::<Vec<_>>().join(" and ");
+    format!(
+        "at solid fraction {fraction} the network is not connected and has no neck; it is in one piece at fractions {ranges}"
+    )
 }
 
 /// Refuses a cell without a mid-surface.

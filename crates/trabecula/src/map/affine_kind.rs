@@ -1,8 +1,10 @@
 //! Affine maps, as they are declared.
 
-use super::{Affine, BuildMap, Map, MapKind, shared};
+use super::{Affine, BuildMap, Map, NO_WAVELENGTH, given_twice, shared};
 use crate::environment::Environment;
+use crate::grade::Grade;
 use crate::kind::{At, DesignError, Kind, OneOrThree, Value};
+use geometry::math::Mat3;
 
 /// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
@@ -33,8 +35,7 @@ pub struct Cells {
 
 impl Cells {
     fn wavelengths(&self, path: &str) -> Result<[f64; 3], DesignError> {
-        let message = "\"wavelength\" is missing: cell edge, mm; only a level with a fraction and a thickness or pore goes without";
-        self.wavelength.map(OneOrThree::three).ok_or_else(|| DesignError::new(path, message))
+        self.wavelength.map(OneOrThree::three).ok_or_else(|| DesignError::new(path, NO_WAVELENGTH))
     }
 
     /// Cells of `scale` mm, or of `scale` times the ratios.
@@ -42,38 +43,16 @@ impl Cells {
         let wavelength = match self.wavelength {
             None => OneOrThree::One(scale),
             Some(OneOrThree::Three(ratios)) => OneOrThree::Three(ratios.map(|r| r * scale)),
-            Some(OneOrThree::One(found)) => {
-                let message = format!(
-                    "fraction and {length} give the wavelength; leave it out, or give one of the two amounts only"
-                );
-                let path = format!("{path}.wavelength");
-                return Err(DesignError::new(path, message).found(found.to_string()));
-            }
+            Some(OneOrThree::One(found)) => return Err(given_twice(length, path).found(found.to_string())),
         };
         Ok(Cells { wavelength: Some(wavelength), ..*self })
     }
-}
 
-impl MapKind {
-    /// The map at `path` with cells of `scale` mm, where their size is not given, or `scale` times as large as their ratios.
-    /// `length` is the amount that gives the size.
-    pub(crate) fn scaled(&self, scale: f64, length: &str, path: &str) -> Result<MapKind, DesignError> {
-        let path = format!("{path}.{}", self.key());
-        match self {
-            MapKind::Affine(map) => {
-                Ok(MapKind::Affine(AffineKind { cells: map.cells.scaled(scale, length, &path)?, skew: map.skew }))
-            }
-            MapKind::Spartan(map) => {
-                Ok(MapKind::Spartan(SpartanKind { cells: map.cells.scaled(scale, length, &path)? }))
-            }
-            _ => {
-                let message = format!(
-                    "fraction and {length} together give the wavelength of map.affine and map.spartan; with this map give \
-                     its wavelength, which may be a grade, and one of the two amounts"
-                );
-                Err(DesignError::new(path, message))
-            }
-        }
+    /// As `scaled`, by a scale that has to be the same everywhere.
+    fn sized(&self, edge: &Grade, length: &str, path: &str) -> Result<Cells, DesignError> {
+        let message = format!("fraction and {length} vary, and this map is the same everywhere; use map.phase");
+        let edge = edge.constant().ok_or_else(|| DesignError::new(path, message))?;
+        self.scaled(edge, length, path)
     }
 }
 
@@ -137,11 +116,29 @@ impl BuildMap for AffineKind {
         let wavelength = self.cells.wavelengths(path)?;
         shared(Affine::rigid(wavelength, self.cells.rotate, self.cells.offset, &self.skew.shears()), path)
     }
+
+    fn unit(&self, length: &str, path: &str, environment: &Environment) -> Result<Mat3, DesignError> {
+        let unit = AffineKind { cells: self.cells.scaled(1.0, length, path)?, ..*self };
+        Ok(unit.build(path, environment)?.typical())
+    }
+
+    fn sized(&self, edge: &Grade, length: &str, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        AffineKind { cells: self.cells.sized(edge, length, path)?, ..*self }.build(path, environment)
+    }
 }
 
 impl BuildMap for SpartanKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
         shared(Affine::spartan(self.cells.wavelengths(path)?, self.cells.rotate, self.cells.offset), path)
+    }
+
+    fn unit(&self, length: &str, path: &str, environment: &Environment) -> Result<Mat3, DesignError> {
+        let unit = SpartanKind { cells: self.cells.scaled(1.0, length, path)? };
+        Ok(unit.build(path, environment)?.typical())
+    }
+
+    fn sized(&self, edge: &Grade, length: &str, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        SpartanKind { cells: self.cells.sized(edge, length, path)? }.build(path, environment)
     }
 }
 

@@ -1,20 +1,22 @@
 //! The solved map, as it is declared.
 
-use super::{Axis, BuildMap, Map, Orientation, Phase, Settings, Wanted, shared};
+use super::{Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Wanted, given_twice, shared};
 use crate::environment::Environment;
 use crate::field::Field;
-use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, lines, several};
+use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, several};
 use crate::kind::{DesignError, Fault, Key, Kind};
 use geometry::fault::number;
+use geometry::math::{IDENTITY, Mat3};
 
 /// Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At most one of
 /// rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Phase", noun = "a phase map")]
 pub struct PhaseKind {
-    /// Cell edge, one number or three; each may vary.
+    /// Cell edge, one number or three; each may vary. Left out where the level has a fraction and a thickness or a pore, from which it
+    /// follows wherever they vary; three numbers are ratios then.
     #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
-    wavelength: GradeOrThree,
+    wavelength: Option<GradeOrThree>,
     /// How cells are turned.
     #[kind(flatten)]
     orientation: OrientationKind,
@@ -196,18 +198,51 @@ pub enum Domain {
 
 impl BuildMap for PhaseKind {
     fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let length = key_of::<PhaseKind>("wavelength");
+        let length = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, length));
+        let at = format!("{path}.wavelength");
+        let wavelength = match &self.wavelength {
+            None => return Err(DesignError::new(path, NO_WAVELENGTH)),
+            Some(GradeOrThree::One(g)) => {
+                let one = length(g, at)?;
+                [one.clone(), one.clone(), one]
+            }
+            Some(GradeOrThree::Three(of)) => each(of, &at, &length)?,
+        };
+        self.with(wavelength, path, environment)
+    }
+
+    fn unit(&self, length: &str, path: &str, _: &Environment) -> Result<Mat3, DesignError> {
+        let ratios = self.ratios(length, path)?;
+        let mut unit = IDENTITY;
+        (0..3).for_each(|a| unit[a][a] = 1.0 / ratios[a]);
+        Ok(unit)
+    }
+
+    fn sized(&self, edge: &Grade, length: &str, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let ratios = self.ratios(length, path)?;
+        self.with(ratios.map(|r| Product::of(edge.clone(), Grade::Constant(r))), path, environment)
+    }
+}
+
+impl PhaseKind {
+    /// The ratios of the cells' edges, where their size is left out.
+    fn ratios(&self, length: &str, path: &str) -> Result<[f64; 3], DesignError> {
+        match &self.wavelength {
+            None => Ok([1.0; 3]),
+            Some(GradeOrThree::Three(of)) => match of.each_ref() {
+                [GradeSpec::Constant(a), GradeSpec::Constant(b), GradeSpec::Constant(c)] => Ok([*a, *b, *c]),
+                _ => Err(given_twice(length, path)),
+            },
+            Some(GradeOrThree::One(_)) => Err(given_twice(length, path)),
+        }
+    }
+
+    /// The map of these wavelengths (mm).
+    fn with(&self, wavelength: [Grade; 3], path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
         let weight_key = key_of::<PhaseKind>("weight");
         let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, weight_key));
-        let length = key_of::<PhaseKind>("wavelength");
-        let length = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, length));
-        let wavelength = match &self.wavelength {
-            GradeOrThree::One(g) => {
-                let one = length(g, below("wavelength"))?;
-                [one.clone(), one.clone(), one]
-            }
-            GradeOrThree::Three(of) => each(of, &below("wavelength"), &length)?,
-        };
         if let (Some(length), OrientationKind::Axes(_) | OrientationKind::Rotate(_)) = (self.smooth, &self.orientation)
         {
             let message =

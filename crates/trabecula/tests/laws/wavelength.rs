@@ -1,12 +1,14 @@
 //! A fraction and a thickness together give the wavelength.
 
+use geometry::math::{IDENTITY, Vec3};
 use proptest::prelude::*;
-use trabecula::cell::{Cell, Part, Series, catalogue, named};
+use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
 use trabecula::design::{Built, Design, DesignError, NoFiles};
 
+use trabecula::field::Field;
 use trabecula::report::Varying;
 
-use crate::common::cases;
+use crate::common::{Random, cases};
 
 fn built(cell: &str, part: &str, map: &str, level: &str) -> Result<Built, DesignError> {
     let text = format!(
@@ -65,6 +67,54 @@ proptest! {
     }
 }
 
+/// Where the fraction or the length varies, cells are those of the wavelength that varies likewise: the length over the one that
+/// the cell has per mm of its edge at the fraction there, for walls, necks and pores.
+#[test]
+fn graded_fractions_and_lengths_are_graded_wavelengths() {
+    let linear = |stops: &[f64]| {
+        let last = (stops.len() - 1) as f64;
+        let at = |(i, v): (usize, &f64)| format!("[{}, {v}]", 9.0 * i as f64 / last - 4.5);
+        let stops = stops.iter().enumerate().map(at).collect::<Vec<_>>().join(", ");
+        format!("{{ linear = {{ along = [1, 0, 0], stops = [{stops}] }} }}")
+    };
+    let mut some = Random(5);
+    let points: Vec<Vec3> = (0..500).map(|_| some.point(4.5)).collect();
+    for (cell, part, key) in [
+        ("gyroid", Part::Sheet, "thickness"),
+        ("diamond", Part::Lower, "thickness"),
+        ("primitive", Part::Upper, "pore"),
+    ] {
+        let series = Series::new(named(cell).expect("named").terms()).expect("series");
+        let of = Cell::new(series.clone());
+        let wall = Distance::new(&series, &IDENTITY);
+        let per_mm = |fraction: f64| match (key, part) {
+            ("pore", _) => of.pores(part, of.level(part, fraction), &IDENTITY)[0],
+            (_, Part::Sheet) => 2.0 * wall.iso(part, fraction).0,
+            _ => of.thickness(part, of.level(part, fraction), &IDENTITY).expect("a neck"),
+        };
+        let word = ["sheet", "lower", "upper"][part as usize];
+        let compare = |fraction: &str, length: &str, wavelength: &[f64]| {
+            let solved = built(cell, word, "map.phase = {}", &format!("fraction = {fraction}, {key} = {length}"));
+            let map = format!("map.phase.wavelength = {}", linear(wavelength));
+            let level =
+                if part == Part::Sheet { format!("thickness = {length}") } else { format!("fraction = {fraction}") };
+            let [solved, given] = [solved, built(cell, word, &map, &level)].map(|made| {
+                let mut values = vec![0.0; points.len()];
+                made.expect("built").lattices[0].1.values(&points, &mut values);
+                values
+            });
+            let apart = solved.iter().zip(&given).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+            // Rounding of the wavelengths, summed up along the part.
+            assert!(apart < 1e-9, "{cell} {word}, {fraction}, {length}: {apart}");
+        };
+        // The wavelength is linear between 65 fractions.
+        let fractions: Vec<f64> = (0..65).map(|i| 0.38 + 0.04 * f64::from(i) / 64.0).collect();
+        let wavelengths: Vec<f64> = fractions.iter().map(|f| 0.5 / per_mm(*f)).collect();
+        compare(&linear(&[0.38, 0.42]), "0.5", &wavelengths);
+        compare("0.4", &linear(&[0.5, 0.55]), &[0.5, 0.55].map(|w| w / per_mm(0.4)));
+    }
+}
+
 #[test]
 fn what_contradicts_is_refused() {
     let refused = |map: &str, level: &str| built("gyroid", "sheet", map, level).err().expect("refused").to_string();
@@ -74,7 +124,11 @@ fn what_contradicts_is_refused() {
     assert!(refused("map.affine = {}", "iso = 0.3, thickness = 0.4").contains("at once"));
     assert!(
         refused("map.cylinder = { around = 20, wavelength = 4 }", both)
-            .contains("give the wavelength of map.affine and map.spartan")
+            .contains("give the wavelength of map.affine, map.spartan and map.phase")
     );
     assert!(refused("map.affine = {}", "fraction = \"x\", thickness = 0.4").contains("expected a number or a grade"));
+    let graded = "fraction.linear = { along = [1, 0, 0], stops = [[0, 0.2], [9, 0.4]] }, thickness = 0.4";
+    assert!(refused("map.affine = {}", graded).contains("use map.phase"));
+    assert!(refused("map.phase.wavelength = 4", both).contains("leave it out"));
+    assert!(refused("map.phase = {}", "fraction = 0.3").contains("\"wavelength\" is missing"));
 }
