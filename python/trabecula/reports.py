@@ -390,6 +390,7 @@ class LatticeReport(Report):
 
     _parts = {
         "distortion": "DistortionReport",
+        "periods": "PeriodReport",
         "tets": "TilingReport",
     }
 
@@ -405,6 +406,8 @@ class LatticeReport(Report):
     """The level t. Where the thickness is given: the constant level of equal fraction. None for cells by zones."""
     part: str
     """sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)."""
+    periods: list[PeriodReport] | None
+    """Cells round the holes of the region; None where the phases of a solved map have one value."""
     pore: float | list[float] | None
     """Diameter of the largest ball that passes through the void from cell to cell, mm; of a sheet the lesser of its two
     sides. Zero where the void is closed."""
@@ -498,6 +501,19 @@ class NarrowestNeck(Report):
     """Diameter, mm, to within one step."""
     place: list[float]
     """Position, mm."""
+
+
+class PeriodReport(Report):
+    """The whole numbers of cells round a hole of the region."""
+
+    along: list[float]
+    """Direction of the line there."""
+    asked: list[float]
+    """The numbers that least squares ask for."""
+    at: list[float]
+    """A point in the hole, on the line through it that cells go round, mm."""
+    cells: list[int]
+    """Whole cells round the line along each axis of the cell; negative against a right-handed screw."""
 
 
 class QualityReport(Report):

@@ -87,6 +87,8 @@ def _lattice(it: Report) -> Iterator[str]:
         yield from _tiling(it.tets)
     if it.distortion:
         yield from _distortion(it.distortion)
+    for period in it.periods or []:
+        yield _period(period)
 
 
 def _beams_title(it: Report) -> str:
@@ -165,6 +167,12 @@ def _distortion(it: Report) -> Iterator[str]:
         f"most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
     )
     yield f"  turn       {it.turn:.1f}° per cell at most"
+
+
+def _period(it: Report) -> str:
+    axes = zip(("first", "second", "third"), it.cells, it.asked, strict=True)
+    round_it = [f"{n} cells along the {axis} axis ({asked:.2f} asked for)" for axis, n, asked in axes if n or abs(asked) > 0.05]
+    return f"  hole       at {point(it.at)} mm along {point(it.along)}: {', '.join(round_it) or 'no cells go round'}"
 
 
 def _blend(it: Report) -> Iterator[str]:

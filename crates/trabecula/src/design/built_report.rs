@@ -10,7 +10,7 @@ use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
-use crate::map::{Distortion, Spread};
+use crate::map::{Distortion, Period, Spread};
 use crate::report::*;
 use crate::truss::Beams;
 use geometry::math::Mat3;
@@ -147,6 +147,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
         distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
+        periods: lattice.map.solved().map(|map| periods(map.periods())).filter(|p| !p.is_empty()),
         tets: None,
     }
 }
@@ -214,6 +215,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
         connected_fraction: Vec::new(),
         truncation: None,
         distortion: None,
+        periods: None,
         tets: None,
     };
     if !it.zones.is_empty() {
@@ -342,4 +344,16 @@ fn distortion(d: &Distortion) -> DistortionReport {
         curl: spread(&d.curl),
         turn: d.turn,
     }
+}
+
+/// The cells round holes; positions to a millionth of a millimetre.
+fn periods(of: &[Period]) -> Vec<PeriodReport> {
+    let rounded = |v: [f64; 3]| v.map(|v| (v * 1e6).round() / 1e6 + 0.0);
+    let one = |p: &Period| PeriodReport {
+        at: rounded(p.at),
+        along: rounded(p.along),
+        cells: p.cells,
+        asked: rounded(p.asked),
+    };
+    of.iter().map(one).collect()
 }

@@ -65,6 +65,7 @@ impl Axis {
         nodes: &[Vec3],
         key: &str,
         smoothing: Option<&Smoothing>,
+        outside: Option<&[f64]>,
     ) -> Result<Vec<Vec3>, Fault> {
         let mut found = self.vectors(nodes, key)?;
         let own = smoothing.map(|_| found.clone());
@@ -84,7 +85,7 @@ impl Axis {
             (Axis::Vector(_), Some(own)) => {
                 found.iter_mut().zip(&own).for_each(|(v, own)| *v = toward(*v, *own));
             }
-            (Axis::Line(_), _) => comb(grid, &mut found, |_| 1.0, |_, v, to| toward(*v, *to)),
+            (Axis::Line(_), _) => comb(grid, &mut found, first_in(outside, |_| 1.0), |_, v, to| toward(*v, *to)),
         }
         Ok(found)
     }
@@ -105,9 +106,16 @@ fn constant(of: &[Grade]) -> bool {
 }
 
 impl Orientation {
-    /// The frames at the nodes of a grid. Where signs and axes are not given, they are chosen so that neighbours agree.
-    pub(super) fn frames(&self, grid: &Grid, nodes: &[Vec3], smoothing: Option<&Smoothing>) -> Result<Frames, Fault> {
-        let sure = |at_nodes| Ok(Frames { at_nodes, trust: None });
+    /// The frames at the nodes of a grid. Where signs and axes are not given, they are chosen so that neighbours agree, the nearest
+    /// to the part first, if it is known how far each is `outside` (0 in it), and how sure those of a stress are depends on what is in it.
+    pub(super) fn frames(
+        &self,
+        grid: &Grid,
+        nodes: &[Vec3],
+        smoothing: Option<&Smoothing>,
+        outside: Option<&[f64]>,
+    ) -> Result<Frames, Fault> {
+        let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
         match self {
             Orientation::Angles(of) => {
                 let angles = columns(of, nodes, "rotate")?;
@@ -117,18 +125,18 @@ impl Orientation {
                 sure(angles.into_iter().map(rotation).collect())
             }
             Orientation::Direction(of) => {
-                let mut along = of.at_nodes(grid, nodes, "direction", smoothing)?;
-                comb(grid, &mut along, |_| 1.0, |_, v, to| toward(*v, *to));
+                let mut along = of.at_nodes(grid, nodes, "direction", smoothing, outside)?;
+                comb(grid, &mut along, first_in(outside, |_| 1.0), |_, v, to| toward(*v, *to));
                 sure(along.into_iter().map(turned_from_z).collect())
             }
             Orientation::Frame { x, z } => {
-                let x = x.at_nodes(grid, nodes, "frame.x", smoothing)?;
-                sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing)?, nodes)?)
+                let x = x.at_nodes(grid, nodes, "frame.x", smoothing, outside)?;
+                sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing, outside)?, nodes)?)
             }
             Orientation::Stress(of) => {
                 let values = columns(of, nodes, "stress")?;
                 let found: Vec<Principal> = values.par_iter().map(Principal::of).collect();
-                let range = range(&found);
+                let range = range(&found, outside);
                 if range == 0.0 {
                     return Err(no_principal());
                 }
@@ -136,13 +144,14 @@ impl Orientation {
                 let of_part: Vec<Vec3> = found.iter().map(|p| scale(p.gaps(), 1.0 / range)).collect();
                 if let Some(smoothing) = smoothing {
                     let averages = smoothing.frames(grid, &frames, &of_part);
-                    comb(grid, &mut frames, |n| averages.confidence(n), |n, _, to| averages.settled(n, to));
-                    return Ok(Frames { at_nodes: frames, trust: Some(averages.trust()) });
+                    let confidence = first_in(outside, |n| averages.confidence(n));
+                    comb(grid, &mut frames, confidence, |n, _, to| averages.settled(n, to));
+                    return Ok(Frames { at_nodes: frames, trust: Some(averages.trust()), range });
                 }
                 let turns = cube();
-                let least = |n: usize| of_part[n].into_iter().fold(f64::INFINITY, f64::min);
+                let least = first_in(outside, |n| of_part[n].into_iter().fold(f64::INFINITY, f64::min));
                 comb(grid, &mut frames, least, |n, f, to| settled(f, &found[n].own_gaps(range), to, &turns));
-                sure(frames)
+                Ok(Frames { at_nodes: frames, trust: None, range })
             }
         }
     }
@@ -180,7 +189,7 @@ impl Orientation {
     pub(super) fn stress_range(&self, points: &[Vec3]) -> Result<f64, Fault> {
         let Orientation::Stress(of) = self else { return Ok(0.0) };
         let values = columns(of, points, "stress")?;
-        Ok(range(&values.par_iter().map(Principal::of).collect::<Vec<_>>()))
+        Ok(range(&values.par_iter().map(Principal::of).collect::<Vec<_>>(), None))
     }
 
     /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is that of a stress
@@ -224,6 +233,8 @@ pub(super) struct Frames {
     pub at_nodes: Vec<Mat3>,
     /// How sure they are, from 0 to 1, where that differs.
     pub trust: Option<Vec<f64>>,
+    /// The range of a stress, against which directions are more or less sure; 0 for other orientations.
+    pub range: f64,
 }
 
 /// A gap between principal values, over the greatest value, below which they count as equal.
@@ -267,9 +278,10 @@ impl Principal {
 
 /// The difference of two principal values that counts as large in a part: √3 times the root of the mean square of the greatest ones,
 /// which is the greatest of all in a bent beam. A peak at a corner hardly changes it, nor do parts that carry nothing.
-fn range(found: &[Principal]) -> f64 {
-    let squares: f64 = found.iter().map(|p| p.difference().powi(2)).sum();
-    (3.0 * squares / found.len() as f64).sqrt()
+fn range(found: &[Principal], outside: Option<&[f64]>) -> f64 {
+    let counted = || found.iter().enumerate().filter(|(n, _)| outside.is_none_or(|d| d[*n] == 0.0));
+    let squares: f64 = counted().map(|(_, p)| p.difference().powi(2)).sum();
+    (3.0 * squares / counted().count() as f64).sqrt()
 }
 
 fn no_principal() -> Fault {
@@ -497,6 +509,14 @@ fn comb<T: Copy + FirstOf>(
                 heap.push(Step { sure: sure(next), behind: sure(node), node: next, from: node });
             }
         }
+    }
+}
+
+/// How sure nodes are, those in the part before all others, and of these the nearest to it first.
+fn first_in<'a>(outside: Option<&'a [f64]>, sure: impl Fn(usize) -> f64 + 'a) -> impl Fn(usize) -> f64 + 'a {
+    move |n| match outside.map(|d| d[n]) {
+        Some(distance) if distance > 0.0 => -distance,
+        _ => sure(n),
     }
 }
 

@@ -45,8 +45,11 @@ pub(super) fn search(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
     let longest = map.longest();
     let mut x = near;
     let mut at = [[0.0; 3]];
+    // Phases jump by whole numbers where they grow round holes; the search follows them without jumps.
+    let mut ahead = [0.0; 3];
     for _ in 0..STEPS {
         map.phases(&[x], &mut at);
+        at[0] = add(at[0], ahead);
         let miss = sub(u, at[0]);
         if norm(miss) < NEAR {
             return Some(x);
@@ -57,7 +60,9 @@ pub(super) fn search(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
         }
         let step = apply(&inverse(&j), miss);
         let long = norm(step);
-        x = add(x, scale(step, (longest / long).min(1.0)));
+        let next = add(x, scale(step, (longest / long).min(1.0)));
+        ahead = map.continued(ahead, x, next);
+        x = next;
     }
     None
 }

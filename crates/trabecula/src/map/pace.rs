@@ -5,8 +5,9 @@
 //! h² |K″| / 8 where K is smooth. It is taken at points throughout the region, so that no period of K can hide from it.
 
 use super::frame::{Orientation, in_mm};
-use super::phase::{Wanted, wavelengths};
+use super::phase::Wanted;
 use super::phase_grid::Grid;
+use super::phase_target::wavelengths;
 use super::spline;
 use crate::field::Field;
 use crate::grade::Grade;

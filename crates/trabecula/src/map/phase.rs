@@ -8,31 +8,37 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
-use super::frame::{self, Frames, Orientation, in_mm};
+use super::edge_squares::EdgeSquares;
+use super::frame::{self, Orientation, in_mm};
+use super::integral::{Integral, Problem};
 use super::pace;
+use super::periods::{Angles, Period};
 use super::phase_grid::Grid;
-use super::poisson::Poisson;
-use super::smooth_frames::Smoothing;
-use super::spline::{self, Spline};
-use super::tilt::Tilt;
+use super::phase_target::{Laid, Target, wavelengths};
+use super::region_holes::{MOST, Sought};
+use super::solution::Solution;
+use super::spline::Spline;
+use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
-use geometry::progress::{Cancellation, checkpoint};
+use geometry::progress::checkpoint;
 use geometry::random::low_discrepancy;
 
-/// Weights fall off outside the region by e² for each of this many steps.
-const FALL: f64 = 3.0;
 /// Most nodes at which a solution is compared with the target.
 const COMPARED: usize = 60_000;
 /// And most points between nodes.
 const BETWEEN: usize = 30_000;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
-/// Least root of a weight.
-const LEAST_ROOT: f64 = 1e-3;
+/// The error |∇Φ − K|² of phases of one value, relative to |K|², above which cells round holes are considered though none fold, and the
+/// share of it that is left where they are taken.
+const MISSED: [f64; 2] = [0.25, 0.5];
+/// The distance over which roots of weights of nodes fall off by e where phases grow round holes, in steps: there edges count by what the
+/// region has of them.
+const SHARP: f64 = 0.5;
 
 /// The target of a map.
 #[derive(Clone)]
@@ -52,6 +58,22 @@ pub struct Wanted {
     pub offset: Vec3,
 }
 
+impl Wanted {
+    /// What an error of angle counts, if it is in its range.
+    fn ratio(&self) -> Result<f64, Fault> {
+        let ratio = self.angle_weight;
+        if !(LEAST_RATIO..=1.0 / LEAST_RATIO).contains(&ratio) {
+            let message = format!(
+                "{}; an angle counts from {LEAST_RATIO} to {} times as much as a spacing",
+                number(ratio),
+                number(1.0 / LEAST_RATIO)
+            );
+            return Err(Fault::new("angle_weight", message));
+        }
+        Ok(ratio)
+    }
+}
+
 /// How a map is solved for.
 #[derive(Clone, Copy, Default)]
 pub struct Settings<'a> {
@@ -65,7 +87,8 @@ pub struct Settings<'a> {
 
 /// A solved map.
 pub struct Phase {
-    spline: Spline,
+    solution: Solution,
+    periods: Vec<Period>,
     wanted: Wanted,
     shift: Vec3,
     /// Least and greatest target wavelength, mm.
@@ -91,106 +114,79 @@ impl Phase {
     /// grid that is too coarse or too large; a map that folds.
     pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
         let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
-        let grid = chosen.grid;
-        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
+        let laid = Laid::over(bounds, chosen.grid, wanted, settings.region)?;
         checkpoint();
-        let mut depth = vec![f64::NEG_INFINITY; grid.len()];
-        if let Some(region) = settings.region {
-            let chunks = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
-            chunks.for_each(|(d, p)| region.values(p, d));
-        }
-        let weight: Vec<f64> = depth.iter().map(|d| nearness(&grid, *d).powi(2)).collect();
-        let smoothing = wanted.smooth.map(|length| Smoothing { length, weight: &weight });
-        let Frames { at_nodes: frames, trust } = wanted.orientation.frames(&grid, &nodes, smoothing.as_ref())?;
+        let target = Target::new(&laid, wanted, None)?;
         checkpoint();
-        let range = wanted.orientation.stress_range(&nodes)?;
-        let reach = 1e-9 * norm(bounds.size());
-        let inside: Vec<bool> = depth.iter().map(|d| *d <= reach).collect();
-        pace::check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
+        pace::check_pace(&laid.grid, &wanted.wavelength, &laid.wavelength, &laid.inside)?;
         chosen.refuse()?;
-        let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| {
-            let of = frames.iter().zip(&wavelength);
-            of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
-        });
-        let mut close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
-        if let Some(trust) = trust {
-            let roots = close.get_or_insert_with(|| vec![1.0; nodes.len()]);
-            roots.iter_mut().zip(&trust).for_each(|(root, t)| *root = (*root * t.sqrt()).max(LEAST_ROOT));
+        let roots = target.roots(&laid, wanted)?;
+        let ratio = wanted.ratio()?;
+        checkpoint();
+        let Integral { values, mean, steps } = Problem::new(laid.grid, &target.k, roots, ratio).solve();
+        checkpoint();
+        let solution = Solution { spline: Spline::through(laid.grid, values), winding: Winding::default() };
+        let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
+        let mut found = Found { target, solution, periods: Vec::new(), mean, steps, judged };
+        let mut tried = String::new();
+        if found.judged.fold.is_some() || found.judged.missed > MISSED[0] {
+            let (closed, words) = closed(&laid, wanted, settings, ratio)?;
+            tried = words;
+            if let Some(closed) = closed.filter(|c| c.is_better_than(&found)) {
+                found = closed;
+            }
         }
-        let ratio = wanted.angle_weight;
-        if !(LEAST_RATIO..=1.0 / LEAST_RATIO).contains(&ratio) {
-            let message = format!(
-                "{}; an angle counts from {LEAST_RATIO} to {} times as much as a spacing",
-                number(ratio),
-                number(1.0 / LEAST_RATIO)
-            );
-            return Err(Fault::new("angle_weight", message));
-        }
-        checkpoint();
-        let (values, mean, steps) = integrate(&grid, &k, close.as_deref(), ratio);
-        checkpoint();
-        let spline = Spline::through(grid, values);
-        checkpoint();
-        let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
-        // The density at every node; the other measures, which cost more, at some tens of thousands.
-        let density: Vec<f64> = within
-            .par_iter()
-            .map(|&n| {
-                let cells = determinant(&spline.jacobian(nodes[n]).1);
-                cells * wavelength[n].iter().product::<f64>()
-            })
-            .collect();
-        checkpoint();
-        let (compared, between) = compared(&grid, &inside, settings.region);
-        let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
-        let jacobians: Vec<Mat3> = positions.par_iter().map(|p| spline.jacobian(*p).1).collect();
-        let off_nodes = targets(wanted, range, &grid, &frames, &between)?;
-        let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
-        let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
-        let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
-        let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(&grid, &k, n)).collect();
         let lengths_range =
-            wavelength.iter().flatten().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
-        let turn = distortion::turning(&grid, &frames, &inside, lengths_range[1]);
-        let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
-        let least = (0..density.len()).min_by(order);
-        let most = (0..density.len()).max_by(order);
-        let mut distortion = Distortion {
-            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
-            least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
-            ..Distortion::of(&found, compared.len(), &curl, turn)
-        };
-        distortion.widen_density(&found, &positions);
-        if !settings.folds {
-            refuse_folds(&grid, &spline, &distortion, &inside, &remedy(wanted, lengths_range[1]))?;
+            (laid.wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
+        if let (Some(p), false) = (found.judged.fold, settings.folds) {
+            return Err(folded(p, &remedy(wanted, lengths_range[1]), &tried));
         }
+        let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. } } = found;
         let shift = mean.map(|m| -dot(m, wanted.offset));
-        let average = (within.iter()).fold([0.0; 3], |s, &n| add(s, wavelength[n]));
-        let max_lipschitz = spline.lipschitz(bounds);
+        let within = laid.inside.iter().zip(&laid.wavelength).filter(|(inside, _)| **inside);
+        let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
+        let corner = norm(laid.grid.step);
+        let max_lipschitz = solution.max_lipschitz(bounds, |n| laid.depth[n] <= corner);
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
-        let typical = spline.jacobian(bounds.center()).1;
+        let typical = solution.jacobian(bounds.center());
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
+        let keep = wanted.smooth.is_some() || !periods.is_empty();
         Ok(Phase {
-            spline,
+            solution,
+            periods,
             wanted: wanted.clone(),
             shift,
             wavelengths: lengths_range,
-            stress_range: range,
-            mean: if within.is_empty() { wavelength[0] } else { scale(average, 1.0 / within.len() as f64) },
+            stress_range: target.range,
+            mean: if count == 0 { laid.wavelength[0] } else { scale(sum, 1.0 / f64::from(count)) },
             max_lipschitz,
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
             hasty: chosen.hasty,
-            frames: if wanted.smooth.is_some() { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
+            frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(target.frames)) } else { OnceLock::new() },
         })
     }
 
     /// Deviation of the map from the target.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
+    }
+
+    /// The whole numbers of cells round the holes of the region, one for each hole that the grid sees.
+    pub fn periods(&self) -> &[Period] {
+        &self.periods
+    }
+
+    /// Whether phases grow round a hole, so that one place has many phases.
+    pub fn winds(&self) -> bool {
+        !self.solution.winding.is_empty()
+    }
+
+    /// Phases (turns) at `p` that continue those at a near point without a jump.
+    pub(super) fn continued(&self, u: Vec3, from: Vec3, p: Vec3) -> Vec3 {
+        self.solution.continued(u, from, p)
     }
 
     /// Deviation of the map from the target at points (mm) within the box. The target is evaluated at the points,
@@ -200,7 +196,7 @@ impl Phase {
     /// Numbers that are not finite, vectors without a direction.
     pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
         let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
-        let targets = targets(&self.wanted, self.stress_range, self.spline.grid(), &self.combed()?, points)?;
+        let targets = targets(&self.wanted, self.stress_range, self.solution.grid(), &self.combed()?, points)?;
         Ok(jacobians.iter().zip(&targets).map(|(j, k)| distortion::compare(j, k)).collect())
     }
 
@@ -212,9 +208,9 @@ impl Phase {
         if !self.wanted.orientation.is_combed() {
             return Ok(Arc::default());
         }
-        let grid = self.spline.grid();
+        let grid = self.solution.grid();
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None)?.at_nodes.into();
+        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None, None)?.at_nodes.into();
         Ok(self.frames.get_or_init(|| made).clone())
     }
 
@@ -225,7 +221,7 @@ impl Phase {
 
     /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
     pub fn effort(&self) -> ([usize; 3], usize) {
-        (self.spline.grid().shape, self.steps)
+        (self.solution.grid().shape, self.steps)
     }
 }
 
@@ -236,16 +232,16 @@ impl Mapping for Phase {
     }
 
     fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
-        self.spline.values(points, out);
+        self.solution.phases(points, out);
         out.iter_mut().for_each(|u| *u = add(*u, self.shift));
     }
 
     fn jacobian(&self, at: Vec3) -> Mat3 {
-        self.spline.jacobian(at).1
+        self.solution.jacobian(at)
     }
 
     fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
-        self.spline.jacobians(points, u, j);
+        self.solution.jacobians(points, u, j);
         u.iter_mut().for_each(|u| *u = add(*u, self.shift));
     }
 
@@ -264,7 +260,7 @@ impl Mapping for Phase {
     }
 
     fn lipschitz(&self, b: &Aabb) -> f64 {
-        self.spline.lipschitz(b)
+        self.solution.lipschitz(b)
     }
 
     /// In the region's bounds.
@@ -281,28 +277,7 @@ impl Mapping for Phase {
     }
 
     fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
-        Box::new(SplineRows { rows: self.spline.rows(block), shift: self.shift })
-    }
-}
-
-/// The phases of a solved map along the rows of a block.
-struct SplineRows<'a> {
-    rows: spline::Rows<'a>,
-    shift: Vec3,
-}
-
-impl Rows for SplineRows<'_> {
-    fn enter_layer(&mut self, k: usize) {
-        self.rows.enter_layer(k);
-    }
-
-    fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
-        self.rows.fill(j, out);
-        for (out, shift) in out.iter_mut().zip(self.shift) {
-            if shift != 0.0 {
-                out.iter_mut().for_each(|u| *u += shift);
-            }
-        }
+        self.solution.rows(block, self.shift)
     }
 }
 
@@ -346,106 +321,6 @@ fn targets(wanted: &Wanted, range: f64, grid: &Grid, frames: &[Mat3], points: &[
     Ok(each.collect())
 }
 
-/// The three wavelengths at points.
-pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
-    let mut out = vec![[0.0; 3]; points.len()];
-    let mut values = vec![0.0; points.len()];
-    for (i, grade) in of.iter().enumerate() {
-        grade.values(points, &mut values);
-        for ((o, v), p) in out.iter_mut().zip(&values).zip(points) {
-            if !(*v > 0.0 && v.is_finite()) {
-                return Err(Fault::new(
-                    "wavelength",
-                    format!(
-                        "{} mm at {}; a wavelength is a positive, finite length all over the region's bounds",
-                        number(*v),
-                        in_mm(*p)
-                    ),
-                ));
-            }
-            o[i] = *v;
-        }
-    }
-    Ok(out)
-}
-
-/// The roots of the weights of nodes: closeness to the region times the target's weight. `None` if all are one.
-fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3]) -> Result<Option<Vec<f64>>, Fault> {
-    let fall = fall(grid);
-    let mut roots = vec![1.0; nodes.len()];
-    if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
-        weight.values(nodes, &mut roots);
-        let most = roots.iter().copied().fold(0.0, f64::max);
-        let wrong = (roots.iter().zip(nodes)).find(|(w, _)| !(**w >= 0.0 && w.is_finite()));
-        if let Some((w, p)) = wrong {
-            let message = format!(
-                "{} at {}; a weight is a finite number from 0 up, all over the region's bounds",
-                number(*w),
-                in_mm(*p)
-            );
-            return Err(Fault::new("weight", message));
-        }
-        if most == 0.0 {
-            let message = "the weight is zero everywhere: nothing is asked for";
-            return Err(Fault::new("weight", message));
-        }
-        roots.iter_mut().for_each(|w| *w = (*w / most).sqrt());
-    } else if depth.iter().all(|d| *d <= 1e-6 * fall) {
-        return Ok(None);
-    }
-    let roots = roots.iter().zip(depth).map(|(w, d)| (w * nearness(grid, *d)).max(LEAST_ROOT));
-    Ok(Some(roots.collect()))
-}
-
-/// The root of the weight of a node at a signed distance from the region.
-fn nearness(grid: &Grid, distance: f64) -> f64 {
-    (-distance.max(0.0) / fall(grid)).exp()
-}
-
-/// The distance over which roots of weights fall off by e, mm.
-fn fall(grid: &Grid) -> f64 {
-    FALL * grid.step.into_iter().fold(0.0, f64::max)
-}
-
-/// The three phases at the nodes, the mean of the rows of K, and the number of steps. With K̄ the mean of K, that of
-/// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by s².
-fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> ([Vec<f64>; 3], Mat3, usize) {
-    let even = (ratio != 1.0 && s.is_none()).then(|| vec![1.0; grid.len()]);
-    let s = s.or(even.as_deref());
-    let weights: Vec<f64> = (0..grid.len()).map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n])).collect();
-    let whole: f64 = weights.iter().sum();
-    let poisson = Poisson::new(*grid);
-    let request = Cancellation::current();
-    let solved = k.par_iter().map(|k| {
-        request.enter(|| {
-            // From a first value on, so that a K that does not vary has exactly itself as its mean.
-            let first = k[0];
-            let off = k.iter().zip(&weights).fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
-            let mean = add(first, scale(off, 1.0 / whole));
-            let rest: Vec<Vec3> = k.iter().map(|k| sub(*k, mean)).collect();
-            let (mut f, steps) = match s {
-                _ if rest.iter().all(|r| norm(*r) <= 1e-15 * norm(mean)) => (vec![0.0; k.len()], 0),
-                None => (poisson.integrate(&rest), 0),
-                Some(s) => {
-                    let tilt = Tilt::new(*grid, k, ratio, s);
-                    let (f, steps, _) = poisson.integrate_weighted(&rest, s, tilt.as_ref());
-                    (f, steps)
-                }
-            };
-            let off = f.iter().zip(&weights).map(|(f, w)| f * w).sum::<f64>() / whole;
-            for (n, f) in f.iter_mut().enumerate() {
-                *f += dot(mean, grid.node(n)) - off;
-            }
-            (f, mean, steps)
-        })
-    });
-    let solved: Vec<(Vec<f64>, Vec3, usize)> = solved.collect();
-    let mean = [solved[0].1, solved[1].1, solved[2].1];
-    let steps = solved.iter().map(|s| s.2).max().unwrap_or(0);
-    let mut values = solved.into_iter().map(|s| s.0);
-    (core::array::from_fn(|_| values.next().unwrap_or_default()), mean, steps)
-}
-
 /// What may keep a map from folding.
 fn remedy(wanted: &Wanted, longest: f64) -> String {
     match (&wanted.orientation, wanted.smooth) {
@@ -461,33 +336,168 @@ fn remedy(wanted: &Wanted, longest: f64) -> String {
     }
 }
 
-/// Refuses a map whose det J is not positive at a node or between nodes in the region.
-fn refuse_folds(
-    grid: &Grid,
-    spline: &Spline,
-    distortion: &Distortion,
-    inside: &[bool],
-    remedy: &str,
-) -> Result<(), Fault> {
-    let at_node = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
+/// A solution, and what it was found for.
+struct Found {
+    target: Target,
+    solution: Solution,
+    periods: Vec<Period>,
+    /// The mean of the rows of K.
+    mean: Mat3,
+    steps: usize,
+    judged: Judged,
+}
+
+impl Found {
+    /// Whether it is taken where phases of one value would be: its error is far less, and it does not fold where they do not.
+    fn is_better_than(&self, single: &Found) -> bool {
+        let (own, other) = (&self.judged, &single.judged);
+        (own.fold.is_none() || other.fold.is_some()) && own.missed <= MISSED[1] * other.missed
+    }
+}
+
+/// How a solution compares with its target.
+struct Judged {
+    distortion: Distortion,
+    /// Jacobians where they were compared.
+    jacobians: Vec<Mat3>,
+    /// |∇Φ − K|² over |K|², all three in the mean over points between nodes.
+    missed: f64,
+    /// Where det J is not positive.
+    fold: Option<Vec3>,
+}
+
+impl Judged {
+    fn of(
+        laid: &Laid,
+        wanted: &Wanted,
+        region: Option<&dyn Field>,
+        target: &Target,
+        solution: &Solution,
+    ) -> Result<Judged, Fault> {
+        let Laid { grid, nodes, inside, wavelength, .. } = laid;
+        let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
+        // The density at every node; the other measures, which cost more, at some tens of thousands.
+        let density: Vec<f64> = within
+            .par_iter()
+            .map(|&n| {
+                let cells = determinant(&solution.jacobian(nodes[n]));
+                cells * wavelength[n].iter().product::<f64>()
+            })
+            .collect();
+        checkpoint();
+        let (compared, between) = compared(grid, inside, region);
+        let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
+        let jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
+        let off_nodes = targets(wanted, target.range, grid, &target.frames, &between)?;
+        let k = &target.k;
+        let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
+        let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
+        let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
+        let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(grid, k, n)).collect();
+        let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
+        let turn = distortion::turning(grid, &target.frames, inside, longest);
+        let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
+        let least = (0..density.len()).min_by(order);
+        let most = (0..density.len()).max_by(order);
+        let mut distortion = Distortion {
+            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
+            least_at: least.map_or(laid.bounds.center(), |n| nodes[within[n]]),
+            ..Distortion::of(&found, compared.len(), &curl, turn)
+        };
+        distortion.widen_density(&found, &positions);
+        let squares = |m: &Mat3| m.as_flattened().iter().map(|v| v * v).sum::<f64>();
+        let even = || jacobians.iter().zip(&asked).skip(compared.len());
+        let off: f64 = even().map(|(j, k)| squares(&core::array::from_fn(|i| sub(j[i], k[i])))).sum();
+        let missed = off / even().map(|(_, k)| squares(k)).sum::<f64>().max(f64::MIN_POSITIVE);
+        let worst = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
+        let fold = worst.or_else(|| fold_between(solution, inside));
+        Ok(Judged { distortion, jacobians, missed, fold })
+    }
+}
+
+/// The map whose phases close round all holes, if the region has some: of the best whole numbers of cells the first that does not fold, or
+/// if all do and where they may, the best. Also what was tried, in words.
+fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Result<(Option<Found>, String), Fault> {
+    let Some(region) = settings.region else { return Ok((None, String::new())) };
+    let sought = Sought { grid: &laid.grid, depth: &laid.depth, region };
+    let count = sought.count();
+    if count > MOST {
+        return Ok((None, format!("; the region has {count} holes, and phases close round {MOST} at most")));
+    }
+    let holes = if count > 0 { sought.all() } else { Vec::new() };
+    if holes.is_empty() {
+        return Ok((None, String::new()));
+    }
+    // What is asked for within a hole may have little to do with the part.
+    let outside: Vec<f64> = laid.inside.iter().zip(&laid.depth).map(|(i, d)| if *i { 0.0 } else { *d }).collect();
+    let target = Target::new(laid, wanted, Some(&outside))?;
+    let ones = || vec![1.0; laid.grid.len()];
+    let roots = |steps: f64| -> Result<Vec<f64>, Fault> {
+        Ok(laid.roots(wanted.weight.as_ref(), target.trust.as_deref(), steps)?.unwrap_or_else(ones))
+    };
+    let squares = EdgeSquares::new(laid.grid, &roots(f64::INFINITY)?, Some(&laid.depth));
+    let problem = Problem { grid: laid.grid, k: &target.k, weights: Some((roots(SHARP)?, squares)), ratio };
+    let Integral { values, mean, steps } = problem.solve();
+    let angles = Angles::new(&problem, holes, &values);
+    let mut first = None;
+    for (solution, periods) in angles.solutions(&laid.grid, &values) {
+        checkpoint();
+        if fold_at_node(&solution, laid).or_else(|| fold_between(&solution, &laid.inside)).is_none() {
+            let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
+            if judged.fold.is_none() {
+                let words = tried(&periods);
+                return Ok((Some(Found { target, solution, periods, mean, steps, judged }), words));
+            }
+        }
+        first.get_or_insert((solution, periods));
+    }
+    let Some((solution, periods)) = first else { return Ok((None, String::new())) };
+    let words = tried(&periods);
+    if !settings.folds {
+        return Ok((None, words));
+    }
+    let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
+    Ok((Some(Found { target, solution, periods, mean, steps, judged }), words))
+}
+
+/// A node in the region where det J is not positive.
+fn fold_at_node(solution: &Solution, laid: &Laid) -> Option<Vec3> {
+    let nodes = laid.nodes.par_iter().zip(&laid.inside).filter(|(_, inside)| **inside);
+    nodes.map(|(p, _)| *p).find_first(|p| determinant(&solution.jacobian(*p)) <= 0.0)
+}
+
+/// The middle of a cell of the grid in the region where det J is not positive.
+fn fold_between(solution: &Solution, inside: &[bool]) -> Option<Vec3> {
+    let grid = solution.grid();
     let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
     let far: usize = strides.iter().sum();
-    let between = || {
-        (0..grid.len())
-            .into_par_iter()
-            .filter(|&n| (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far])
-            .map(|n| add(grid.node(n), half))
-            .find_first(|p| determinant(&spline.jacobian(*p).1) <= 0.0)
+    (0..grid.len())
+        .into_par_iter()
+        .filter(|&n| (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far])
+        .map(|n| add(grid.node(n), half))
+        .find_first(|p| determinant(&solution.jacobian(*p)) <= 0.0)
+}
+
+/// A map that folds at a place.
+fn folded(p: Vec3, remedy: &str, tried: &str) -> Fault {
+    let message = format!(
+        "the map folds at {}: cells turn inside out there{tried}. {remedy}, or allow it with folds = true",
+        in_mm(p)
+    );
+    Fault::new("", message)
+}
+
+/// What was tried to keep a map from folding: cells round holes.
+fn tried(periods: &[Period]) -> String {
+    let one = |p: &Period| {
+        let [a, b, c] = p.asked.map(|v| format!("{:.2}", v + 0.0));
+        format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", in_mm(p.at))
     };
-    match at_node.or_else(between) {
-        None => Ok(()),
-        Some(p) => Err(Fault::new(
-            "",
-            format!(
-                "the map folds at {}: cells turn inside out there. {remedy}, or allow it with folds = true",
-                in_mm(p)
-            ),
-        )),
+    let some: Vec<String> = periods.iter().take(3).map(one).collect();
+    match periods.len() - some.len() {
+        _ if some.is_empty() => String::new(),
+        0 => format!(", whatever whole numbers of cells go round {}", some.join(" and ")),
+        rest => format!(", whatever whole numbers of cells go round {} and {rest} more", some.join(", ")),
     }
 }
 

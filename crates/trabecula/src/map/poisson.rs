@@ -3,10 +3,6 @@
 //! With the weights of the trapezoid rule the normal equations are a second difference, mirrored at the faces, and the
 //! cosines of the DCT-I are its eigenvectors: one transform forth and one back solve it (the fixed point of the iteration
 //! of Rumpf and Pazos, Synthesis of spatially variant lattices, Opt. Express 20, 2012, in one step).
-//!
-//! With a weight s² that varies, v = s Φ turns the equations into the same second difference plus a potential (Concus and
-//! Golub, Use of fast direct methods for nonseparable elliptic equations, SIAM J. Numer. Anal. 10, 1973), and conjugate
-//! gradients need few steps with the direct solution as preconditioner.
 
 use std::sync::Arc;
 
@@ -14,14 +10,8 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
 
 use super::phase_grid::Grid;
-use super::tilt::Tilt;
 use geometry::math::Vec3;
 use geometry::progress::checkpoint;
-
-/// Residual, relative to the first, at which conjugate gradients end.
-const RESIDUAL: f64 = 1e-7;
-/// Most steps of conjugate gradients.
-const STEPS: usize = 400;
 
 /// The mirrored second difference on a grid, and its inverse.
 pub(super) struct Poisson {
@@ -49,83 +39,13 @@ impl Poisson {
 
     /// Φ of zero trapezoid mean whose steps along the edges of the grid are nearest to those of K.
     pub fn integrate(&self, k: &[Vec3]) -> Vec<f64> {
-        let mut f = self.divergence(k, None);
+        let mut f = self.divergence(k);
         self.solve(&mut f, 0.0);
         f
     }
 
-    /// As `integrate`, the square of an edge counting as the product of `s` at its ends, and errors across K more or less than
-    /// those along it, if there is a tilt. Also the number of steps taken, and the residual left, relative to the first.
-    pub fn integrate_weighted(&self, k: &[Vec3], s: &[f64], tilt: Option<&Tilt>) -> (Vec<f64>, usize, f64) {
-        let n = self.grid.len();
-        let t: Vec<f64> = (0..n).map(|i| self.grid.trapezoid(i)).collect();
-        let dot = |a: &[f64], b: &[f64]| -> f64 {
-            // In chunks of one length, so that the sum does not depend on the number of threads.
-            let sums: Vec<f64> = (a.par_chunks(4096), b.par_chunks(4096), t.par_chunks(4096))
-                .into_par_iter()
-                .map(|(a, b, t)| a.iter().zip(b).zip(t).map(|((a, b), t)| a * b * t).sum())
-                .collect();
-            sums.iter().sum()
-        };
-        let potential: Vec<f64> = {
-            let bend = self.apply(s);
-            bend.iter().zip(s).map(|(b, s)| -b / s).collect()
-        };
-        // The mean of the potential, where it is positive, makes the preconditioner regular and like the operator.
-        let shift = potential.iter().map(|q| q.max(0.0)).sum::<f64>() / n as f64;
-        let operator = |v: &[f64]| {
-            let mut out = self.apply(v);
-            out.par_iter_mut().zip(v).zip(&potential).for_each(|((o, v), q)| *o += q * v);
-            if let Some(tilt) = tilt {
-                let phi: Vec<f64> = v.iter().zip(s).map(|(v, s)| v / s).collect();
-                let more = tilt.apply(&phi);
-                out.iter_mut().zip(more.iter().zip(s)).for_each(|(o, (m, s))| *o += m / s);
-            }
-            out
-        };
-        let mut v: Vec<f64> = self.integrate(k).iter().zip(s).map(|(f, s)| f * s).collect();
-        let mut r = operator(&v);
-        let mut f = self.divergence(k, Some(s));
-        if let Some(tilt) = tilt {
-            let more = tilt.wanted(k);
-            f.iter_mut().zip(more.iter().zip(s)).for_each(|(f, (m, s))| *f += m / s);
-        }
-        let scale = dot(&f, &f).sqrt();
-        r.iter_mut().zip(&f).for_each(|(r, f)| *r = f - *r);
-        let precondition = |r: &[f64]| {
-            let mut z = r.to_vec();
-            self.solve(&mut z, shift);
-            z
-        };
-        let first = dot(&r, &r).sqrt();
-        // What rounding leaves of a gradient that needs no solving.
-        if first <= 1e-12 * scale {
-            return (v.iter().zip(s).map(|(v, s)| v / s).collect(), 0, 0.0);
-        }
-        let mut z = precondition(&r);
-        let mut p = z.clone();
-        let mut rz = dot(&r, &z);
-        let (mut steps, mut left) = (0, 1.0);
-        while steps < STEPS && left > RESIDUAL {
-            checkpoint();
-            let q = operator(&p);
-            let alpha = rz / dot(&p, &q);
-            if !alpha.is_finite() {
-                break;
-            }
-            v.iter_mut().zip(&p).for_each(|(v, p)| *v += alpha * p);
-            r.iter_mut().zip(&q).for_each(|(r, q)| *r -= alpha * q);
-            z = precondition(&r);
-            let next = dot(&r, &z);
-            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + next / rz * *p);
-            rz = next;
-            steps += 1;
-            left = dot(&r, &r).sqrt() / first;
-        }
-        (v.iter().zip(s).map(|(v, s)| v / s).collect(), steps, left)
-    }
-
     /// Minus the mirrored second difference.
+    #[cfg(test)]
     pub fn apply(&self, v: &[f64]) -> Vec<f64> {
         let (g, strides) = (&self.grid, self.grid.strides());
         let [nx, ny, _] = g.shape;
@@ -146,9 +66,8 @@ impl Poisson {
         out
     }
 
-    /// The right-hand side: minus the sum over a node's edges of the weight at the other end times the step of K, over
-    /// h², edges mirrored at the faces.
-    fn divergence(&self, k: &[Vec3], s: Option<&[f64]>) -> Vec<f64> {
+    /// The right-hand side: minus the sum over a node's edges of the step of K, over h², edges mirrored at the faces.
+    fn divergence(&self, k: &[Vec3]) -> Vec<f64> {
         let (g, strides) = (&self.grid, self.grid.strides());
         (0..g.len())
             .into_par_iter()
@@ -156,7 +75,7 @@ impl Poisson {
                 let at = g.index(n);
                 let mut sum = 0.0;
                 for a in 0..3 {
-                    let edge = |m: usize| s.map_or(1.0, |s| s[m]) * (k[n][a] + k[m][a]) / (2.0 * g.step[a]);
+                    let edge = |m: usize| (k[n][a] + k[m][a]) / (2.0 * g.step[a]);
                     sum += match at[a] {
                         0 => -2.0 * edge(n + strides[a]),
                         c if c + 1 == g.shape[a] => 2.0 * edge(n - strides[a]),
@@ -318,7 +237,7 @@ mod tests {
             let once = start.elapsed().as_secs_f64();
             // Half the squares of the steps times the right-hand side, and the mean of the six neighbours.
             let h = g.step[0];
-            let right: Vec<f64> = direct.divergence(&k, None).iter().map(|v| v * h * h / 6.0).collect();
+            let right: Vec<f64> = direct.divergence(&k).iter().map(|v| v * h * h / 6.0).collect();
             let strides = g.strides();
             let sweep = |f: &[f64], out: &mut [f64]| {
                 out.par_chunks_mut(n).enumerate().for_each(|(row, out)| {
@@ -374,106 +293,6 @@ mod tests {
             let mut back = p.apply(&f);
             p.solve(&mut back, 0.0);
             assert!(largest(&back, &f) < 1e-12, "{shape:?}");
-        }
-    }
-
-    /// With a weight, what is found is stationary: the weighted sum of squares does not fall in any direction, which a
-    /// direct evaluation of the sum shows; and where all edges weigh the same it is the direct solution.
-    #[test]
-    fn weighted_least_squares_are_least() {
-        let g = grid([14, 12, 11], [2.0, 3.0, 1.4]);
-        let p = Poisson::new(g);
-        let mut random = noise(5);
-        let k: Vec<Vec3> = (0..g.len()).map(|_| [random(), random(), random()]).collect();
-        let s: Vec<f64> = (0..g.len()).map(|n| (-2.0 * (g.node(n)[0].abs() - 0.3).max(0.0)).exp().max(1e-3)).collect();
-        let (f, steps, left) = p.integrate_weighted(&k, &s, None);
-        assert!(left < RESIDUAL && steps < 60, "{steps} steps, {left}");
-        let strides = g.strides();
-        let sum = |f: &[f64]| {
-            let mut sum = 0.0;
-            for n in 0..g.len() {
-                let at = g.index(n);
-                for a in 0..3 {
-                    if at[a] + 1 < g.shape[a] {
-                        let m = n + strides[a];
-                        let faces = (0..3)
-                            .filter(|&b| b != a && (at[b] == 0 || at[b] + 1 == g.shape[b]))
-                            .fold(1.0, |w, _| 0.5 * w);
-                        let miss = (f[m] - f[n]) / g.step[a] - (k[n][a] + k[m][a]) / 2.0;
-                        sum += faces * s[n] * s[m] * miss * miss;
-                    }
-                }
-            }
-            sum
-        };
-        let least = sum(&f);
-        for _ in 0..20 {
-            let d: Vec<f64> = (0..g.len()).map(|n| random() * s[n]).collect();
-            let moved = |by: f64| {
-                let f: Vec<f64> = f.iter().zip(&d).map(|(f, d)| f + by * d).collect();
-                sum(&f)
-            };
-            let slope = (moved(1e-3) - moved(-1e-3)) / 2e-3;
-            // The residual, times the length of the direction and the steepness of the sum.
-            assert!(slope.abs() < 1e-4 * least, "{slope} of {least}");
-        }
-        let (even, ..) = p.integrate_weighted(&k, &vec![1.0; g.len()], None);
-        assert!(largest(&even, &p.integrate(&k)) < 1e-10);
-    }
-
-    /// With a tilt the sum of the edges' squares and of those of the cells' middles, across K or along it, is least.
-    #[test]
-    fn tilted_least_squares_are_least() {
-        let g = grid([11, 9, 8], [2.0, 3.0, 1.4]);
-        let p = Poisson::new(g);
-        let mut random = noise(9);
-        let k: Vec<Vec3> = (0..g.len()).map(|_| [2.0 + random(), random(), random()]).collect();
-        let even = vec![1.0; g.len()];
-        for ratio in [0.1, 10.0] {
-            let tilt = Tilt::new(g, &k, ratio, &even).expect("tilted");
-            let (f, _, left) = p.integrate_weighted(&k, &even, Some(&tilt));
-            assert!(left < RESIDUAL);
-            let strides = g.strides();
-            let sum = |f: &[f64]| {
-                let mut sum = 0.0;
-                for n in 0..g.len() {
-                    let at = g.index(n);
-                    for a in (0..3).filter(|&a| at[a] + 1 < g.shape[a]) {
-                        let m = n + strides[a];
-                        let faces = (0..3)
-                            .filter(|&b| b != a && (at[b] == 0 || at[b] + 1 == g.shape[b]))
-                            .fold(1.0, |w, _| 0.5 * w);
-                        let miss = (f[m] - f[n]) / g.step[a] - (k[n][a] + k[m][a]) / 2.0;
-                        sum += faces * miss * miss;
-                    }
-                    if (0..3).any(|a| at[a] + 1 == g.shape[a]) {
-                        continue;
-                    }
-                    let corner = |i: usize| n + (0..3).map(|a| (i >> a & 1) * strides[a]).sum::<usize>();
-                    let mean = |a: usize| (0..8).map(|i| k[corner(i)][a]).sum::<f64>() / 8.0;
-                    let slope = |a: usize| {
-                        let ends = (0..8).map(|i| f[corner(i)] * if i >> a & 1 == 1 { 0.25 } else { -0.25 });
-                        ends.sum::<f64>() / g.step[a]
-                    };
-                    let want = [0, 1, 2].map(mean);
-                    let miss = [0, 1, 2].map(|a| slope(a) - want[a]);
-                    let long = want.iter().map(|v| v * v).sum::<f64>();
-                    let along = (0..3).map(|a| want[a] * miss[a]).sum::<f64>().powi(2) / long;
-                    let all: f64 = miss.iter().map(|m| m * m).sum();
-                    sum += if ratio > 1.0 { (ratio - 1.0) * (all - along) } else { (1.0 / ratio - 1.0) * along };
-                }
-                sum
-            };
-            let least = sum(&f);
-            for _ in 0..10 {
-                let d: Vec<f64> = (0..g.len()).map(|_| random()).collect();
-                let moved = |by: f64| {
-                    let f: Vec<f64> = f.iter().zip(&d).map(|(f, d)| f + by * d).collect();
-                    sum(&f)
-                };
-                let slope = (moved(1e-3) - moved(-1e-3)) / 2e-3;
-                assert!(slope.abs() < 1e-4 * least, "{ratio}: {slope} of {least}");
-            }
         }
     }
 }

@@ -27,6 +27,8 @@ pub(super) struct Spline {
     /// For each block of intervals between nodes, x fastest: a bound of |J − J₀| (Frobenius) and one of |J₀| (spectral), J₀ the
     /// middle of what the entries can be.
     lipschitz: Vec<[f32; 2]>,
+    /// J₀ of each block.
+    middles: Vec<Mat3>,
 }
 
 /// Where a coordinate falls: the interval, and the weights of its four coefficients in the value and in the slope.
@@ -47,12 +49,10 @@ impl Spline {
             let mut made = made.into_iter();
             core::array::from_fn(|_| made.next().unwrap_or_default())
         };
-        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new() };
+        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
         let [nx, ny, nz] = spline.blocks();
-        spline.lipschitz = (0..nx * ny * nz)
-            .into_par_iter()
-            .map(|i| spline.lipschitz_of([i % nx, i / nx % ny, i / nx / ny]))
-            .collect();
+        (spline.lipschitz, spline.middles) =
+            (0..nx * ny * nz).into_par_iter().map(|i| spline.lipschitz_of([i % nx, i / nx % ny, i / nx / ny])).unzip();
         spline
     }
 
@@ -137,8 +137,8 @@ impl Spline {
         self.grid.shape.map(|n| (n - 1).div_ceil(BLOCK))
     }
 
-    /// [|J − J₀|, |J₀|] over a block. A derivative is a mean of differences of coefficients along its axis.
-    fn lipschitz_of(&self, at: [usize; 3]) -> [f32; 2] {
+    /// [|J − J₀|, |J₀|] over a block, and J₀. A derivative is a mean of differences of coefficients along its axis.
+    fn lipschitz_of(&self, at: [usize; 3]) -> ([f32; 2], Mat3) {
         let s = self.strides();
         let base = BLOCK * (at[0] + at[1] * s[1] + at[2] * s[2]);
         // Coefficients that count.
@@ -164,11 +164,29 @@ impl Spline {
         }
         // Rounded up, and by more than the rounding of the sums.
         let up = |v: f64| (v * (1.0 + 1e-6)) as f32;
-        [up(half.sqrt()), up(longest(&middle))]
+        ([up(half.sqrt()), up(longest(&middle))], middle)
     }
 
     /// A bound of |J| (spectral norm) in the box.
     pub fn lipschitz(&self, b: &Aabb) -> f64 {
+        self.greatest(b, |block, beyond| {
+            let [half, middle] = self.lipschitz[block];
+            f64::from(half) * beyond + f64::from(middle)
+        })
+    }
+
+    /// A bound of |J + M| (spectral norm) in the box.
+    pub fn lipschitz_beside(&self, b: &Aabb, m: &Mat3) -> f64 {
+        self.greatest(b, |block, beyond| {
+            let middle = self.middles[block];
+            let both = core::array::from_fn(|i| geometry::math::add(middle[i], m[i]));
+            // As those that are kept, which are rounded up.
+            f64::from(self.lipschitz[block][0]) * beyond + longest(&both) * (1.0 + 1e-6)
+        })
+    }
+
+    /// The greatest of a number for each block that meets the box, and for how much weights add up to beyond the grid.
+    fn greatest(&self, b: &Aabb, of: impl Fn(usize, f64) -> f64) -> f64 {
         let mut range = [(0, 0); 3];
         // Beyond a face the weights are those of a straight line; they add up to one, their sizes to more.
         let mut beyond = 1.0;
@@ -186,9 +204,8 @@ impl Spline {
         let mut most = 0.0f64;
         for k in range[2].0..=range[2].1 {
             for j in range[1].0..=range[1].1 {
-                let row = &self.lipschitz[(k * ny + j) * nx..][range[0].0..=range[0].1];
-                for [half, middle] in row {
-                    most = most.max(f64::from(*half) * beyond + f64::from(*middle));
+                for i in range[0].0..=range[0].1 {
+                    most = most.max(of((k * ny + j) * nx + i, beyond));
                 }
             }
         }

@@ -6,7 +6,7 @@
 //! Groen and Sigmund, Homogenization-based topology optimization for high-resolution manufacturable microstructures, Int. J.
 //! Numer. Meth. Engng 113, 2018; least squares stay linear.
 //!
-//! The identity is the edges' part (`poisson`). The rest is taken at the middles of the grid's cells, where the gradient is the
+//! The identity is the edges' part (`edge_squares`). The rest is taken at the middles of the grid's cells, where the gradient is the
 //! mean of four differences along each axis: second order, and the edges' part covers the modes that such a mean leaves out.
 
 use rayon::prelude::*;
@@ -64,7 +64,7 @@ impl Tilt {
         scale(if self.across { sub(g, part) } else { part }, weight)
     }
 
-    /// Carries a vector in each cell back to the nodes: the transpose of taking the gradient, over the trapezoid weights.
+    /// Carries a vector in each cell back to the nodes: the transpose of taking the gradient.
     fn spread(&self, cells: &[Vec3]) -> Vec<f64> {
         let grid = &self.grid;
         let one = |n: usize| {
@@ -82,7 +82,7 @@ impl Tilt {
                     sum += sign * q[a] / grid.step[a];
                 }
             }
-            sum / grid.trapezoid(n)
+            sum
         };
         (0..grid.len()).into_par_iter().map(one).collect()
     }
@@ -100,13 +100,22 @@ impl Tilt {
         self.spread(&each.collect::<Vec<Vec3>>())
     }
 
-    /// The part of the right-hand side: Bᵀ P K.
-    pub fn wanted(&self, k: &[Vec3]) -> Vec<f64> {
-        let each = (0..self.of.len()).into_par_iter().map(|c| {
-            let near = self.corners(c);
-            let sum = near.iter().fold([0.0; 3], |m, n| add(m, k[*n]));
-            self.weighted(c, scale(sum, 0.125))
-        });
+    /// The gradient in a cell by the slopes along its edges, each kept at the node below it.
+    fn mean(&self, c: usize, slopes: &[Vec3]) -> Vec3 {
+        let near = self.corners(c);
+        let below = |a: usize| (0..8).filter(move |i| i >> a & 1 == 0);
+        [0, 1, 2].map(|a| 0.25 * below(a).map(|i| slopes[near[i]][a]).sum::<f64>())
+    }
+
+    /// The part of the right-hand side: Bᵀ P of slopes along the edges above the nodes.
+    pub fn wanted(&self, slopes: &[Vec3]) -> Vec<f64> {
+        let each = (0..self.of.len()).into_par_iter().map(|c| self.weighted(c, self.mean(c, slopes)));
         self.spread(&each.collect::<Vec<Vec3>>())
+    }
+
+    /// The part of the sum of products of two sets of slopes along the edges above the nodes.
+    pub fn product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
+        let one = |c: usize| dot(self.weighted(c, self.mean(c, a)), self.mean(c, b));
+        (0..self.of.len()).into_par_iter().map(one).collect::<Vec<f64>>().iter().sum()
     }
 }

@@ -62,6 +62,9 @@ pub struct LatticeReport {
     /// Deviation of a solved map from the orientation and wavelength asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionReport>,
+    /// Cells round the holes of the region; None where the phases of a solved map have one value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub periods: Option<Vec<PeriodReport>>,
     /// The tetrahedral mesh of a lattice over tetrahedra, and the cells in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tets: Option<TilingReport>,
@@ -140,6 +143,19 @@ pub struct DistortionReport {
     pub curl: MapSpread,
     /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
+}
+
+/// The whole numbers of cells round a hole of the region.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct PeriodReport {
+    /// A point in the hole, on the line through it that cells go round, mm.
+    pub at: [f64; 3],
+    /// Direction of the line there.
+    pub along: [f64; 3],
+    /// Whole cells round the line along each axis of the cell; negative against a right-handed screw.
+    pub cells: [i64; 3],
+    /// The numbers that least squares ask for.
+    pub asked: [f64; 3],
 }
 
 /// The transition between two lattices of a blend: the lattices alone, without skin and keep zones.

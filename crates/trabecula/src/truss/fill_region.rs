@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::map::Map;
+use crate::map::{Map, Phase};
 use beams::graph::{MAX_STRUTS, PeriodicGraph, Wireframe};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, add, determinant};
@@ -57,7 +57,9 @@ pub fn fill(graph: &PeriodicGraph, map: &Map, bounds: &Aabb, reach: f64) -> Resu
             let [a, b] = beam.ends;
             let there: [i32; 3] = core::array::from_fn(|i| cell[i] + beam.shift[i]);
             let Some(from) = positions[a] else { continue };
-            let to = if beam.shift == [0; 3] { positions[b] } else { map.position(phase(there, b), from) };
+            // Phases that grow round holes are continued from where the cell was found.
+            let start = if map.solved().is_some_and(Phase::winds) { near } else { from };
+            let to = if beam.shift == [0; 3] { positions[b] } else { map.position(phase(there, b), start) };
             let Some(to) = to else { continue };
             if Aabb::EMPTY.with(from).with(to).intersection(bounds).is_empty() {
                 continue;

@@ -12,6 +12,7 @@ mod islands;
 mod local_thickness;
 mod measured;
 mod noisy_stress;
+mod periods;
 mod phase;
 mod pore;
 mod simplify;

@@ -1,0 +1,275 @@
+//! Multigrid for the normal equations of weighted differences along the edges of a grid.
+//!
+//! A V-cycle: Chebyshev polynomials of Jacobi's iteration as smoothers, trilinear interpolation, and on each coarser grid the seven
+//! points of the same form whose edges count what the edges about them count together, Galerkin's operator with its mass lumped. The
+//! cycle is symmetric, so it can precondition conjugate gradients, and neither its order nor its sums depend on the number of threads.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// Degree of the smoothers, and the least eigenvalue of D⁻¹A that they are for; no eigenvalue exceeds 2, by Gershgorin's circles.
+const SMOOTHER: (usize, f64) = (3, 0.3);
+/// The same for the coarsest grid.
+const COARSEST: (usize, f64) = (24, 0.02);
+/// Fewest nodes along an axis that is halved, and the ratio of steps up to which one is: weak axes wait for the strong.
+const LEAST: usize = 5;
+const APART: f64 = 1.5;
+/// Rows that are worked on in one go.
+const ROWS: usize = 8;
+
+/// A grid and the grids coarser than it.
+pub(super) struct Multigrid {
+    levels: Vec<Level>,
+}
+
+/// Σ w (Φⱼ − Φᵢ)² over the edges of a grid, x running fastest.
+pub(super) struct Level {
+    shape: [usize; 3],
+    /// For the edge above each node along each axis what the square of a difference counts; zero where there is no edge.
+    pub edges: [Vec<f64>; 3],
+    /// One over the sum of a node's edges; zero where it has none.
+    inverse: Vec<f64>,
+    /// The axes along which the next level has half as many nodes.
+    halved: [bool; 3],
+}
+
+/// Vectors of one level: the right-hand side, the solution, its last change, and what is left.
+struct Work {
+    right: Vec<f64>,
+    x: Vec<f64>,
+    change: Vec<f64>,
+    left: Vec<f64>,
+}
+
+impl Multigrid {
+    /// For what the square of a difference along each edge counts; `step` is the length of the edges along each axis.
+    pub fn new(shape: [usize; 3], step: [f64; 3], edges: [Vec<f64>; 3]) -> Multigrid {
+        let (mut levels, mut step) = (vec![Level::new(shape, edges)], step);
+        while let Some(coarser) = levels.last_mut().and_then(|l| l.coarsened(&mut step)) {
+            levels.push(coarser);
+        }
+        Multigrid { levels }
+    }
+
+    pub fn finest(&self) -> &Level {
+        &self.levels[0]
+    }
+
+    /// A cycle: what takes residuals of the finest level to corrections.
+    pub fn cycle(&self) -> impl FnMut(&[f64], &mut [f64]) + '_ {
+        let zeros = |l: &Level| Work {
+            right: vec![0.0; l.inverse.len()],
+            x: vec![0.0; l.inverse.len()],
+            change: vec![0.0; l.inverse.len()],
+            left: vec![0.0; l.inverse.len()],
+        };
+        let mut work: Vec<Work> = self.levels.iter().map(zeros).collect();
+        move |r, z| {
+            work[0].right.copy_from_slice(r);
+            descend(&self.levels, &mut work);
+            z.copy_from_slice(&work[0].x);
+        }
+    }
+}
+
+fn descend(levels: &[Level], work: &mut [Work]) {
+    let ([level, coarser @ ..], [own, below @ ..]) = (levels, work) else { return };
+    let ([_, ..], [next, ..]) = (coarser, &mut *below) else { return level.smooth(own, COARSEST, true) };
+    level.smooth(own, SMOOTHER, true);
+    let Work { right, x, left, .. } = own;
+    level.apply(x, left, |_, right, product| right - product, right);
+    level.restrict(&coarser[0], left, &mut next.right);
+    descend(coarser, below);
+    level.prolong(&coarser[0], &below[0].x, &mut own.x);
+    level.smooth(own, SMOOTHER, false);
+}
+
+impl Level {
+    fn new(shape: [usize; 3], edges: [Vec<f64>; 3]) -> Level {
+        let strides = [1, shape[0], shape[0] * shape[1]];
+        let sum = |n: usize| -> f64 {
+            (0..3).map(|a| edges[a][n] + n.checked_sub(strides[a]).map_or(0.0, |m| edges[a][m])).sum()
+        };
+        let all = shape.iter().product();
+        let inverse = (0..all).into_par_iter().map(sum).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+        Level { shape, edges, inverse, halved: [false; 3] }
+    }
+
+    /// The next level; `None` where no axis can be halved.
+    fn coarsened(&mut self, step: &mut [f64; 3]) -> Option<Level> {
+        let long = |a: usize| self.shape[a] >= LEAST;
+        let least = (0..3).filter(|a| long(*a)).map(|a| step[a]).fold(f64::INFINITY, f64::min);
+        self.halved = core::array::from_fn(|a| long(a) && step[a] < APART * least);
+        if !self.halved.contains(&true) {
+            return None;
+        }
+        let shape = core::array::from_fn(|a| if self.halved[a] { self.shape[a] / 2 + 1 } else { self.shape[a] });
+        (0..3).filter(|a| self.halved[*a]).for_each(|a| step[a] *= 2.0);
+        let strides = [1, self.shape[0], self.shape[0] * self.shape[1]];
+        // Along the edge two finer ones in a row, a half of the difference each; across it all whose ends have a share of this line.
+        let edge = |a: usize, n: usize| {
+            let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
+            if at[a] + 1 == shape[a] {
+                return 0.0;
+            }
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            let first = if self.halved[a] { 2 * at[a] } else { at[a] };
+            let parts = if self.halved[a] { &[(0, 0.25), (1, 0.25)][..] } else { &[(0, 1.0)] };
+            let mut sum = 0.0;
+            for (k, wk) in self.taps(c, at[c]) {
+                for (j, wj) in self.taps(b, at[b]) {
+                    for (i, wi) in parts.iter().filter(|(i, _)| first + i < self.shape[a]) {
+                        sum += wi * wj * wk * self.edges[a][(first + i) * strides[a] + j * strides[b] + k * strides[c]];
+                    }
+                }
+            }
+            sum
+        };
+        let all: usize = shape.iter().product();
+        let edges = core::array::from_fn(|a| (0..all).into_par_iter().map(|n| edge(a, n)).collect());
+        Some(Level::new(shape, edges))
+    }
+
+    /// The nodes along an axis in which node `i` of the next level has a share, with the shares.
+    fn taps(&self, axis: usize, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (first, all) = match self.halved[axis] {
+            true => (2 * i, &[(-1, 0.5), (0, 1.0), (1, 0.5)][..]),
+            false => (i, &[(0, 1.0)][..]),
+        };
+        let there = move |(by, w): &(isize, f64)| first.checked_add_signed(*by).map(|n| (n, *w));
+        all.iter().filter_map(there).filter(move |(n, _)| *n < self.shape[axis])
+    }
+
+    /// The nodes of the next level along an axis that have a share in node `i`, with the shares.
+    fn sources(&self, axis: usize, i: usize) -> [(usize, f64); 2] {
+        match (self.halved[axis], i % 2) {
+            (true, 1) => [(i / 2, 0.5), (i / 2 + 1, 0.5)],
+            (true, _) => [(i / 2, 1.0), (i / 2, 0.0)],
+            _ => [(i, 1.0), (i, 0.0)],
+        }
+    }
+
+    /// Gives each entry of `out` what `of` makes of it, of the entry of `given` and of that of A x.
+    pub fn apply(&self, x: &[f64], out: &mut [f64], of: impl Fn(f64, f64, f64) -> f64 + Sync, given: &[f64]) {
+        let nx = self.shape[0];
+        let rows = |(at, (out, given)): (usize, (&mut [f64], &[f64]))| {
+            let mut product = vec![0.0; nx];
+            for (i, (out, given)) in out.chunks_mut(nx).zip(given.chunks(nx)).enumerate() {
+                self.row(x, at * ROWS + i, &mut product);
+                out.iter_mut().zip(given).zip(&product).for_each(|((o, b), p)| *o = of(*o, *b, *p));
+            }
+        };
+        out.par_chunks_mut(nx * ROWS).zip(given.par_chunks(nx * ROWS)).enumerate().for_each(rows);
+    }
+
+    /// Row number `row` of A x.
+    fn row(&self, x: &[f64], row: usize, out: &mut [f64]) {
+        let [nx, ny, _] = self.shape;
+        let from = row * nx;
+        let own = &x[from..][..nx];
+        along(own, &self.edges[0][from..][..nx], out);
+        for (a, stride, at) in [(1, nx, row % ny), (2, nx * ny, row / ny)] {
+            if at + 1 < self.shape[a] {
+                across(own, &x[from + stride..][..nx], &self.edges[a][from..][..nx], out);
+            }
+            if at > 0 {
+                across(own, &x[from - stride..][..nx], &self.edges[a][from - stride..][..nx], out);
+            }
+        }
+    }
+
+    /// Improves the solution, or begins it, by a polynomial of D⁻¹A that is least on the eigenvalues from `low` to 2 (Saad, Iterative
+    /// methods for sparse linear systems, 2003, algorithm 12.1).
+    fn smooth(&self, work: &mut Work, (degree, low): (usize, f64), anew: bool) {
+        let (middle, half) = (0.5 * (2.0 + low), 0.5 * (2.0 - low));
+        let Work { right, x, change, left } = work;
+        let mut rho = half / middle;
+        for i in 0..degree {
+            let (keep, more) = match i {
+                0 => (0.0, 1.0 / middle),
+                _ => {
+                    let next = 1.0 / (2.0 * middle / half - rho);
+                    let both = (next * rho, 2.0 * next / half);
+                    rho = next;
+                    both
+                }
+            };
+            let first = anew && i == 0;
+            match first {
+                true => left.copy_from_slice(right),
+                false => self.apply(x, left, |_, right, product| right - product, right),
+            }
+            let parts = (
+                x.par_chunks_mut(4096),
+                change.par_chunks_mut(4096),
+                left.par_chunks(4096),
+                self.inverse.par_chunks(4096),
+            );
+            parts.into_par_iter().for_each(|(x, change, left, inverse)| {
+                for (((x, c), l), d) in x.iter_mut().zip(change).zip(left).zip(inverse) {
+                    *c = if i == 0 { more * d * l } else { keep * *c + more * d * l };
+                    *x = if first { *c } else { *x + *c };
+                }
+            });
+        }
+    }
+
+    /// What a vector of this level is on the next: the transpose of `prolong`.
+    fn restrict(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+        let [nx, ny, _] = self.shape;
+        let [cx, cy, _] = coarser.shape;
+        to.par_chunks_mut(cx).enumerate().for_each(|(row, to)| {
+            let mut line = vec![0.0; nx];
+            for (k, wk) in self.taps(2, row / cy) {
+                for (j, wj) in self.taps(1, row % cy) {
+                    let w = wj * wk;
+                    line.iter_mut().zip(&from[(k * ny + j) * nx..]).for_each(|(l, f)| *l += w * f);
+                }
+            }
+            for (i, t) in to.iter_mut().enumerate() {
+                *t = self.taps(0, i).map(|(n, w)| w * line[n]).sum();
+            }
+        });
+    }
+
+    /// Adds the trilinear interpolation of a vector of the next level.
+    fn prolong(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+        let [nx, ny, _] = self.shape;
+        let [cx, cy, _] = coarser.shape;
+        to.par_chunks_mut(nx).enumerate().for_each(|(row, to)| {
+            let mut line = vec![0.0; cx];
+            for (k, wk) in self.sources(2, row / ny) {
+                for (j, wj) in self.sources(1, row % ny) {
+                    let w = wj * wk;
+                    if w != 0.0 {
+                        line.iter_mut().zip(&from[(k * cy + j) * cx..]).for_each(|(l, f)| *l += w * f);
+                    }
+                }
+            }
+            for (i, t) in to.iter_mut().enumerate() {
+                *t += self.sources(0, i).into_iter().map(|(n, w)| w * line[n]).sum::<f64>();
+            }
+        });
+    }
+}
+
+/// What the edges along a row give of A x.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn along(x: &[f64], edges: &[f64], out: &mut [f64]) {
+    let n = x.len();
+    out[n - 1] = 0.0;
+    for ((o, w), d) in out.iter_mut().zip(edges).zip(x.windows(2)) {
+        *o = w * (d[0] - d[1]);
+    }
+    for ((o, w), d) in out[1..].iter_mut().zip(edges).zip(x.windows(2)) {
+        *o += w * (d[1] - d[0]);
+    }
+}
+
+/// Adds what edges to another row give of A x.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn across(x: &[f64], other: &[f64], edges: &[f64], out: &mut [f64]) {
+    for (((o, x), y), w) in out.iter_mut().zip(x).zip(other).zip(edges) {
+        *o += w * (x - y);
+    }
+}

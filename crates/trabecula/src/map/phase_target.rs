@@ -1,0 +1,147 @@
+//! What a solved map is asked for on its grid: wavelengths, frames, the gradients that they give, and what nodes count.
+
+use rayon::prelude::*;
+
+use super::frame::{Frames, in_mm};
+use super::phase::Wanted;
+use super::phase_grid::Grid;
+use super::smooth_frames::Smoothing;
+use crate::field::Field;
+use crate::grade::Grade;
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Mat3, Vec3, norm, scale};
+use geometry::progress::checkpoint;
+
+/// Weights fall off outside the region by e² for each of this many steps.
+const FALL: f64 = 3.0;
+/// Least root of a weight.
+const LEAST_ROOT: f64 = 1e-3;
+
+/// A grid over a region, and the wavelengths at its nodes.
+pub(super) struct Laid {
+    pub bounds: Aabb,
+    pub grid: Grid,
+    pub nodes: Vec<Vec3>,
+    /// The signed distance of each node from the region, mm.
+    pub depth: Vec<f64>,
+    /// Whether nodes are in the region.
+    pub inside: Vec<bool>,
+    pub wavelength: Vec<Vec3>,
+}
+
+impl Laid {
+    pub fn over(bounds: &Aabb, grid: Grid, wanted: &Wanted, region: Option<&dyn Field>) -> Result<Laid, Fault> {
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
+        checkpoint();
+        let mut depth = vec![f64::NEG_INFINITY; grid.len()];
+        if let Some(region) = region {
+            depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096)).for_each(|(d, p)| region.values(p, d));
+        }
+        let reach = 1e-9 * norm(bounds.size());
+        let inside = depth.iter().map(|d| *d <= reach).collect();
+        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, wavelength })
+    }
+
+    /// The root of the weight of a node; it falls off by e outside the region over some steps of the grid.
+    fn nearness(&self, steps: f64, node: usize) -> f64 {
+        (-self.depth[node].max(0.0) / (steps * self.longest())).exp()
+    }
+
+    /// The longest step of the grid, mm.
+    pub fn longest(&self) -> f64 {
+        self.grid.step.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The roots of the weights of nodes: closeness to the region, which falls off by e over some `steps` of the grid, times the target's
+    /// weight and how sure its frames are. `None` if all are one.
+    pub fn roots(&self, weight: Option<&Grade>, trust: Option<&[f64]>, steps: f64) -> Result<Option<Vec<f64>>, Fault> {
+        let mut close = self.closeness(weight, steps)?;
+        if let Some(trust) = trust {
+            let roots = close.get_or_insert_with(|| vec![1.0; self.grid.len()]);
+            roots.iter_mut().zip(trust).for_each(|(root, t)| *root = (*root * t.sqrt()).max(LEAST_ROOT));
+        }
+        Ok(close)
+    }
+
+    fn closeness(&self, weight: Option<&Grade>, steps: f64) -> Result<Option<Vec<f64>>, Fault> {
+        let mut roots = vec![1.0; self.grid.len()];
+        if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
+            weight.values(&self.nodes, &mut roots);
+            let most = roots.iter().copied().fold(0.0, f64::max);
+            let wrong = (roots.iter().zip(&self.nodes)).find(|(w, _)| !(**w >= 0.0 && w.is_finite()));
+            if let Some((w, p)) = wrong {
+                let message = format!(
+                    "{} at {}; a weight is a finite number from 0 up, all over the region's bounds",
+                    number(*w),
+                    in_mm(*p)
+                );
+                return Err(Fault::new("weight", message));
+            }
+            if most == 0.0 {
+                let message = "the weight is zero everywhere: nothing is asked for";
+                return Err(Fault::new("weight", message));
+            }
+            roots.iter_mut().for_each(|w| *w = (*w / most).sqrt());
+        } else if self.depth.iter().all(|d| *d <= 1e-6 * self.longest()) {
+            return Ok(None);
+        }
+        let roots = roots.iter().enumerate().map(|(n, w)| (w * self.nearness(steps, n)).max(LEAST_ROOT));
+        Ok(Some(roots.collect()))
+    }
+}
+
+/// The frames at the nodes, and the gradients of the three phases that they and the wavelengths ask for.
+pub(super) struct Target {
+    pub frames: Vec<Mat3>,
+    /// How sure frames are, from 0 to 1, where that differs.
+    pub trust: Option<Vec<f64>>,
+    /// The range of a stress, against which directions are more or less sure; 0 for other orientations.
+    pub range: f64,
+    pub k: [Vec<Vec3>; 3],
+}
+
+impl Target {
+    /// Signs and axes that are not given are chosen so that neighbours agree, the nearest to the part first, if it is known how far each
+    /// node is `outside`.
+    pub fn new(laid: &Laid, wanted: &Wanted, outside: Option<&[f64]>) -> Result<Target, Fault> {
+        let weight: Vec<f64> = (0..laid.grid.len()).map(|n| laid.nearness(FALL, n).powi(2)).collect();
+        let smoothing = wanted.smooth.map(|length| Smoothing { length, weight: &weight });
+        let Frames { at_nodes: frames, trust, range } =
+            wanted.orientation.frames(&laid.grid, &laid.nodes, smoothing.as_ref(), outside)?;
+        checkpoint();
+        let k = core::array::from_fn(|i| {
+            let of = frames.iter().zip(&laid.wavelength);
+            of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
+        });
+        Ok(Target { frames, trust, range, k })
+    }
+
+    /// The roots of the weights of nodes, as surroundings count where phases have one value everywhere.
+    pub fn roots(&self, laid: &Laid, wanted: &Wanted) -> Result<Option<Vec<f64>>, Fault> {
+        laid.roots(wanted.weight.as_ref(), self.trust.as_deref(), FALL)
+    }
+}
+
+/// The three wavelengths at points.
+pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
+    let mut out = vec![[0.0; 3]; points.len()];
+    let mut values = vec![0.0; points.len()];
+    for (i, grade) in of.iter().enumerate() {
+        grade.values(points, &mut values);
+        for ((o, v), p) in out.iter_mut().zip(&values).zip(points) {
+            if !(*v > 0.0 && v.is_finite()) {
+                return Err(Fault::new(
+                    "wavelength",
+                    format!(
+                        "{} mm at {}; a wavelength is a positive, finite length all over the region's bounds",
+                        number(*v),
+                        in_mm(*p)
+                    ),
+                ));
+            }
+            o[i] = *v;
+        }
+    }
+    Ok(out)
+}
