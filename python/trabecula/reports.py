@@ -34,6 +34,7 @@ __all__ = [
     "RegionReport",
     "RepairReport",
     "SimplifyReport",
+    "SingularLineReport",
     "SmoothReport",
     "SpecificSurface",
     "SurfaceReport",
@@ -241,6 +242,7 @@ class DistortionReport(Report):
         "anisotropy": "MapSpread",
         "curl": "MapSpread",
         "shear": "MapSpread",
+        "singular_lines": "SingularLineReport",
         "spacing": "MapSpread",
     }
 
@@ -256,6 +258,8 @@ class DistortionReport(Report):
     """Share of points and axes with a spacing ratio outside 1/1.5 to 1.5."""
     shear: MapSpread
     """Greatest deviation from a right angle between two gradients, degrees."""
+    singular_lines: list[SingularLineReport]
+    """Lines round which the wanted axes do not come back to themselves, at least half a wavelength long, the longest first."""
     spacing: list[MapSpread]
     """|∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
     whichever is greater."""
@@ -599,6 +603,17 @@ class SimplifyReport(Report):
     """Volume after, mm³."""
     volume_before: float
     """Volume before, mm³."""
+
+
+class SingularLineReport(Report):
+    """A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there."""
+
+    ends: list[list[float]]
+    """Its ends, mm, to a step of the map's grid; the same point where it is closed."""
+    length: float
+    """Its length within the region, mm, to about a tenth."""
+    turn: float
+    """By what the axes are turned once round it, degrees."""
 
 
 class SmoothReport(Report):

@@ -167,6 +167,12 @@ def _distortion(it: Report) -> Iterator[str]:
         f"most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
     )
     yield f"  turn       {it.turn:.1f}° per cell at most"
+    for line in it.singular_lines[:3]:
+        a, b = line.ends
+        place = f"from {point(a)} to {point(b)} mm" if a != b else f"closed, through {point(a)} mm"
+        yield f"  singular   {line.length:.1f} mm, axes turned by {line.turn:.0f}° once round it, {place}"
+    if more := it.singular_lines[3:]:
+        yield f"             and {counted(len(more), 'shorter one')}"
 
 
 def _period(it: Report) -> str:

@@ -13,7 +13,7 @@ use serde_json::Value as Json;
 pub use beams_report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, TrimmedReport};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
-    PeriodReport, RbfReport, RegionReport, TransitionReport,
+    PeriodReport, RbfReport, RegionReport, SingularLineReport, TransitionReport,
 };
 pub use mesh_report::{
     DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,

@@ -343,6 +343,9 @@ fn distortion(d: &Distortion) -> DistortionReport {
         density: d.density,
         curl: spread(&d.curl),
         turn: d.turn,
+        singular_lines: (d.singular.iter())
+            .map(|l| SingularLineReport { length: l.length, ends: l.ends, turn: l.turn })
+            .collect(),
     }
 }
 

@@ -223,6 +223,13 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
             at(d.turn_at)
         ));
     }
+    if let Some(longest) = d.singular.first() {
+        let all: f64 = d.singular.iter().map(|l| l.length).sum();
+        say(format!(
+            "axes do not come back to themselves round {}, {all:.1} mm in all: no lattice is without a flaw there",
+            longest.words(d.singular.len())
+        ));
+    }
     if d.outside > OUTSIDE {
         let worst = d.spacing.iter().fold(0.0, |m: f64, s| m.max(s.max));
         say(format!(

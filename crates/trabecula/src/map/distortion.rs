@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use rayon::prelude::*;
 
 use super::phase_grid::Grid;
+use super::singular_lines::SingularLine;
 use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
 
 /// A number over the region: its mean, its 95th percentile, its greatest value.
@@ -58,6 +59,8 @@ pub struct Distortion {
     pub turn: f64,
     /// Where that is, mm.
     pub turn_at: Vec3,
+    /// The lines round which the target's axes do not come back to themselves.
+    pub singular: Vec<SingularLine>,
 }
 
 /// Deviation of the gradients from the targets at one position.
@@ -128,6 +131,16 @@ impl Distortion {
             turn,
             turn_at,
             ..Distortion::default()
+        }
+    }
+
+    /// The singular lines in words that continue a sentence; nothing where there is none.
+    pub(super) fn winds(&self) -> String {
+        match self.singular.first() {
+            None => String::new(),
+            Some(longest) => {
+                format!("; axes do not come back to themselves round {}", longest.words(self.singular.len()))
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use rayon::prelude::*;
 
 use super::phase_grid::Grid;
+use super::singular_lines::Alike;
 use super::smooth_frames::{LEAST_AVERAGE, Smoothing};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
@@ -163,6 +164,18 @@ impl Orientation {
             Orientation::Direction(of) => of.is_constant(),
             Orientation::Frame { x, z } => x.is_constant() && z.is_constant(),
             Orientation::Stress(of) => constant(of),
+        }
+    }
+
+    /// What counts as the same axes.
+    pub(super) fn alike(&self) -> Alike {
+        match self {
+            Orientation::Direction(_) => Alike::Line,
+            Orientation::Stress(_) => Alike::Turned(cube()),
+            Orientation::Frame { .. } if self.is_combed() => {
+                Alike::Turned(cube().into_iter().filter(|t| (0..3).all(|a| t[a][a] != 0.0)).collect())
+            }
+            Orientation::Angles(_) | Orientation::Frame { .. } => Alike::Turned(vec![IDENTITY]),
         }
     }
 
@@ -400,7 +413,7 @@ fn turned_from_z(d: Vec3) -> Mat3 {
 }
 
 /// The 24 rotations of a cube.
-fn cube() -> Vec<Mat3> {
+pub(super) fn cube() -> Vec<Mat3> {
     let mut all = Vec::new();
     for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         for signs in 0..8 {

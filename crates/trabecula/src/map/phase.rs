@@ -16,6 +16,7 @@ use super::periods::{Angles, Period};
 use super::phase_grid::Grid;
 use super::phase_target::{Laid, Target, wavelengths};
 use super::region_holes::{MOST, Sought};
+use super::singular_lines::singular_lines;
 use super::solution::Solution;
 use super::spline::Spline;
 use super::winding::Winding;
@@ -138,7 +139,11 @@ impl Phase {
         }
         let lengths_range =
             (laid.wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
+        let axes = &found.target.frames;
+        let lines = singular_lines(&laid.grid, axes, &laid.inside, &wanted.orientation.alike(), 0.5 * lengths_range[0]);
+        found.judged.distortion.singular = lines;
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
+            tried += &found.judged.distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1]), &tried));
         }
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. } } = found;

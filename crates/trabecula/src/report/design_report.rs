@@ -143,6 +143,19 @@ pub struct DistortionReport {
     pub curl: MapSpread,
     /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
+    /// Lines round which the wanted axes do not come back to themselves, at least half a wavelength long, the longest first.
+    pub singular_lines: Vec<SingularLineReport>,
+}
+
+/// A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct SingularLineReport {
+    /// Its length within the region, mm, to about a tenth.
+    pub length: f64,
+    /// Its ends, mm, to a step of the map's grid; the same point where it is closed.
+    pub ends: [[f64; 3]; 2],
+    /// By what the axes are turned once round it, degrees.
+    pub turn: f64,
 }
 
 /// The whole numbers of cells round a hole of the region.

@@ -6,6 +6,7 @@ mod combined;
 mod common;
 mod crease;
 mod damage;
+mod disclinations;
 mod fields;
 mod flush;
 mod islands;

@@ -1,0 +1,343 @@
+//! Singular lines of a field of frames: lines round which the axes do not come back to themselves.
+//!
+//! From node to node the axes are followed to the nearest ones. Once round a face of the grid they come back turned by one of the
+//! rotations that take axes to axes (the holonomy), or by a whole turn; unless they come back as they were, a line pierces the face. No
+//! phases have these gradients about such a line. (Nieser, Reitebuch, Polthier, CubeCover, Comput. Graph. Forum 30, 2011.)
+
+use rayon::prelude::*;
+
+use super::phase_grid::Grid;
+use geometry::math::{Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
+use geometry::union_find;
+
+/// What counts as the same axes.
+pub(super) enum Alike {
+    /// The third axis and its opposite; the others follow it.
+    Line,
+    /// Frames that differ by one of these rotations, with which any two have their product.
+    Turned(Vec<Mat3>),
+}
+
+/// A line round which the axes do not come back to themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SingularLine {
+    /// Its length within the region, mm, to about a tenth.
+    pub length: f64,
+    /// Its ends, mm; the same point where it is closed.
+    pub ends: [Vec3; 2],
+    /// By what the axes are turned once round it, degrees.
+    pub turn: f64,
+}
+
+impl SingularLine {
+    /// Where it is, as the longest of `count` lines.
+    pub(crate) fn words(&self, count: usize) -> String {
+        let at = |[x, y, z]: Vec3| format!("({x:.1}, {y:.1}, {z:.1})");
+        let [a, b] = self.ends;
+        let place = if a == b {
+            format!("a ring through {} mm", at(a))
+        } else {
+            format!("a line from {} to {} mm", at(a), at(b))
+        };
+        match count {
+            1 => place,
+            _ => format!("{count} lines, of which the longest is {place}"),
+        }
+    }
+}
+
+/// A face that a line pierces: its first node, the axis along which it is pierced, the turn once round it.
+struct Pierced {
+    node: usize,
+    axis: usize,
+    turn: f64,
+}
+
+/// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid.
+pub(super) fn singular_lines(
+    grid: &Grid,
+    frames: &[Mat3],
+    inside: &[bool],
+    alike: &Alike,
+    least: f64,
+) -> Vec<SingularLine> {
+    let strides = grid.strides();
+    let last = |n: usize, a: usize| grid.index(n)[a] + 1 == grid.shape[a];
+    // Edges along which axes turn by less than an eighth: round a face of such they come back.
+    let quick: Vec<[bool; 3]> = (0..grid.len())
+        .into_par_iter()
+        .map(|n| [0, 1, 2].map(|a| last(n, a) || !inside[n] || alike.is_near(&frames[n], &frames[n + strides[a]])))
+        .collect();
+    let faces = (0..grid.len()).into_par_iter().flat_map_iter(|n| {
+        let quick = &quick;
+        (0..3).filter_map(move |axis| {
+            let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+            if last(n, a) || last(n, b) {
+                return None;
+            }
+            let [p, q] = [n + strides[a], n + strides[b]];
+            let round = [n, p, p + strides[b], q];
+            if (quick[n][a] && quick[n][b] && quick[p][b] && quick[q][a]) || !round.iter().all(|m| inside[*m]) {
+                return None;
+            }
+            let turn = alike.round(&round.map(|m| frames[m]));
+            (turn > 0.0).then_some(Pierced { node: n, axis, turn })
+        })
+    });
+    let faces: Vec<Pierced> = faces.collect();
+    lines(grid, &faces, least)
+}
+
+/// Pierced faces that are joined through cells of the grid, as lines.
+fn lines(grid: &Grid, faces: &[Pierced], least: f64) -> Vec<SingularLine> {
+    let strides = grid.strides();
+    let middle = |f: &Pierced| {
+        let off = |a: usize| if a == f.axis { 0.0 } else { 0.5 * grid.step[a] };
+        add(grid.node(f.node), [0, 1, 2].map(off))
+    };
+    // Both cells of each face, by their first nodes; below the first node's own there may be none.
+    let mut of_cells: Vec<(usize, usize)> = faces
+        .iter()
+        .enumerate()
+        .flat_map(|(i, f)| {
+            let at = grid.index(f.node)[f.axis];
+            let above = (at + 1 < grid.shape[f.axis]).then_some((f.node, i));
+            let below = (at > 0).then(|| (f.node - strides[f.axis], i));
+            [above, below].into_iter().flatten()
+        })
+        .collect();
+    of_cells.sort_unstable();
+    let cells: Vec<&[(usize, usize)]> = of_cells.chunk_by(|a, b| a.0 == b.0).collect();
+    let mut root = union_find::singles(faces.len());
+    for pair in cells.iter().flat_map(|c| c.windows(2)) {
+        union_find::unite(&mut root, pair[0].1 as u32, pair[1].1 as u32);
+    }
+    let (line, count) = union_find::labels(&mut root);
+    // Through a cell a line goes from the middle of a face to that of another.
+    let (mut length, mut uses) = (vec![0.0; count], vec![0; faces.len()]);
+    for cell in cells.iter().filter(|c| c.len() > 1) {
+        let points: Vec<Vec3> = cell.iter().map(|(_, i)| middle(&faces[*i])).collect();
+        let sum = points.iter().fold([0.0; 3], |s, p| add(s, *p));
+        let centre = scale(sum, 1.0 / points.len() as f64);
+        length[line[cell[0].1] as usize] += points.iter().map(|p| norm(sub(*p, centre))).sum::<f64>();
+        cell.iter().for_each(|(_, i)| uses[*i] += 1);
+    }
+    let mut members = vec![Vec::new(); count];
+    line.iter().enumerate().for_each(|(i, l)| members[*l as usize].push(i));
+    let of = |(members, length): (&Vec<usize>, f64)| {
+        let point = |i: usize| middle(&faces[i]);
+        let open = || members.iter().copied().filter(|i| uses[*i] < 2);
+        let from = point(open().next().unwrap_or(members[0]));
+        let far = |i: &usize| norm(sub(point(*i), from));
+        let end = open().max_by(|a, b| far(a).total_cmp(&far(b)));
+        SingularLine { length, ends: [from, end.map_or(from, point)], turn: faces[members[0]].turn }
+    };
+    let mut found: Vec<SingularLine> = members.iter().zip(length).map(of).collect();
+    found.retain(|l| l.length >= least);
+    found.sort_by(|a, b| b.length.total_cmp(&a.length));
+    apart(found, 2.0 * norm(grid.step))
+}
+
+/// Lines with those that run within a distance of them made one, at their mean place: a whole turn of axes that are alike after a
+/// quarter is four quarters, some steps of the grid apart.
+fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
+    let mut kept: Vec<(SingularLine, Vec3)> = Vec::new();
+    let close = |a: Vec3, b: Vec3| norm(sub(a, b)) < near;
+    for line in lines {
+        let [a, b] = line.ends;
+        // As it was found: means wander.
+        let beside = |(k, from): &&mut (SingularLine, Vec3)| {
+            let to = add(*from, sub(k.ends[1], k.ends[0]));
+            (close(a, *from) && close(b, to)) || (close(b, *from) && close(a, to))
+        };
+        let Some((k, from)) = kept.iter_mut().find(beside) else {
+            kept.push((line, a));
+            continue;
+        };
+        let [a, b] = if close(a, *from) { [a, b] } else { [b, a] };
+        let share = line.turn / (k.turn + line.turn);
+        k.ends = [(k.ends[0], a), (k.ends[1], b)].map(|(k, l)| add(k, scale(sub(l, k), share)));
+        k.turn += line.turn;
+    }
+    kept.into_iter().map(|k| k.0).collect()
+}
+
+impl Alike {
+    /// Whether the axes of two frames differ by so little that once round a face of four such edges they come back.
+    fn is_near(&self, a: &Mat3, b: &Mat3) -> bool {
+        match self {
+            Alike::Line => dot(third(a), third(b)) > 0.0,
+            // Twice the cosine of an eighth of a turn, and one.
+            Alike::Turned(_) => agreement(a, b) > 1.0 + core::f64::consts::SQRT_2,
+        }
+    }
+
+    /// By what the axes are turned once round four frames, degrees; zero where they come back as they were.
+    fn round(&self, frames: &[Mat3; 4]) -> f64 {
+        let pairs = || (0..4).map(|i| (&frames[i], &frames[(i + 1) % 4]));
+        match self {
+            Alike::Line => {
+                let turned = pairs().filter(|(a, b)| dot(third(a), third(b)) < 0.0).count();
+                if turned % 2 == 1 { 180.0 } else { 0.0 }
+            }
+            Alike::Turned(all) => {
+                // The rotations in space, one after the other, as quaternions: a whole turn is −1.
+                let step = |(a, b): (&Mat3, &Mat3)| {
+                    let near =
+                        all.iter().map(|t| product(b, t)).max_by(|p, q| agreement(a, p).total_cmp(&agreement(a, q)));
+                    quaternion(&product(&near.unwrap_or(*b), &transpose(a)))
+                };
+                // Each edge is followed in one direction, so that both faces at it see the same.
+                let steps = (0..4).map(|i| match i {
+                    0 | 1 => step((&frames[i], &frames[i + 1])),
+                    _ => conjugate(step((&frames[(i + 1) % 4], &frames[i]))),
+                });
+                let [w, ..] = steps.fold([1.0, 0.0, 0.0, 0.0], |q, s| times(s, q));
+                let turn = 2.0 * w.clamp(-1.0, 1.0).acos().to_degrees();
+                // Rotations that take axes to axes turn by 90 degrees or more.
+                if turn < 45.0 { 0.0 } else { turn.round() }
+            }
+        }
+    }
+}
+
+fn third(m: &Mat3) -> Vec3 {
+    [m[0][2], m[1][2], m[2][2]]
+}
+
+/// One and twice the cosine of the angle between two frames.
+fn agreement(a: &Mat3, b: &Mat3) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+}
+
+/// The unit quaternion of a rotation by at most half a turn, w ≥ 0.
+fn quaternion(m: &Mat3) -> [f64; 4] {
+    // The column of the largest entry of 4 q qᵀ, which is free of cancellation.
+    let t = m[0][0] + m[1][1] + m[2][2];
+    let squares = [1.0 + t, 1.0 + 2.0 * m[0][0] - t, 1.0 + 2.0 * m[1][1] - t, 1.0 + 2.0 * m[2][2] - t];
+    let [x, y, z] = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
+    let sums = [m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]];
+    let largest = (0..4).fold(0, |k, i| if squares[i] > squares[k] { i } else { k });
+    let q = match largest {
+        0 => [squares[0], x, y, z],
+        1 => [x, squares[1], sums[0], sums[1]],
+        2 => [y, sums[0], squares[2], sums[2]],
+        _ => [z, sums[1], sums[2], squares[3]],
+    };
+    let size = q.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
+    q.map(|v| sign * v / size)
+}
+
+fn conjugate([w, x, y, z]: [f64; 4]) -> [f64; 4] {
+    [w, -x, -y, -z]
+}
+
+/// The product of two quaternions.
+fn times([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 4] {
+    [
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::math::{Aabb, IDENTITY, rotation};
+
+    fn equal() -> Alike {
+        Alike::Turned(vec![IDENTITY])
+    }
+
+    fn grid() -> Grid {
+        Grid::over(&Aabb { min: [-5.0, -4.0, 0.0], max: [6.0, 5.0, 8.0] }, [24, 22, 18])
+    }
+
+    fn found(alike: &Alike, frame: impl Fn(Vec3) -> Mat3, solid: impl Fn(Vec3) -> bool) -> Vec<SingularLine> {
+        let g = grid();
+        let nodes: Vec<Vec3> = (0..g.len()).map(|n| g.node(n)).collect();
+        let frames: Vec<Mat3> = nodes.iter().map(|p| frame(*p)).collect();
+        let inside: Vec<bool> = nodes.iter().map(|p| solid(*p)).collect();
+        singular_lines(&g, &frames, &inside, alike, 0.0)
+    }
+
+    /// Frames turned about y, so that their third axes lie in the plane of x and z, by `index` turns once round a line along y, and
+    /// with it by a rotation of all, in which nothing may depend on the axes of the grid.
+    fn about(index: f64) -> impl Fn(Vec3) -> Mat3 {
+        move |[x, _, z]| rotation([0.0, -index * (z - 3.3).atan2(x - 0.7).to_degrees(), 0.0])
+    }
+
+    /// A line along y that ends where the part does, one step about.
+    fn is_at(line: &SingularLine, turn: f64) {
+        let [a, b] = line.ends;
+        for p in [a, b] {
+            assert!((p[0] - 0.7).abs() <= 0.5 && (p[2] - 3.3).abs() <= 0.5, "{line:?}");
+        }
+        // From the first row of nodes to the last.
+        assert!((line.length - 9.0).abs() < 0.5 && ((b[1] - a[1]).abs() - line.length).abs() < 1e-9, "{line:?}");
+        assert_eq!(line.turn, turn);
+    }
+
+    #[test]
+    fn disclinations_are_at_their_place() {
+        let quarter = Alike::Turned(crate::map::frame::cube());
+        for (alike, index, turn) in
+            [(&Alike::Line, 0.5, 180.0), (&quarter, 0.5, 180.0), (&quarter, -0.25, 90.0), (&equal(), 1.0, 360.0)]
+        {
+            let lines = found(alike, about(index), |_| true);
+            assert_eq!(lines.len(), 1, "{index}: {lines:?}");
+            is_at(&lines[0], turn);
+        }
+    }
+
+    /// Where the line lies in a hole of the part there is none, nor in a field that turns by less.
+    #[test]
+    fn there_is_none_in_a_hole() {
+        let quarter = Alike::Turned(crate::map::frame::cube());
+        let hole = |[x, _, z]: Vec3| (x - 0.7).hypot(z - 3.3) > 1.0;
+        assert_eq!(found(&quarter, about(0.25), hole), []);
+        let slow = |p: Vec3| rotation([20.0 * p[0], 5.0 * p[1] * p[2], -8.0 * p[0]]);
+        for alike in [&Alike::Line, &quarter, &equal()] {
+            assert_eq!(found(alike, slow, |_| true), []);
+        }
+    }
+
+    /// Signs and axes of the frames do not count, whatever each node has.
+    #[test]
+    fn arbitrary_axes_change_nothing() {
+        let turns = crate::map::frame::cube();
+        let quarter = Alike::Turned(turns.clone());
+        let mut s = 3u64;
+        let mut any: Vec<usize> =
+            (0..grid().len()).map(|_| (24.0 * geometry::random::random(&mut s).abs()) as usize % 24).collect();
+        let plain = found(&quarter, about(0.25), |_| true);
+        let next = std::cell::RefCell::new(&mut any);
+        let mixed =
+            found(&quarter, |p| product(&about(0.25)(p), &turns[next.borrow_mut().pop().unwrap_or(0)]), |_| true);
+        assert_eq!(plain, mixed);
+        is_at(&mixed[0], 90.0);
+    }
+
+    /// A closed line has no ends: half a turn once round a ring.
+    #[test]
+    fn rings_are_closed() {
+        let frame = |p: Vec3| {
+            let [x, y, z] = sub(p, [0.52, 0.47, 4.03]);
+            let (r, around) = (x.hypot(y), y.atan2(x).to_degrees());
+            let turn = 0.5 * z.atan2(r - 2.6).to_degrees();
+            // About the ring's tangent.
+            let about = rotation([0.0, 0.0, around]);
+            product(&product(&about, &rotation([0.0, turn, 0.0])), &transpose(&about))
+        };
+        let ring = |p: Vec3| (p[0] - 0.52).hypot(p[1] - 0.47) > 0.9;
+        let lines = found(&Alike::Line, frame, ring);
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        assert_eq!(lines[0].ends[0], lines[0].ends[1]);
+        // A chain of the middles of faces is up to a tenth longer than a circle.
+        let round = core::f64::consts::TAU * 2.6;
+        assert!(lines[0].length > 0.95 * round && lines[0].length < 1.12 * round, "{lines:?} of {round}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Lines round which directions wind are found where closed forms have them.
+
+use trabecula::design::{Built, Design, DesignError, NoFiles};
+use trabecula::report::SingularLineReport;
+
+fn built(orientation: &str, folds: bool) -> Result<Built, DesignError> {
+    let text = format!(
+        "schema = 1\n[region.box]\nmin = [-9, -8, 0]\nmax = [10, 9, 6]\n[lattice.core]\ncell = \"primitive\"\npart = \"lower\"\n\
+         map.phase = {{ wavelength = 3, folds = {folds}, {orientation} }}\nlevel.fraction = 0.5"
+    );
+    Design::from_toml(&text)?.build(&NoFiles)
+}
+
+fn lines(orientation: &str) -> Vec<SingularLineReport> {
+    built(orientation, true).expect("built").report().lattices["core"]
+        .distortion
+        .clone()
+        .expect("solved")
+        .singular_lines
+}
+
+/// The stress x, −x, y of a half disclination, moved; a stress that goes round an axis; a direction that is half as fast as the angle.
+#[test]
+fn closed_forms_have_one_line_at_its_place() {
+    let [x, y] = ["(x - 0.6)", "(y - 1.3)"];
+    let r = format!("sqrt({x}^2 + {y}^2 + 1e-9)");
+    let f = |text: String| format!("{{ formula = \"{text}\" }}");
+    let plane = |xx: String, yy: String, xy: String| format!("stress = [{}, {}, -20, 0, 0, {}]", f(xx), f(yy), f(xy));
+    for (what, orientation, turn) in [
+        ("half", plane(x.into(), format!("-{x}"), y.into()), 180.0),
+        ("trisector", plane(x.into(), format!("-{x}"), format!("-{y}")), 180.0),
+        ("hoop", plane(format!("{y}^2/{r}"), format!("{x}^2/{r}"), format!("-{x}*{y}/{r}")), 360.0),
+        (
+            "line",
+            format!(
+                "direction = [{}, {}, 0]",
+                f(format!("sqrt(({r} + {x})/2)")),
+                f(format!("{y}/sqrt(2*({r} + {x}))"))
+            ),
+            180.0,
+        ),
+    ] {
+        let found = lines(&orientation);
+        println!("{what}: {found:?}");
+        assert_eq!(found.len(), 1, "{what}: {found:?}");
+        let line = found[0];
+        // Steps are at most 3/4 mm; from the first row of nodes to the last.
+        for [x, y, _] in line.ends {
+            assert!((x - 0.6).abs() < 0.75 && (y - 1.3).abs() < 0.75, "{what}: {line:?}");
+        }
+        assert!((line.length - 6.0).abs() < 0.01, "{what}: {line:?}");
+        assert_eq!(line.turn, turn, "{what}");
+    }
+}
+
+/// A map that folds for that reason names the line.
+#[test]
+fn what_folds_names_its_line() {
+    let message = built("stress = [{ formula = \"x\" }, { formula = \"-x\" }, -20, 0, 0, { formula = \"y\" }]", false);
+    let message = message.err().expect("it folds").to_string();
+    assert!(message.contains("axes do not come back to themselves round a line from"), "{message}");
+}
