@@ -29,6 +29,7 @@ __all__ = [
     "MeshReport",
     "MinMeanMax",
     "NarrowestNeck",
+    "PeriodReport",
     "QualityReport",
     "RbfReport",
     "RegionReport",
