@@ -24,6 +24,7 @@ SHOWN = (
     ("hybrid_bar", 24, 290, 25),
     ("hybrid_rbf_gyroid", 16, 270, 55),
     ("oriented_vortex", 20, 270, 55),
+    ("pressure_tube", 24, 30, 50),
     ("swept_beam", 20, 280, 40),
     ("wrapped_tube", 24, 30, 35),
     ("wavy_panel", 24, 300, 35),

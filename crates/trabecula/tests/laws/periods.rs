@@ -300,3 +300,36 @@ fn what_cannot_close_is_refused_and_what_is_straight_stays() {
         assert!(map.periods().is_empty());
     }
 }
+
+/// A plate with a hole in tension (Kirsch, 1898): beyond a cell from the hole axes are within 3 degrees of the principal ones in the mean,
+/// with no fold anywhere, and as many cells enter above the hole as leave below it: none goes round.
+#[test]
+fn kirsch_is_followed_past_the_hole() {
+    let (a, wave) = (5.0, 3.0);
+    let plate: Region = Arc::new(Cuboid::new([-25.0, -25.0, 0.0], [25.0, 25.0, 6.0]).expect("plate"));
+    let hole: Region = Arc::new(Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], a, 8.0).expect("hole"));
+    let region: Region = Arc::new(Difference::new(vec![plate, hole]).expect("part"));
+    // Polar components for unit tension along x, turned to x and y.
+    let r2 = "(x^2 + y^2 + 1e-9)";
+    let [double, sine, q] = [format!("((x^2 - y^2)/{r2})"), format!("(2*x*y/{r2})"), format!("({}/{r2})", a * a)];
+    let rr = format!("(0.5*(1 - {q}) + 0.5*(1 - 4*{q} + 3*{q}^2)*{double})");
+    let tt = format!("(0.5*(1 + {q}) - 0.5*(1 + 3*{q}^2)*{double})");
+    let rt = format!("(-0.5*(1 + 2*{q} - 3*{q}^2)*{sine})");
+    let [cc, ss, cs] = [format!("(x^2/{r2})"), format!("(y^2/{r2})"), format!("(x*y/{r2})")];
+    let xx = format!("{rr}*{cc} + {tt}*{ss} - 2*{rt}*{cs}");
+    let yy = format!("{rr}*{ss} + {tt}*{cc} + 2*{rt}*{cs}");
+    let xy = format!("({rr} - {tt})*{cs} + {rt}*({cc} - {ss})");
+    let zero = || Grade::Constant(0.0);
+    let stress = [formula(&xx), formula(&yy), zero(), zero(), zero(), formula(&xy)];
+    let map = solve(&region, &wanted(wave, Orientation::Stress(stress)), None);
+    assert!(map.periods().iter().all(|p| p.cells == [0; 3]), "{:?}", map.periods());
+    let points = within(&region, 20_000, 9);
+    assert!(points.iter().all(|p| determinant(&map.jacobian(*p)) > 0.0));
+    let far: Vec<Vec3> = points.into_iter().filter(|p| p[0].hypot(p[1]) > a + wave).collect();
+    let misfits = map.misfits(&far).expect("targets");
+    for i in 0..3 {
+        let mean = misfits.iter().map(|m| m.angle[i]).sum::<f64>() / far.len() as f64;
+        println!("axis {i}: {mean:.2} degrees in the mean");
+        assert!(mean < 3.0, "{i}: {mean}");
+    }
+}
