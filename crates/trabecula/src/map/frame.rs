@@ -1,6 +1,6 @@
 //! Orientation of cells: orthonormal frames from angles, vectors or a stress tensor.
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
@@ -432,6 +432,10 @@ pub(super) fn cube() -> Vec<Mat3> {
 /// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
 fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
     let agree = |m: &Mat3| -> f64 { m.as_flattened().iter().zip(to.as_flattened()).map(|(a, b)| a * b).sum() };
+    // Turns of the cube are a quarter or more: within an eighth, whose cosine this is, there is no nearer one.
+    if agree(f) > 1.0 + core::f64::consts::SQRT_2 {
+        return *f;
+    }
     let all = turns.iter().map(|t| product(f, t));
     all.max_by(|a, b| agree(a).total_cmp(&agree(b))).unwrap_or(*f)
 }
@@ -464,36 +468,6 @@ fn least_turn(from: Vec3, to: Vec3) -> Mat3 {
     core::array::from_fn(|i| core::array::from_fn(|j| IDENTITY[i][j] + k[i][j] + s * kk[i][j]))
 }
 
-/// A node that may be reached next.
-struct Step {
-    sure: f64,
-    /// How sure the node is that it is reached from.
-    behind: f64,
-    node: usize,
-    from: usize,
-}
-
-impl PartialEq for Step {
-    fn eq(&self, o: &Step) -> bool {
-        self.cmp(o) == Ordering::Equal
-    }
-}
-impl Eq for Step {}
-impl PartialOrd for Step {
-    fn partial_cmp(&self, o: &Step) -> Option<Ordering> {
-        Some(self.cmp(o))
-    }
-}
-impl Ord for Step {
-    fn cmp(&self, o: &Step) -> Ordering {
-        self.sure
-            .total_cmp(&o.sure)
-            .then(self.behind.total_cmp(&o.behind))
-            .then(o.node.cmp(&self.node))
-            .then(o.from.cmp(&self.from))
-    }
-}
-
 /// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
 /// nodes come last, so that none depends on them. The first is made to agree with the coordinate axes.
 fn comb<T: Copy + FirstOf>(
@@ -503,13 +477,21 @@ fn comb<T: Copy + FirstOf>(
     agree: impl Fn(usize, &T, &T) -> T,
 ) {
     let strides = grid.strides();
+    let sure: Vec<f64> = (0..values.len()).map(sure).collect();
+    // The surest first, of equals the first node: the number of a node in this order says when it is its turn, and of the nodes that
+    // it may be reached from the least is the one.
+    let mut order: Vec<u32> = (0..values.len() as u32).collect();
+    order.par_sort_unstable_by(|&a, &b| sure[b as usize].total_cmp(&sure[a as usize]).then(a.cmp(&b)));
+    let mut rank = vec![0u32; order.len()];
+    order.iter().zip(0..).for_each(|(n, r)| rank[*n as usize] = r);
     let mut reached = vec![false; values.len()];
-    let mut heap = BinaryHeap::new();
-    let start = (0..values.len()).max_by(|&a, &b| sure(a).total_cmp(&sure(b)).then(b.cmp(&a))).unwrap_or(0);
+    let mut from_rank = vec![u32::MAX; values.len()];
+    let mut heap = BinaryHeap::from([Reverse(0u64)]);
+    let start = order.first().map_or(0, |n| *n as usize);
     values[start] = agree(start, &values[start], &T::FIRST);
-    heap.push(Step { sure: sure(start), behind: sure(start), node: start, from: start });
-    while let Some(Step { node, from, .. }) = heap.pop() {
+    while let Some(Reverse(step)) = heap.pop() {
         checkpoint();
+        let [node, from] = [step >> 32, step & 0xffff_ffff].map(|r| order[r as usize] as usize);
         if core::mem::replace(&mut reached[node], true) {
             continue;
         }
@@ -519,7 +501,10 @@ fn comb<T: Copy + FirstOf>(
             let below = (at[a] > 0).then(|| node - strides[a]);
             let above = (at[a] + 1 < grid.shape[a]).then(|| node + strides[a]);
             for next in below.into_iter().chain(above).filter(|&n| !reached[n]) {
-                heap.push(Step { sure: sure(next), behind: sure(node), node: next, from: node });
+                if rank[node] < from_rank[next] {
+                    from_rank[next] = rank[node];
+                    heap.push(Reverse(u64::from(rank[next]) << 32 | u64::from(rank[node])));
+                }
             }
         }
     }
