@@ -58,7 +58,6 @@ pub mod formats;
 pub mod math;
 pub mod measure;
 pub mod mesh;
-pub mod periodic_voxels;
 pub mod progress;
 pub mod random;
 mod remesh;
@@ -72,6 +71,7 @@ pub mod symmetry;
 pub mod tetmesh;
 pub mod transform;
 pub mod union_find;
+pub mod voxel_distances;
 pub mod voxels;
 pub mod weld;
 

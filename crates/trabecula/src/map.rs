@@ -6,7 +6,6 @@ mod cohomology;
 mod distortion;
 mod edge_squares;
 mod frame;
-mod grid_distance;
 mod integral;
 mod inverse;
 mod multigrid;

@@ -15,6 +15,8 @@ use geometry::fault::number;
 const TURN: f64 = 45.0;
 /// The fraction of nodes and axes with spacings outside 1/1.5 to 1.5 above which there is a warning.
 const OUTSIDE: f64 = 0.05;
+/// The density of cells over the one asked for below which there is a warning: they are drawn out twenty times.
+const PRESSED: f64 = 0.05;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
 
@@ -240,6 +242,13 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
     }
     if d.density[0] <= 0.0 {
         say(format!("the map folds: cells turn inside out at {}", at(d.least_at)));
+    } else if d.density[0] < PRESSED {
+        say(format!(
+            "the map nearly folds: cells are {:.1} % as many in a volume as asked for at {}, where axes may not fit together; let \
+             orientation and wavelength vary more slowly, or keep that place out of the part",
+            100.0 * d.density[0],
+            at(d.least_at)
+        ));
     }
 }
 

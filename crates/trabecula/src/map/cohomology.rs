@@ -9,10 +9,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::grid_distance::distances;
 use super::phase_grid::Grid;
 use geometry::progress::checkpoint;
 use geometry::union_find::{singles, unite};
+use geometry::voxel_distances::distances;
 
 /// Parts of a step that the distances of faces are rounded to, by which they are put in order.
 const SHELLS: f64 = 8.0;
@@ -192,7 +192,7 @@ pub(super) struct Cohomology {
 
 /// The closed cochains of the nodes that are inside, with the edges, faces and cubes between them.
 pub(super) fn cohomology(grid: &Grid, inside: &[bool]) -> Cohomology {
-    let distance = distances(grid, inside);
+    let distance = distances(inside, grid.shape, grid.step);
     let width = grid.step.into_iter().fold(f64::INFINITY, f64::min) / SHELLS;
     let shells: Vec<u32> = distance.iter().map(|d| (d / width).ceil().min(1e5) as u32).collect();
     let last = 4 * shells.iter().copied().max().unwrap_or(0) as usize;

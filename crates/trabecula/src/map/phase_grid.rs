@@ -37,6 +37,21 @@ impl Grid {
         [1, self.shape[0], self.shape[0] * self.shape[1]]
     }
 
+    /// The middle of the face at right angles to an axis above node `n`.
+    pub fn face_middle(&self, n: usize, axis: usize) -> Vec3 {
+        let mut p = self.node(n);
+        for a in (0..3).filter(|a| *a != axis) {
+            p[a] += 0.5 * self.step[a];
+        }
+        p
+    }
+
+    /// The cells below and above that face, by their first nodes; `None` beyond the grid.
+    pub fn cells_of_face(&self, n: usize, axis: usize) -> [Option<usize>; 2] {
+        let at = self.index(n)[axis];
+        [(at > 0).then(|| n - self.strides()[axis]), (at + 1 < self.shape[axis]).then_some(n)]
+    }
+
     /// The weight of the trapezoid rule at node `n`: halved for each face of the box that it lies in.
     pub fn trapezoid(&self, n: usize) -> f64 {
         let at = self.index(n);

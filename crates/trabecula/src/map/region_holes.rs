@@ -73,11 +73,9 @@ impl Sought<'_> {
     }
 }
 
-/// The cubes on both sides of a face, in the sense of its axis, by their lowest nodes; `None` beyond the grid.
+/// The cells below and above a face, by their first nodes; `None` beyond the grid.
 fn sides(grid: &Grid, face: usize) -> [Option<usize>; 2] {
-    let (n, c) = (face / 3, face % 3);
-    let at = grid.index(n)[c];
-    [(at > 0).then(|| n - grid.strides()[c]), (at + 1 < grid.shape[c]).then_some(n)]
+    grid.cells_of_face(face / 3, face % 3)
 }
 
 /// Changes the basis so that long runs of faces are round one hole each.
@@ -171,17 +169,9 @@ struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    fn middle(&self, face: usize) -> Vec3 {
-        let (mut p, c) = (self.grid.node(face / 3), face % 3);
-        for a in (0..3).filter(|a| *a != c) {
-            p[a] += 0.5 * self.grid.step[a];
-        }
-        p
-    }
-
     /// The line through the middles of faces: straight where it nearly is, or else with as few points as follow it within a step.
     fn filament(&self, run: &Run) -> Filament {
-        let points: Vec<Vec3> = run.iter().map(|(f, _)| self.middle(*f)).collect();
+        let points: Vec<Vec3> = run.iter().map(|(f, _)| self.grid.face_middle(f / 3, f % 3)).collect();
         let along = |(face, up): (usize, bool), out: f64| {
             let mut d = [0.0; 3];
             d[face % 3] = if up { out } else { -out };

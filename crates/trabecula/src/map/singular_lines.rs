@@ -90,22 +90,9 @@ pub(super) fn singular_lines(
 
 /// Pierced faces that are joined through cells of the grid, as lines.
 fn lines(grid: &Grid, faces: &[Pierced], least: f64) -> Vec<SingularLine> {
-    let strides = grid.strides();
-    let middle = |f: &Pierced| {
-        let off = |a: usize| if a == f.axis { 0.0 } else { 0.5 * grid.step[a] };
-        add(grid.node(f.node), [0, 1, 2].map(off))
-    };
-    // Both cells of each face, by their first nodes; below the first node's own there may be none.
-    let mut of_cells: Vec<(usize, usize)> = faces
-        .iter()
-        .enumerate()
-        .flat_map(|(i, f)| {
-            let at = grid.index(f.node)[f.axis];
-            let above = (at + 1 < grid.shape[f.axis]).then_some((f.node, i));
-            let below = (at > 0).then(|| (f.node - strides[f.axis], i));
-            [above, below].into_iter().flatten()
-        })
-        .collect();
+    let middle = |f: &Pierced| grid.face_middle(f.node, f.axis);
+    let cells = |(i, f): (usize, &Pierced)| grid.cells_of_face(f.node, f.axis).map(|c| c.map(|c| (c, i)));
+    let mut of_cells: Vec<(usize, usize)> = faces.iter().enumerate().flat_map(cells).flatten().collect();
     of_cells.sort_unstable();
     let cells: Vec<&[(usize, usize)]> = of_cells.chunk_by(|a, b| a.0 == b.0).collect();
     let mut root = union_find::singles(faces.len());

@@ -53,6 +53,26 @@ fn closed_forms_have_one_line_at_its_place() {
     }
 }
 
+/// Axes that come back reversed round a hole meet along a seam: such a map is refused, or warned of where it only nearly folds.
+#[test]
+fn a_seam_is_never_silent() {
+    let half = "[{ formula = \"cos(atan2(y, x)/2)\" }, { formula = \"sin(atan2(y, x)/2)\" }, 0]";
+    for orientation in [format!("frame = {{ x = {half}, z = [0, 0, 1] }}"), format!("direction = {half}")] {
+        let text = format!(
+            "schema = 1\n[[region.difference]]\ncylinder = {{ base = [0, 0, 0], axis = [0, 0, 1], radius = 14, height = 9 }}\n\
+             [[region.difference]]\ncylinder = {{ base = [0, 0, -1], axis = [0, 0, 1], radius = 6, height = 11 }}\n\
+             [lattice.core]\ncell = \"primitive\"\npart = \"lower\"\nmap.phase = {{ wavelength = 3, {orientation} }}\nlevel.fraction = 0.5"
+        );
+        match Design::from_toml(&text).expect("text").build(&NoFiles) {
+            Err(why) => assert!(why.to_string().contains("folds") && why.to_string().contains("hole"), "{why}"),
+            Ok(made) => {
+                let told = made.warnings.iter().any(|w| w.message.contains("nearly folds"));
+                assert!(told, "{orientation}: {:?}", made.warnings);
+            }
+        }
+    }
+}
+
 /// A map that folds for that reason names the line.
 #[test]
 fn what_folds_names_its_line() {

@@ -14,8 +14,8 @@ use geometry::fault::Fault;
 use geometry::formats;
 use geometry::math::{Aabb, Vec3};
 use geometry::mesh::Mesh;
-use geometry::periodic_voxels::signed_distances;
 use geometry::repair::Repair;
+use geometry::voxel_distances::signed_distances;
 
 /// Nodes along an axis of the grid on which a mesh of one cell is sampled.
 const NODES: usize = 64;
