@@ -99,7 +99,7 @@ pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> Toke
                 expected_table(#noun, &Self::keys())
             }
             fn fits(node: &Node) -> u8 {
-                u8::from(matches!(node.value, Value::Table(_)))
+                fits_table(node, Self::keys().iter().map(|k| k.name))
             }
             fn read(at: &At) -> Result<Self, DesignError> {
                 #(#before(at)?;)*

@@ -174,12 +174,18 @@ pub(crate) fn expected_choice(noun: &str, choices: &[Choice]) -> String {
 
 /// How well a value fits a choice.
 pub(crate) fn fits_choice(node: &Node, choices: &[Choice]) -> u8 {
-    let word = match node.value {
-        Value::Text(_) => true,
-        Value::Table(_) => false,
-        _ => return 0,
-    };
-    u8::from(choices.iter().any(|c| c.word == word))
+    let of = |word: bool| choices.iter().filter(move |c| c.word == word).map(|c| c.key.name);
+    match &node.value {
+        Value::Text(_) => u8::from(of(true).next().is_some()),
+        Value::Table(_) if of(false).next().is_some() => fits_table(node, of(false)),
+        _ => 0,
+    }
+}
+
+/// How well a value fits a table of some keys: better with one of them.
+pub(crate) fn fits_table<'a>(node: &Node, mut keys: impl Iterator<Item = &'a str>) -> u8 {
+    let Value::Table(entries) = &node.value else { return 0 };
+    1 + u8::from(keys.any(|k| entries.iter().any(|(key, ..)| key == k)))
 }
 
 /// The keys of all of `sets`, each once.

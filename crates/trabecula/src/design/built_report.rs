@@ -340,6 +340,7 @@ fn distortion(d: &Distortion) -> DistortionReport {
         outside: d.outside,
         shear: spread(&d.shear),
         anisotropy: spread(&d.anisotropy),
+        stretch: d.stretch,
         density: d.density,
         curl: spread(&d.curl),
         turn: d.turn,

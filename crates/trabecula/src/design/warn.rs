@@ -240,6 +240,9 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
             100.0 * d.outside
         ));
     }
+    if let Some(exceeded) = phase.overstretched() {
+        say(exceeded);
+    }
     if d.density[0] <= 0.0 {
         say(format!("the map folds: cells turn inside out at {}", at(d.least_at)));
     } else if d.density[0] < PRESSED {

@@ -49,6 +49,10 @@ pub struct Distortion {
     pub shear: Spread,
     /// Greatest over least stretch of a cell.
     pub anisotropy: Spread,
+    /// The least and the greatest length of a cell over the one asked for, along any direction.
+    pub stretch: [f64; 2],
+    /// Where these are, mm.
+    pub stretch_at: [Vec3; 2],
     /// Least and greatest det J over that of the target: cells for each target cell. Zero or less where the map folds.
     pub density: [f64; 2],
     /// Where the density is least, mm.
@@ -74,6 +78,8 @@ pub struct Misfit {
     pub shear: f64,
     /// Greatest over least stretch of a cell.
     pub anisotropy: f64,
+    /// The least and the greatest length of a cell over the one asked for, along any direction.
+    pub stretch: [f64; 2],
     /// det J over that of the target.
     pub density: f64,
 }
@@ -107,6 +113,7 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
         spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
         shear,
         anisotropy: if least > 0.0 { greatest / least } else { f64::INFINITY },
+        stretch: [1.0 / greatest, (1.0 / least).min(f64::MAX)],
         density,
     }
 }
@@ -130,6 +137,7 @@ impl Distortion {
             curl: Spread::of(curl, 0),
             turn,
             turn_at,
+            stretch: [1.0; 2],
             ..Distortion::default()
         }
     }
@@ -144,9 +152,15 @@ impl Distortion {
         }
     }
 
-    /// Takes the density at other points into its range.
-    pub(super) fn widen_density(&mut self, found: &[Misfit], at: &[Vec3]) {
+    /// Takes the stretch and the density at points into their ranges.
+    pub(super) fn widen(&mut self, found: &[Misfit], at: &[Vec3]) {
         for (f, p) in found.iter().zip(at) {
+            if f.stretch[0] < self.stretch[0] {
+                (self.stretch[0], self.stretch_at[0]) = (f.stretch[0], *p);
+            }
+            if f.stretch[1] > self.stretch[1] {
+                (self.stretch[1], self.stretch_at[1]) = (f.stretch[1], *p);
+            }
             self.density[1] = self.density[1].max(f.density);
             if f.density < self.density[0] {
                 (self.density[0], self.least_at) = (f.density, *p);

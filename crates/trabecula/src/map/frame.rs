@@ -157,6 +157,12 @@ impl Orientation {
         }
     }
 
+    /// The principal directions of a stress at points; none of other orientations.
+    pub(super) fn principal(&self, points: &[Vec3]) -> Result<Vec<Principal>, Fault> {
+        let Orientation::Stress(of) = self else { return Ok(Vec::new()) };
+        Ok(columns(of, points, "stress")?.par_iter().map(Principal::of).collect())
+    }
+
     /// Whether it is the same everywhere.
     pub(super) fn is_constant(&self) -> bool {
         match self {
@@ -251,15 +257,15 @@ pub(super) struct Frames {
 }
 
 /// A gap between principal values, over the greatest value, below which they count as equal.
-const DOUBT: f64 = 0.05;
+pub(super) const DOUBT: f64 = 0.05;
 /// A share of the range in the part: a stress that is less counts as one of this size, so that its rounding has no
 /// direction.
 const LEAST: f64 = 1e-3;
 
 /// The principal directions of a symmetric tensor, as a right-handed frame, and its principal values.
-struct Principal {
-    frame: Mat3,
-    values: Vec3,
+pub(super) struct Principal {
+    pub frame: Mat3,
+    pub values: Vec3,
 }
 
 impl Principal {
@@ -271,7 +277,7 @@ impl Principal {
     }
 
     /// The greatest difference of two values.
-    fn difference(&self) -> f64 {
+    pub fn difference(&self) -> f64 {
         let [a, b, c] = self.values;
         (a - b).abs().max((b - c).abs()).max((c - a).abs())
     }
@@ -284,8 +290,12 @@ impl Principal {
 
     /// The same over the greatest value; `range` is that in the part.
     fn own_gaps(&self, range: f64) -> Vec3 {
-        let size = self.values.iter().fold(LEAST * range, |m, v| m.max(v.abs()));
-        scale(self.gaps(), 1.0 / size)
+        scale(self.gaps(), 1.0 / self.size(range))
+    }
+
+    /// The greatest value; `range` is that in the part.
+    pub fn size(&self, range: f64) -> f64 {
+        self.values.iter().fold(LEAST * range, |m, v| m.max(v.abs()))
     }
 }
 
@@ -322,17 +332,8 @@ fn no_direction(key: &str, p: Vec3) -> Fault {
 /// The frame between those at the nodes about a point: their mean, made orthonormal; of the nearest node where they are too far
 /// apart for a mean.
 pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], p: Vec3) -> Mat3 {
-    let along = |a: usize| ((p[a] - grid.origin[a]) / grid.step[a]).clamp(0.0, (grid.shape[a] - 1) as f64);
-    let first: [usize; 3] = core::array::from_fn(|a| (along(a) as usize).min(grid.shape[a] - 2));
-    let strides = grid.strides();
     let (mut mean, mut nearest) = ([[0.0; 3]; 3], (0.0, IDENTITY));
-    for corner in 0..8 {
-        let (mut n, mut weight) = (0, 1.0);
-        for a in 0..3 {
-            let (t, up) = (along(a) - first[a] as f64, corner >> a & 1);
-            n += (first[a] + up) * strides[a];
-            weight *= if up == 1 { t } else { 1.0 - t };
-        }
+    for (n, weight) in grid.around(p) {
         if weight > nearest.0 {
             nearest = (weight, frames[n]);
         }

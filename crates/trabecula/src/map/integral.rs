@@ -9,12 +9,14 @@ use super::tilt::Tilt;
 use geometry::math::{Mat3, Vec3, add, dot, norm, scale, sub};
 use geometry::progress::Cancellation;
 
+/// The roots of the weights of nodes, and the edges' squares; `None` where all count alike.
+pub(super) type Weights = Option<(Vec<f64>, EdgeSquares)>;
+
 /// Targets at the nodes of a grid, and what errors count.
 pub(super) struct Problem<'a> {
     pub grid: Grid,
     pub k: &'a [Vec<Vec3>; 3],
-    /// The roots of the weights of nodes, and the edges' squares; `None` where all count alike.
-    pub weights: Option<(Vec<f64>, EdgeSquares)>,
+    pub weights: Weights,
     /// What an error of angle counts.
     pub ratio: f64,
 }
@@ -55,6 +57,19 @@ impl<'a> Problem<'a> {
     /// The sum of products of two sets of slopes along edges, as errors count.
     pub fn product(&self, a: &[Vec3], b: &[Vec3], tilt: Option<&Tilt>) -> f64 {
         self.weights.as_ref().map_or(0.0, |(_, squares)| squares.product(a, b, tilt))
+    }
+
+    /// The target at a node.
+    pub fn target(&self, node: usize) -> Mat3 {
+        [0, 1, 2].map(|i| self.k[i][node])
+    }
+
+    /// The function whose steps are nearest to slopes along edges, as errors of an axis count, but for a constant.
+    pub fn nearest(&self, axis: usize, slopes: &[Vec3]) -> Vec<f64> {
+        match &self.weights {
+            None => Poisson::new(self.grid).nearest(slopes),
+            Some(_) => self.fit(slopes, self.tilt(axis).as_ref()),
+        }
     }
 
     pub fn solve(&self) -> Integral {

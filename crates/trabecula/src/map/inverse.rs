@@ -118,6 +118,8 @@ mod tests {
             weight: None,
             angle_weight: 1.0,
             smooth: None,
+            by_principal: false,
+            stretch: None,
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

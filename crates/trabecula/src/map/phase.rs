@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::frame::{self, Orientation, in_mm};
-use super::integral::{Integral, Problem};
+use super::integral::{Integral, Problem, Weights};
 use super::pace;
 use super::periods::{Angles, Period};
 use super::phase_grid::Grid;
@@ -19,6 +19,7 @@ use super::region_holes::{MOST, Sought};
 use super::singular_lines::singular_lines;
 use super::solution::Solution;
 use super::spline::Spline;
+use super::stretch::{Stretch, bounded};
 use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
 use crate::field::{Block, Field};
@@ -44,8 +45,10 @@ const SHARP: f64 = 0.5;
 /// The target of a map.
 #[derive(Clone)]
 pub struct Wanted {
-    /// Cell edges (mm) along the cell's axes.
+    /// Cell edges (mm) along the cell's axes, or the principal directions of a stress.
     pub wavelength: [Grade; 3],
+    /// Whether they are those along the principal directions of a stress, the greatest value's first.
+    pub by_principal: bool,
     /// Orientation of the cells.
     pub orientation: Orientation,
     /// Relative weight of the map's error; the same everywhere if none.
@@ -55,6 +58,8 @@ pub struct Wanted {
     pub angle_weight: f64,
     /// The length over which directions, frames and stresses are smoothed, mm.
     pub smooth: Option<f64>,
+    /// The range in which cells may be stretched; any if none.
+    pub stretch: Option<Stretch>,
     /// Moves the lattice (mm).
     pub offset: Vec3,
 }
@@ -105,6 +110,8 @@ pub struct Phase {
     steps: usize,
     hasty: Option<String>,
     frames: OnceLock<Arc<[Mat3]>>,
+    /// The wavelengths at the nodes along the axes of the frames, where they are given along others.
+    lengths: Option<Vec<Vec3>>,
 }
 
 impl Phase {
@@ -119,16 +126,17 @@ impl Phase {
         checkpoint();
         let target = Target::new(&laid, wanted, None)?;
         checkpoint();
-        pace::check_pace(&laid.grid, &wanted.wavelength, &laid.wavelength, &laid.inside)?;
+        pace::check_pace(&laid.grid, &wanted.wavelength, &laid.given, &laid.inside)?;
         chosen.refuse()?;
         let roots = target.roots(&laid, wanted)?;
         let ratio = wanted.ratio()?;
         checkpoint();
-        let Integral { values, mean, steps } = Problem::new(laid.grid, &target.k, roots, ratio).solve();
+        let problem = Problem::new(laid.grid, &target.k, roots, ratio);
+        let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
         checkpoint();
         let solution = Solution { spline: Spline::through(laid.grid, values), winding: Winding::default() };
         let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
-        let mut found = Found { target, solution, periods: Vec::new(), mean, steps, judged };
+        let mut found = Found { target, weights, solution, periods: Vec::new(), mean, steps, judged };
         let mut tried = String::new();
         if found.judged.fold.is_some() || found.judged.missed > MISSED[0] {
             let (closed, words) = closed(&laid, wanted, settings, ratio)?;
@@ -137,8 +145,13 @@ impl Phase {
                 found = closed;
             }
         }
+        if let Some(range) = wanted.stretch {
+            found = found.bounded(&laid, wanted, settings.region, range)?;
+        }
+        let wavelength = found.target.wavelength(&laid);
+        let mean_length = mean_within(&laid.inside, wavelength);
         let lengths_range =
-            (laid.wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
+            (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         let axes = &found.target.frames;
         let lines = singular_lines(&laid.grid, axes, &laid.inside, &wanted.orientation.alike(), 0.5 * lengths_range[0]);
         found.judged.distortion.singular = lines;
@@ -146,31 +159,32 @@ impl Phase {
             tried += &found.judged.distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1]), &tried));
         }
-        let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. } } = found;
+        let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
+        let stress_range = target.range;
         let shift = mean.map(|m| -dot(m, wanted.offset));
-        let within = laid.inside.iter().zip(&laid.wavelength).filter(|(inside, _)| **inside);
-        let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
         let corner = norm(laid.grid.step);
         let max_lipschitz = solution.max_lipschitz(bounds, |n| laid.depth[n] <= corner);
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = solution.jacobian(bounds.center());
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
-        let keep = wanted.smooth.is_some() || !periods.is_empty();
+        let keep = wanted.smooth.is_some() || wanted.by_principal || !periods.is_empty();
+        let Target { frames, lengths, .. } = target;
         Ok(Phase {
             solution,
             periods,
             wanted: wanted.clone(),
             shift,
             wavelengths: lengths_range,
-            stress_range: target.range,
-            mean: if count == 0 { laid.wavelength[0] } else { scale(sum, 1.0 / f64::from(count)) },
+            stress_range,
+            mean: mean_length,
             max_lipschitz,
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
             hasty: chosen.hasty,
-            frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(target.frames)) } else { OnceLock::new() },
+            frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
+            lengths,
         })
     }
 
@@ -201,7 +215,8 @@ impl Phase {
     /// Numbers that are not finite, vectors without a direction.
     pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
         let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
-        let targets = targets(&self.wanted, self.stress_range, self.solution.grid(), &self.combed()?, points)?;
+        let (grid, frames) = (self.solution.grid(), self.combed()?);
+        let targets = targets(&self.wanted, self.stress_range, grid, &frames, self.lengths.as_deref(), points)?;
         Ok(jacobians.iter().zip(&targets).map(|(j, k)| distortion::compare(j, k)).collect())
     }
 
@@ -222,6 +237,11 @@ impl Phase {
     /// A target that varies faster than cells of its size can, in words; `None` where the solution's grid carries it.
     pub fn hasty(&self) -> Option<&str> {
         self.hasty.as_deref()
+    }
+
+    /// Cells that are stretched beyond the range that was given, in words.
+    pub fn overstretched(&self) -> Option<String> {
+        self.wanted.stretch.and_then(|s| s.exceeded(&self.distortion))
     }
 
     /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
@@ -309,16 +329,34 @@ fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<us
     (some(COMPARED).filter(|n| inside[*n]).collect(), between)
 }
 
-/// The target gradients at points; `frames` are those of the nodes, from which points have their signs and axes, or, if they are
+/// The mean of lengths at the nodes in a region; those of the first node if none is.
+fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
+    let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
+    let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
+    if count == 0 { of[0] } else { scale(sum, 1.0 / f64::from(count)) }
+}
+
+/// The target gradients at points; `lengths` are the wavelengths at the nodes, where they are not those that are given; `frames` are those of the nodes, from which points have their signs and axes, or, if they are
 /// smoothed, their frames.
-fn targets(wanted: &Wanted, range: f64, grid: &Grid, frames: &[Mat3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+fn targets(
+    wanted: &Wanted,
+    range: f64,
+    grid: &Grid,
+    frames: &[Mat3],
+    lengths: Option<&[Vec3]>,
+    points: &[Vec3],
+) -> Result<Vec<Mat3>, Fault> {
     let smooth = wanted.smooth.is_some();
     let like: Vec<Mat3> = match smooth || wanted.orientation.is_combed() {
         true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
         false => Vec::new(),
     };
     let frames = if smooth { like } else { wanted.orientation.frames_near(points, &like, range)? };
-    let wavelength = wavelengths(&wanted.wavelength, points)?;
+    let between = |p: &Vec3, of: &[Vec3]| grid.around(*p).iter().fold([0.0; 3], |m, (n, s)| add(m, scale(of[*n], *s)));
+    let wavelength = match lengths {
+        Some(of) => points.par_iter().map(|p| between(p, of)).collect(),
+        None => wavelengths(&wanted.wavelength, points)?,
+    };
     let each = frames.iter().zip(&wavelength).map(|(f, w)| {
         let k = transpose(f);
         [0, 1, 2].map(|i| scale(k[i], 1.0 / w[i]))
@@ -328,22 +366,24 @@ fn targets(wanted: &Wanted, range: f64, grid: &Grid, frames: &[Mat3], points: &[
 
 /// What may keep a map from folding.
 fn remedy(wanted: &Wanted, longest: f64) -> String {
-    match (&wanted.orientation, wanted.smooth) {
-        (Orientation::Angles(_), _) => "Let orientation and wavelength vary more slowly".into(),
-        (of, None) => format!(
-            "Smooth the {} over a length, such as smooth = {}, let orientation and wavelength vary more slowly",
-            of.key(),
-            number(longest)
-        ),
-        (_, Some(length)) => {
-            format!("Use a smooth of more than {} mm, let orientation and wavelength vary more slowly", number(length))
-        }
-    }
+    let smoother = match (&wanted.orientation, wanted.smooth) {
+        (Orientation::Angles(_), _) => "Let".into(),
+        (of, None) => format!("Smooth the {} over a length, such as smooth = {}, let", of.key(), number(longest)),
+        (_, Some(length)) => format!("Use a smooth of more than {} mm, let", number(length)),
+    };
+    let bounded = if wanted.stretch.is_none() {
+        ", bound what cells are stretched by, such as stretch = [0.67, 1.5]"
+    } else {
+        ""
+    };
+    format!("{smoother} orientation and wavelength vary more slowly{bounded}")
 }
 
 /// A solution, and what it was found for.
 struct Found {
     target: Target,
+    /// What errors count.
+    weights: Weights,
     solution: Solution,
     periods: Vec<Period>,
     /// The mean of the rows of K.
@@ -357,6 +397,24 @@ impl Found {
     fn is_better_than(&self, single: &Found) -> bool {
         let (own, other) = (&self.judged, &single.judged);
         (own.fold.is_none() || other.fold.is_some()) && own.missed <= MISSED[1] * other.missed
+    }
+
+    /// The solution whose cells are stretched within a range.
+    fn bounded(self, laid: &Laid, wanted: &Wanted, region: Option<&dyn Field>, range: Stretch) -> Result<Found, Fault> {
+        let [least, most] = range.range();
+        let [low, high] = self.judged.distortion.stretch;
+        if self.judged.fold.is_none() && low >= least && high <= most {
+            return Ok(self);
+        }
+        let Found { target, weights, solution, periods, mean, steps, .. } = self;
+        let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
+        // The cells of the grid that the region reaches into.
+        let reach = norm(laid.grid.step);
+        let counts: Vec<bool> = laid.depth.iter().map(|d| *d <= reach).collect();
+        let solution = bounded(&problem, &counts, range, solution);
+        let weights = problem.weights;
+        let judged = Judged::of(laid, wanted, region, &target, &solution)?;
+        Ok(Found { target, weights, solution, periods, mean, steps, judged })
     }
 }
 
@@ -379,7 +437,7 @@ impl Judged {
         target: &Target,
         solution: &Solution,
     ) -> Result<Judged, Fault> {
-        let Laid { grid, nodes, inside, wavelength, .. } = laid;
+        let (Laid { grid, nodes, inside, .. }, wavelength) = (laid, target.wavelength(laid));
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // The density at every node; the other measures, which cost more, at some tens of thousands.
         let density: Vec<f64> = within
@@ -393,7 +451,7 @@ impl Judged {
         let (compared, between) = compared(grid, inside, region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
         let jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
-        let off_nodes = targets(wanted, target.range, grid, &target.frames, &between)?;
+        let off_nodes = targets(wanted, target.range, grid, &target.frames, target.lengths.as_deref(), &between)?;
         let k = &target.k;
         let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
         let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
@@ -409,7 +467,7 @@ impl Judged {
             least_at: least.map_or(laid.bounds.center(), |n| nodes[within[n]]),
             ..Distortion::of(&found, compared.len(), &curl, turn)
         };
-        distortion.widen_density(&found, &positions);
+        distortion.widen(&found, &positions);
         let squares = |m: &Mat3| m.as_flattened().iter().map(|v| v * v).sum::<f64>();
         let even = || jacobians.iter().zip(&asked).skip(compared.len());
         let off: f64 = even().map(|(j, k)| squares(&core::array::from_fn(|i| sub(j[i], k[i])))).sum();
@@ -444,6 +502,7 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
     let problem = Problem { grid: laid.grid, k: &target.k, weights: Some((roots(SHARP)?, squares)), ratio };
     let Integral { values, mean, steps } = problem.solve();
     let angles = Angles::new(&problem, holes, &values);
+    let weights = problem.weights;
     let mut first = None;
     for (solution, periods) in angles.solutions(&laid.grid, &values) {
         checkpoint();
@@ -451,18 +510,18 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
             let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
             if judged.fold.is_none() {
                 let words = tried(&periods);
-                return Ok((Some(Found { target, solution, periods, mean, steps, judged }), words));
+                return Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words));
             }
         }
         first.get_or_insert((solution, periods));
     }
     let Some((solution, periods)) = first else { return Ok((None, String::new())) };
     let words = tried(&periods);
-    if !settings.folds {
+    if !settings.folds && wanted.stretch.is_none() {
         return Ok((None, words));
     }
     let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
-    Ok((Some(Found { target, solution, periods, mean, steps, judged }), words))
+    Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words))
 }
 
 /// A node in the region where det J is not positive.

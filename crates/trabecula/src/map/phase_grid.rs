@@ -37,6 +37,19 @@ impl Grid {
         [1, self.shape[0], self.shape[0] * self.shape[1]]
     }
 
+    /// The nodes about a point, or about the nearest point of the grid's box, and their shares in a value there, linear between them.
+    pub fn around(&self, p: Vec3) -> [(usize, f64); 8] {
+        let along = |a: usize| ((p[a] - self.origin[a]) / self.step[a]).clamp(0.0, (self.shape[a] - 1) as f64);
+        let first: [usize; 3] = core::array::from_fn(|a| (along(a) as usize).min(self.shape[a] - 2));
+        let strides = self.strides();
+        core::array::from_fn(|corner| {
+            (0..3).fold((0, 1.0), |(n, share), a| {
+                let (t, up) = (along(a) - first[a] as f64, corner >> a & 1);
+                (n + (first[a] + up) * strides[a], share * if up == 1 { t } else { 1.0 - t })
+            })
+        })
+    }
+
     /// The middle of the face at right angles to an axis above node `n`.
     pub fn face_middle(&self, n: usize, axis: usize) -> Vec3 {
         let mut p = self.node(n);

@@ -1,6 +1,6 @@
 //! The solved map, as it is declared.
 
-use super::{Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Wanted, given_twice, shared};
+use super::{Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, several};
@@ -13,7 +13,8 @@ use geometry::math::{IDENTITY, Mat3};
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Phase", noun = "a phase map")]
 pub struct PhaseKind {
-    /// Cell edge, one number or three; each may vary. Left out where the level has a fraction and a thickness or a pore, from which it
+    /// Cell edge, one number or three, along the cell's axes or, { principal = [a, b, c] }, the principal directions of the stress;
+    /// each may vary. Left out where the level has a fraction and a thickness or a pore, from which it
     /// follows wherever they vary; three numbers are ratios then.
     #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "unit_cell_size", "cell_edge", "period", "size"))]
     wavelength: Option<GradeOrThree>,
@@ -32,6 +33,9 @@ pub struct PhaseKind {
     /// parts of a stress count by how much they differ between directions. None unless given.
     #[kind(unit = "mm", above = 0.0)]
     smooth: Option<f64>,
+    /// The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say. The map is the
+    /// one nearest to the target that keeps to it; an error where none is found. Any unless given.
+    stretch: Option<[f64; 2]>,
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
@@ -115,7 +119,7 @@ pub struct AlongStress {
     stress: TensorKind,
 }
 
-/// A number that may vary, or three of them.
+/// A number that may vary, or three of them, along the cell's axes or those of a stress.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(untagged)]
 pub enum GradeOrThree {
@@ -123,6 +127,18 @@ pub enum GradeOrThree {
     One(GradeSpec),
     /// Along the cell's x, y, z.
     Three(Box<[GradeSpec; 3]>),
+    /// Along the principal directions of the stress.
+    Principal(PrincipalLengths),
+}
+
+/// Cell edges along the principal directions of the stress, whatever axes of the cell lie along them.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "cell edges along principal directions")]
+pub struct PrincipalLengths {
+    /// Along the direction of the greatest principal stress (tension is positive), of the middle and of the least. Where two values
+    /// are within 10 % they are the same along both.
+    #[kind(unit = "mm", above = 0.0)]
+    principal: Box<[GradeSpec; 3]>,
 }
 
 /// A vector that may vary.
@@ -208,6 +224,17 @@ impl BuildMap for PhaseKind {
                 [one.clone(), one.clone(), one]
             }
             Some(GradeOrThree::Three(of)) => each(of, &at, &length)?,
+            Some(GradeOrThree::Principal(PrincipalLengths { principal })) => {
+                if !matches!(self.orientation, OrientationKind::Stress(_)) {
+                    let message =
+                        "cell edges along principal directions need a stress; give one number or three, or a stress";
+                    return Err(DesignError::new(at, message));
+                }
+                let at = format!("{at}.principal");
+                each(principal, &at, &|of, path| {
+                    of.build(&Quantity::new(path, environment, key_of::<PrincipalLengths>("principal")))
+                })?
+            }
         };
         self.with(wavelength, path, environment)
     }
@@ -234,7 +261,7 @@ impl PhaseKind {
                 [GradeSpec::Constant(a), GradeSpec::Constant(b), GradeSpec::Constant(c)] => Ok([*a, *b, *c]),
                 _ => Err(given_twice(length, path)),
             },
-            Some(GradeOrThree::One(_)) => Err(given_twice(length, path)),
+            Some(GradeOrThree::One(_) | GradeOrThree::Principal(_)) => Err(given_twice(length, path)),
         }
     }
 
@@ -252,10 +279,12 @@ impl PhaseKind {
         let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
         let wanted = Wanted {
             wavelength,
+            by_principal: matches!(self.wavelength, Some(GradeOrThree::Principal(_))),
             orientation: self.orientation.build(path, environment)?,
             weight: weight.transpose()?,
             angle_weight: self.angle_weight,
             smooth: self.smooth,
+            stretch: self.stretch.map(Stretch::new).transpose().map_err(|f| DesignError::fault(path, f))?,
             offset: self.offset,
         };
         let region: &dyn Field = &**environment.region;

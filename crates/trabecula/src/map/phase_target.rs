@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::frame::{Frames, in_mm};
 use super::phase::Wanted;
 use super::phase_grid::Grid;
+use super::principal_lengths::along_axes;
 use super::smooth_frames::Smoothing;
 use crate::field::Field;
 use crate::grade::Grade;
@@ -26,13 +27,14 @@ pub(super) struct Laid {
     pub depth: Vec<f64>,
     /// Whether nodes are in the region.
     pub inside: Vec<bool>,
-    pub wavelength: Vec<Vec3>,
+    /// The wavelengths that are given, mm.
+    pub given: Vec<Vec3>,
 }
 
 impl Laid {
     pub fn over(bounds: &Aabb, grid: Grid, wanted: &Wanted, region: Option<&dyn Field>) -> Result<Laid, Fault> {
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
+        let given = wavelengths(&wanted.wavelength, &nodes)?;
         checkpoint();
         let mut depth = vec![f64::NEG_INFINITY; grid.len()];
         if let Some(region) = region {
@@ -40,7 +42,7 @@ impl Laid {
         }
         let reach = 1e-9 * norm(bounds.size());
         let inside = depth.iter().map(|d| *d <= reach).collect();
-        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, wavelength })
+        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, given })
     }
 
     /// The root of the weight of a node; it falls off by e outside the region over some steps of the grid.
@@ -98,6 +100,8 @@ pub(super) struct Target {
     pub trust: Option<Vec<f64>>,
     /// The range of a stress, against which directions are more or less sure; 0 for other orientations.
     pub range: f64,
+    /// The wavelengths along the axes of the frames, where they are given along others.
+    pub lengths: Option<Vec<Vec3>>,
     pub k: [Vec<Vec3>; 3],
 }
 
@@ -110,11 +114,24 @@ impl Target {
         let Frames { at_nodes: frames, trust, range } =
             wanted.orientation.frames(&laid.grid, &laid.nodes, smoothing.as_ref(), outside)?;
         checkpoint();
+        let lengths = match wanted.by_principal {
+            true => {
+                let of = wanted.orientation.principal(&laid.nodes)?;
+                Some(along_axes(&laid.grid, &of, range, &laid.given, &frames, smoothing.as_ref()))
+            }
+            false => None,
+        };
+        checkpoint();
         let k = core::array::from_fn(|i| {
-            let of = frames.iter().zip(&laid.wavelength);
+            let of = frames.iter().zip(lengths.as_ref().unwrap_or(&laid.given));
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
         });
-        Ok(Target { frames, trust, range, k })
+        Ok(Target { frames, trust, range, lengths, k })
+    }
+
+    /// The wavelengths at the nodes along the cell's axes, mm.
+    pub fn wavelength<'a>(&'a self, laid: &'a Laid) -> &'a [Vec3] {
+        self.lengths.as_ref().unwrap_or(&laid.given)
     }
 
     /// The roots of the weights of nodes, as surroundings count where phases have one value everywhere.

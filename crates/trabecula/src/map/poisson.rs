@@ -39,7 +39,14 @@ impl Poisson {
 
     /// Φ of zero trapezoid mean whose steps along the edges of the grid are nearest to those of K.
     pub fn integrate(&self, k: &[Vec3]) -> Vec<f64> {
-        let mut f = self.divergence(k);
+        let mut f = self.divergence(|a, n, m| 0.5 * (k[n][a] + k[m][a]));
+        self.solve(&mut f, 0.0);
+        f
+    }
+
+    /// The same for slopes along the edges above nodes.
+    pub fn nearest(&self, slopes: &[Vec3]) -> Vec<f64> {
+        let mut f = self.divergence(|a, n, m| slopes[n.min(m)][a]);
         self.solve(&mut f, 0.0);
         f
     }
@@ -66,8 +73,8 @@ impl Poisson {
         out
     }
 
-    /// The right-hand side: minus the sum over a node's edges of the step of K, over h², edges mirrored at the faces.
-    fn divergence(&self, k: &[Vec3]) -> Vec<f64> {
+    /// The right-hand side: minus the sum over a node's edges of the step along each, over h², edges mirrored at the faces.
+    fn divergence(&self, slope: impl Fn(usize, usize, usize) -> f64 + Sync) -> Vec<f64> {
         let (g, strides) = (&self.grid, self.grid.strides());
         (0..g.len())
             .into_par_iter()
@@ -75,7 +82,7 @@ impl Poisson {
                 let at = g.index(n);
                 let mut sum = 0.0;
                 for a in 0..3 {
-                    let edge = |m: usize| (k[n][a] + k[m][a]) / (2.0 * g.step[a]);
+                    let edge = |m: usize| slope(a, n, m) / g.step[a];
                     sum += match at[a] {
                         0 => -2.0 * edge(n + strides[a]),
                         c if c + 1 == g.shape[a] => 2.0 * edge(n - strides[a]),
@@ -237,7 +244,8 @@ mod tests {
             let once = start.elapsed().as_secs_f64();
             // Half the squares of the steps times the right-hand side, and the mean of the six neighbours.
             let h = g.step[0];
-            let right: Vec<f64> = direct.divergence(&k).iter().map(|v| v * h * h / 6.0).collect();
+            let right: Vec<f64> =
+                direct.divergence(|a, n, m| 0.5 * (k[n][a] + k[m][a])).iter().map(|v| v * h * h / 6.0).collect();
             let strides = g.strides();
             let sweep = |f: &[f64], out: &mut [f64]| {
                 out.par_chunks_mut(n).enumerate().for_each(|(row, out)| {

@@ -33,7 +33,7 @@ pub(super) struct Smoothing<'a> {
 
 impl Smoothing<'_> {
     /// The averages of several components of each node, the component that a node has multiplied by its weight.
-    fn averages<const N: usize>(&self, grid: &Grid, values: &[[f64; N]]) -> Vec<[f64; N]> {
+    pub fn averages<const N: usize>(&self, grid: &Grid, values: &[[f64; N]]) -> Vec<[f64; N]> {
         let (poisson, shift) = (Poisson::new(*grid), 1.0 / (self.length * self.length));
         let mut out = vec![[0.0; N]; values.len()];
         let mut one = Vec::with_capacity(values.len());
@@ -91,7 +91,7 @@ impl Averages {
 }
 
 /// Confidence in a direction whose principal values differ by this gap.
-fn trusted(gap: f64) -> f64 {
+pub(super) fn trusted(gap: f64) -> f64 {
     let square = gap * gap;
     square / (square + HALF_TRUSTED * HALF_TRUSTED)
 }

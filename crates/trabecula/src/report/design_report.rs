@@ -137,6 +137,8 @@ pub struct DistortionReport {
     pub shear: MapSpread,
     /// Greatest over least stretch of a cell.
     pub anisotropy: MapSpread,
+    /// Least and greatest length of a cell over the one asked for, along any direction.
+    pub stretch: [f64; 2],
     /// Least and greatest det J over the one asked for; 0 or less where the map folds.
     pub density: [f64; 2],
     /// |curl Kᵢ| λᵢ², what no map can follow.

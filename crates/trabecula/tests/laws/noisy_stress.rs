@@ -29,6 +29,8 @@ fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Pha
         weight: None,
         angle_weight: 1.0,
         smooth,
+        by_principal: false,
+        stretch: None,
         offset: [0.0; 3],
     };
     Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)

@@ -27,6 +27,8 @@ fn wanted(wavelength: f64, orientation: Orientation) -> Wanted {
         weight: None,
         angle_weight: 1.0,
         smooth: None,
+        by_principal: false,
+        stretch: None,
         offset: [0.0; 3],
     }
 }

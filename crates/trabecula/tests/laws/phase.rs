@@ -30,6 +30,8 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         weight: None,
         angle_weight: 1.0,
         smooth: None,
+        by_principal: false,
+        stretch: None,
         offset: [0.1, 0.2, 0.3],
     };
     Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))

@@ -22,6 +22,8 @@ fn about_z(angle: &str, wavelength: Grade) -> Wanted {
         weight: None,
         angle_weight: 1.0,
         smooth: None,
+        by_principal: false,
+        stretch: None,
         offset: [0.0; 3],
     }
 }
@@ -45,6 +47,8 @@ fn what_does_not_vary_is_the_affine_map() {
         weight: Some(formula("1 + x*x")),
         angle_weight: 1.0,
         smooth: None,
+        by_principal: false,
+        stretch: None,
         offset,
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");

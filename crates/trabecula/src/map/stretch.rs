@@ -1,0 +1,256 @@
+//! Bounds on how much cells are stretched: the map nearest to its target of those whose cells keep to a range.
+//!
+//! J K⁻¹ is what a map makes of a cell that has the size and the axes asked for; its singular values are one over the cell's principal
+//! stretches, and a map that folds has a negative determinant there. Of all maps Φ with ∇Φ in the set C of Jacobians whose determinant
+//! is positive and whose stretches are in the range, the one with the least ∫ w |∇Φ − K|² is sought by the alternating direction
+//! method of multipliers (Boyd, Parikh, Chu, Peleato, Eckstein, Distributed optimization and statistical learning via the alternating
+//! direction method of multipliers, Found. Trends Mach. Learn. 3, 2011): a global step, the same least squares with another target; a
+//! local one, the nearest element of C in each cell of the grid, as in the local–global methods for meshes (Aigerman, Lipman, Injective
+//! and bounded distortion mappings in 3D, ACM Trans. Graph. 32, 2013). C is not convex, so what leaving it costs is raised step by step,
+//! and what is reached is judged afterwards.
+
+use rayon::prelude::*;
+
+use super::distortion::Distortion;
+use super::edge_squares::gradient;
+use super::frame::in_mm;
+use super::integral::Problem;
+use super::phase_grid::Grid;
+use super::solution::Solution;
+use super::spline::Spline;
+use geometry::fault::{Fault, number};
+use geometry::math::{
+    Mat3, Vec3, add, apply, cross, determinant, dot, eigen, inverse, norm, product, scale, sub, transpose,
+};
+use geometry::progress::checkpoint;
+
+/// Most global steps.
+const ROUNDS: usize = 120;
+/// Steps after which what leaving the range costs is doubled, and the most of it, relative to the same distance from the target.
+const DOUBLED: usize = 10;
+const DEAREST: f64 = 1000.0;
+/// What multipliers keep from step to step: all of it, as for a convex set, makes rotations swing.
+const KEPT: f64 = 0.9;
+/// What the range is narrowed by in the middles of the grid's cells, of its logarithm, so that points off them keep to it.
+const MARGIN: f64 = 0.15;
+
+/// The least and the greatest principal stretch of cells: the ratio of a length to the one asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    least: f64,
+    most: f64,
+}
+
+impl Stretch {
+    /// From the least to the greatest.
+    ///
+    /// # Errors
+    /// A range that is not positive, not finite or does not have 1 within it.
+    pub fn new([least, most]: [f64; 2]) -> Result<Stretch, Fault> {
+        if !(least > 0.0 && least < 1.0 && most > 1.0 && most.is_finite()) {
+            let message = format!(
+                "[{}, {}]; the stretch of cells goes from above 0 and below 1 to above 1, such as [0.67, 1.5]",
+                number(least),
+                number(most)
+            );
+            return Err(Fault::new("stretch", message));
+        }
+        Ok(Stretch { least, most })
+    }
+
+    /// The range.
+    pub fn range(&self) -> [f64; 2] {
+        [self.least, self.most]
+    }
+
+    /// A range within this one, by a part of its logarithm.
+    fn narrowed(&self, by: f64) -> Stretch {
+        Stretch { least: self.least.powf(1.0 - by), most: self.most.powf(1.0 - by) }
+    }
+
+    /// The Jacobian nearest to `j` (in units of the target `k`) that does not turn cells inside out and stretches them within the range.
+    fn nearest(&self, j: &Mat3, k: &Mat3) -> Mat3 {
+        let f = product(j, &inverse(k));
+        // From the greatest singular value down; the last axis follows from the others, so that both sets are right-handed.
+        let (_, [_, b, a]) = eigen(&product(&transpose(&f), &f));
+        let v = [a, b, cross(a, b)];
+        let images = v.map(|v| apply(&f, v));
+        let size = norm(images[0]);
+        if size.is_nan() || size <= 0.0 {
+            return *k;
+        }
+        let first = scale(images[0], 1.0 / size);
+        let rest = sub(images[1], scale(first, dot(first, images[1])));
+        let second = if norm(rest) > 1e-12 * size { scale(rest, 1.0 / norm(rest)) } else { any_normal(first) };
+        let u = [first, second, cross(first, second)];
+        let found: Mat3 = core::array::from_fn(|i| {
+            core::array::from_fn(|c| {
+                (0..3).map(|s| dot(u[s], images[s]).clamp(1.0 / self.most, 1.0 / self.least) * u[s][i] * v[s][c]).sum()
+            })
+        });
+        product(&found, k)
+    }
+
+    /// In words where cells of a map are stretched beyond the range; `None` if nowhere.
+    pub(super) fn exceeded(&self, d: &Distortion) -> Option<String> {
+        let [low, high] = d.stretch;
+        let (found, at) = match () {
+            () if low < self.least => (low, d.stretch_at[0]),
+            () if high > self.most => (high, d.stretch_at[1]),
+            () => return None,
+        };
+        let [least, most] = self.range().map(number);
+        Some(format!(
+            "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map with a smaller stretch there was \
+             found. Give a wider range, or let orientation and wavelength vary more slowly",
+            in_mm(at)
+        ))
+    }
+
+    /// Whether the stretches of a Jacobian are in the range.
+    fn holds(&self, stretches: Option<[f64; 2]>) -> bool {
+        stretches.is_some_and(|[a, b]| a >= self.least && b <= self.most)
+    }
+}
+
+/// The least and the greatest principal stretch of a cell that has the axes and lengths of `k` where it is not stretched; `None` where
+/// cells are turned inside out.
+pub(super) fn stretches(j: &Mat3, k: &Mat3) -> Option<[f64; 2]> {
+    let f = product(j, &inverse(k));
+    if determinant(&f) <= 0.0 {
+        return None;
+    }
+    let ([least, _, most], _) = eigen(&product(&transpose(&f), &f));
+    Some([1.0 / most.sqrt(), 1.0 / least.max(0.0).sqrt()])
+}
+
+/// A unit vector at right angles to one.
+fn any_normal(v: Vec3) -> Vec3 {
+    let a = (0..3).fold(0, |m, i| if v[i].abs() < v[m].abs() { i } else { m });
+    let mut e = [0.0; 3];
+    e[a] = 1.0;
+    let n = cross(v, e);
+    scale(n, 1.0 / norm(n))
+}
+
+/// The map near to `solution` whose stretches are in a range in the cells of the grid of which a node `counts`.
+pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: Solution) -> Solution {
+    let grid = *solution.grid();
+    let mut values: [Vec<f64>; 3] = {
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        solution.spline.values(&nodes, &mut u);
+        core::array::from_fn(|i| u.iter().map(|u| u[i]).collect())
+    };
+    let cells = Cells::new(&grid);
+    let middles: Vec<Vec3> = (0..cells.len()).map(|c| cells.middle(c)).collect();
+    let mut wound = vec![[[0.0; 3]; 3]; middles.len()];
+    solution.winding.add_jacobians(&middles, &mut wound);
+    let k: Vec<Mat3> = (0..cells.len()).into_par_iter().map(|c| cells.mean(c, |n| problem.target(n))).collect();
+    let counts: Vec<bool> =
+        (0..cells.len()).into_par_iter().map(|c| cells.corners(c).iter().any(|n| counts[*n])).collect();
+    let [inner, enough] = [MARGIN, 0.5 * MARGIN].map(|by| range.narrowed(by));
+    let mut dual = vec![[[0.0; 3]; 3]; cells.len()];
+    let mut penalty = 1.0;
+    for round in 0..ROUNDS {
+        checkpoint();
+        let slopes = values.each_ref().map(|v| gradient(&grid, v));
+        let jacobian = |c: usize| -> Mat3 { core::array::from_fn(|i| add(cells.slope(c, &slopes[i]), wound[c][i])) };
+        let now: Vec<Mat3> = (0..cells.len()).into_par_iter().map(jacobian).collect();
+        if (0..cells.len()).into_par_iter().all(|c| !counts[c] || enough.holds(stretches(&now[c], &k[c]))) {
+            break;
+        }
+        if round > 0 && round % DOUBLED == 0 && penalty < DEAREST {
+            penalty *= 2.0;
+            dual.par_iter_mut().for_each(|d| *d = d.map(|r| scale(r, 0.5)));
+        }
+        // What the next map's gradient is to differ by from this one's.
+        let off: Vec<Mat3> = dual
+            .par_iter_mut()
+            .enumerate()
+            .map(|(c, dual)| {
+                let (j, k) = (&now[c], &k[c]);
+                let mut toward = *j;
+                if counts[c] {
+                    let lifted: Mat3 = core::array::from_fn(|i| add(j[i], dual[i]));
+                    let near = inner.nearest(&lifted, k);
+                    *dual = core::array::from_fn(|i| scale(sub(lifted[i], near[i]), KEPT));
+                    toward = core::array::from_fn(|i| sub(near[i], dual[i]));
+                }
+                let step = |i: usize| add(sub(k[i], j[i]), scale(sub(toward[i], j[i]), penalty));
+                core::array::from_fn(|i| scale(step(i), 1.0 / (1.0 + penalty)))
+            })
+            .collect();
+        for (axis, values) in values.iter_mut().enumerate() {
+            let change = problem.nearest(axis, &cells.on_edges(&off, axis));
+            values.par_iter_mut().zip(&change).for_each(|(v, d)| *v += d);
+        }
+    }
+    Solution { spline: Spline::through(grid, values), winding: solution.winding }
+}
+
+/// The cells of a grid of nodes.
+struct Cells<'a> {
+    grid: &'a Grid,
+    shape: [usize; 3],
+}
+
+impl<'a> Cells<'a> {
+    fn new(grid: &'a Grid) -> Cells<'a> {
+        Cells { grid, shape: grid.shape.map(|n| n - 1) }
+    }
+
+    fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// The first node of a cell.
+    fn first(&self, c: usize) -> usize {
+        let [nx, ny, _] = self.shape;
+        let [_, y, z] = self.grid.strides();
+        c % nx + c / nx % ny * y + c / nx / ny * z
+    }
+
+    fn corners(&self, c: usize) -> [usize; 8] {
+        let (first, strides) = (self.first(c), self.grid.strides());
+        core::array::from_fn(|n| first + (0..3).map(|a| (n >> a & 1) * strides[a]).sum::<usize>())
+    }
+
+    fn middle(&self, c: usize) -> Vec3 {
+        add(self.grid.node(self.first(c)), scale(self.grid.step, 0.5))
+    }
+
+    fn mean(&self, c: usize, of: impl Fn(usize) -> Mat3) -> Mat3 {
+        let each = self.corners(c).map(of);
+        core::array::from_fn(|i| core::array::from_fn(|j| each.iter().map(|m| m[i][j]).sum::<f64>() / 8.0))
+    }
+
+    /// The gradient in the middle: the mean slopes of the four edges along each axis.
+    fn slope(&self, c: usize, slopes: &[Vec3]) -> Vec3 {
+        let near = self.corners(c);
+        [0, 1, 2].map(|a| (0..8).filter(|i| i >> a & 1 == 0).map(|i| 0.25 * slopes[near[i]][a]).sum())
+    }
+
+    /// For each edge above a node the mean over the cells about it.
+    fn on_edges(&self, of: &[Mat3], row: usize) -> Vec<Vec3> {
+        let grid = self.grid;
+        let edge = |n: usize, a: usize| {
+            let at = grid.index(n);
+            if at[a] == self.shape[a] {
+                return 0.0;
+            }
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let mut low = at;
+                (low[b], low[c]) = (at[b].wrapping_sub(i), at[c].wrapping_sub(j));
+                if low[b] < self.shape[b] && low[c] < self.shape[c] {
+                    sum += of[(low[2] * self.shape[1] + low[1]) * self.shape[0] + low[0]][row][a];
+                    count += 1.0;
+                }
+            }
+            sum / count
+        };
+        (0..grid.len()).into_par_iter().map(|n| [0, 1, 2].map(|a| edge(n, a))).collect()
+    }
+}

@@ -1,0 +1,87 @@
+//! Bounds on how much cells are stretched hold wherever a map is accepted.
+
+use geometry::math::{Aabb, Vec3, determinant};
+use trabecula::field::Field;
+use trabecula::grade::{Formula, Grade};
+use trabecula::map::{Mapping, Orientation, Phase, Settings, Stretch, Wanted};
+use trabecula::region::Cylinder;
+
+fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> Wanted {
+    Wanted {
+        wavelength: [0; 3].map(|_| Grade::Constant(3.0)),
+        orientation: Orientation::Angles(rotate.map(|f| Grade::from(Formula::parse(f).expect("formula")))),
+        weight: None,
+        angle_weight: 1.0,
+        smooth: None,
+        by_principal: false,
+        stretch: range.map(|r| Stretch::new(r).expect("range")),
+        offset: [0.0; 3],
+    }
+}
+
+fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
+    let b = *b;
+    (1..=n).map(move |i| {
+        let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract());
+        core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a])
+    })
+}
+
+const BOX: Aabb = Aabb { min: [0.0; 3], max: [24.0, 24.0, 12.0] };
+
+fn rod() -> Cylinder {
+    Cylinder::new([12.0, 12.0, 0.0], [0.0, 0.0, 1.0], 11.0, 12.0).expect("rod")
+}
+
+/// The share of points in a region at which cells are stretched beyond a range.
+fn beyond(map: &Phase, region: &dyn Field, range: [f64; 2]) -> f64 {
+    let within: Vec<Vec3> = points(&BOX, 30_000).filter(|p| region.value(*p) < 0.0).collect();
+    let found = map.misfits(&within).expect("misfits");
+    let out = found.iter().filter(|m| m.density <= 0.0 || m.stretch[0] < range[0] || m.stretch[1] > range[1]);
+    out.count() as f64 / within.len() as f64
+}
+
+/// Where least squares alone stretches cells too much, nearly all of them keep to the range: it is held in the middles of the grid's
+/// cells, and off them to what the Jacobian changes by within one. What is lost is fidelity, and little of it.
+#[test]
+fn cells_keep_to_the_range() {
+    let rod = rod();
+    for (rotate, range) in [
+        (["0", "0", "5*x"], [0.67, 1.5]),
+        (["0", "0", "2.5*x"], [0.8, 1.25]),
+        (["10*sin(x/3)", "20*sin(y/4)", "40*sin(x/3)*cos(y/4)"], [0.67, 1.5]),
+    ] {
+        let settings = Settings { region: Some(&rod), ..Settings::default() };
+        let solve = |range| Phase::solve(&BOX, &wanted(rotate, range), &settings).expect("no fold");
+        let [free, held] = [solve(None), solve(Some(range))];
+        let [before, after] = [&free, &held].map(|m| beyond(m, &rod, range));
+        let angle = |m: &Phase| m.distortion().angle.map(|a| a.mean).iter().sum::<f64>();
+        println!("{rotate:?}: {before} {after}, {:?}, angles {} {}", held.overstretched(), angle(&free), angle(&held));
+        assert!(before > 0.02 && after < 0.003, "{rotate:?}: {before} {after}");
+        assert!(angle(&held) < 1.3 * angle(&free));
+    }
+}
+
+/// A target that no map of least squares can follow without cells that are turned inside out has one whose cells are not.
+#[test]
+fn a_map_that_folds_is_unfolded() {
+    let (rod, rotate) = (rod(), ["0", "0", "90*sin(x/2)"]);
+    let settings = Settings { region: Some(&rod), ..Settings::default() };
+    let refused = Phase::solve(&BOX, &wanted(rotate, None), &settings).err().expect("it folds");
+    assert!(refused.message.contains("stretch"), "{}", refused.message);
+    let map = Phase::solve(&BOX, &wanted(rotate, Some([0.67, 1.5])), &settings).expect("no fold");
+    let mut within = points(&BOX, 200_000).filter(|p| rod.value(*p) < 0.0);
+    assert!(within.all(|p| determinant(&map.jacobian(p)) > 0.0));
+}
+
+/// What keeps to the range as it is stays what it is, to the bit.
+#[test]
+fn a_map_within_the_range_is_that_of_least_squares() {
+    for rotate in [["0", "0", "2*x"], ["3*sin(x/4)", "2*y", "20"]] {
+        let solve = |range| Phase::solve(&BOX, &wanted(rotate, range), &Settings::default()).expect("no fold");
+        let [free, held] = [solve(None), solve(Some([0.5, 2.0]))];
+        for p in points(&BOX, 500) {
+            assert_eq!(free.jacobian(p), held.jacobian(p));
+        }
+    }
+}
