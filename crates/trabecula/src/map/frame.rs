@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::phase_grid::Grid;
 use super::singular_lines::Alike;
-use super::smooth_frames::{LEAST_AVERAGE, Smoothing};
+use super::smooth_frames::{Averages, LEAST_AVERAGE, Octahedral, Smoothing};
+use super::surface_frames::Surface;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{
@@ -114,8 +115,14 @@ impl Orientation {
         grid: &Grid,
         nodes: &[Vec3],
         smoothing: Option<&Smoothing>,
+        surface: Option<&Surface>,
         outside: Option<&[f64]>,
     ) -> Result<Frames, Fault> {
+        if let (Some(surface), Some(smoothing)) = (surface, smoothing) {
+            let (frames, gaps, range) = self.asked(grid, nodes, outside)?;
+            let averages = smoothing.frames(grid, |n| surface.mixed(n, Octahedral::of(&frames[n], &gaps(n))));
+            return Ok(averaged(grid, frames, &averages, range, outside));
+        }
         let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
         match self {
             Orientation::Angles(of) => {
@@ -144,10 +151,8 @@ impl Orientation {
                 let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
                 let of_part: Vec<Vec3> = found.iter().map(|p| scale(p.gaps(), 1.0 / range)).collect();
                 if let Some(smoothing) = smoothing {
-                    let averages = smoothing.frames(grid, &frames, &of_part);
-                    let confidence = first_in(outside, |n| averages.confidence(n));
-                    comb(grid, &mut frames, confidence, |n, _, to| averages.settled(n, to));
-                    return Ok(Frames { at_nodes: frames, trust: Some(averages.trust()), range });
+                    let averages = smoothing.frames(grid, |n| Octahedral::of(&frames[n], &of_part[n]));
+                    return Ok(averaged(grid, frames, &averages, range, outside));
                 }
                 let turns = cube();
                 let least = first_in(outside, |n| of_part[n].into_iter().fold(f64::INFINITY, f64::min));
@@ -155,6 +160,31 @@ impl Orientation {
                 Ok(Frames { at_nodes: frames, trust: None, range })
             }
         }
+    }
+
+    /// The frames that are asked for at nodes, without regard to signs and order; how far apart principal values are, relative to the
+    /// range of those in the part; and that range. Where cells are not turned at all, nothing is asked for.
+    fn asked(
+        &self,
+        grid: &Grid,
+        nodes: &[Vec3],
+        outside: Option<&[f64]>,
+    ) -> Result<(Vec<Mat3>, Box<dyn Fn(usize) -> Vec3>, f64), Fault> {
+        if let Orientation::Stress(_) = self {
+            let found = self.principal(nodes)?;
+            let range = range(&found, outside);
+            if range == 0.0 {
+                return Err(no_principal());
+            }
+            let frames = found.iter().map(|p| p.frame).collect();
+            return Ok((frames, Box::new(move |n| scale(found[n].gaps(), 1.0 / range)), range));
+        }
+        let gaps = match self {
+            Orientation::Angles(of) if of.iter().all(|a| a.constant() == Some(0.0)) => [0.0; 3],
+            Orientation::Direction(_) => [0.0, 0.0, 1.0],
+            _ => [1.0; 3],
+        };
+        Ok((self.frames(grid, nodes, None, None, outside)?.at_nodes, Box::new(move |_| gaps), 0.0))
     }
 
     /// The principal directions of a stress at points; none of other orientations.
@@ -245,6 +275,14 @@ impl Orientation {
             }
         }
     }
+}
+
+/// Frames combed to their averages.
+fn averaged(grid: &Grid, frames: Vec<Mat3>, averages: &Averages, range: f64, outside: Option<&[f64]>) -> Frames {
+    let mut frames = frames;
+    let confidence = first_in(outside, |n| averages.confidence(n));
+    comb(grid, &mut frames, confidence, |n, _, to| averages.settled(n, to));
+    Frames { at_nodes: frames, trust: Some(averages.trust()), range }
 }
 
 /// Frames at the nodes of a grid.

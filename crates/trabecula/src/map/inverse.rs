@@ -119,6 +119,7 @@ mod tests {
             angle_weight: 1.0,
             smooth: None,
             by_principal: false,
+            align: None,
             stretch: None,
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");

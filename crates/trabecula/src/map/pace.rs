@@ -66,7 +66,7 @@ pub(super) fn choose(
     let of = &wanted.orientation;
     let slower = match of {
         Orientation::Angles(_) => "let it vary more slowly",
-        _ if wanted.smooth.is_some() || missed[axis].key != of.key() => "let it vary more slowly",
+        _ if wanted.averaged().is_some() || missed[axis].key != of.key() => "let it vary more slowly",
         _ => "smooth it over about a wavelength (smooth, in mm), or let it vary more slowly",
     };
     let remedy = match (left.iter().any(Missed::much), step) {
@@ -221,7 +221,7 @@ impl<'a> Probe<'a> {
     /// The wavelengths and the frames at points; of frames that are alike, those nearest to `like`.
     fn target(&self, points: &[Vec3], like: &[Mat3]) -> Result<Vec<(Vec3, Mat3)>, Fault> {
         // What is smoothed varies no faster than the grid can carry.
-        let frames = match self.wanted.smooth {
+        let frames = match self.wanted.averaged() {
             Some(_) => like.to_vec(),
             None => self.wanted.orientation.frames_near(points, like, self.range)?,
         };

@@ -9,17 +9,18 @@ use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
-use super::frame::{self, Orientation, in_mm};
+use super::frame::{self, Orientation, cube, in_mm};
 use super::integral::{Integral, Problem, Weights};
 use super::pace;
 use super::periods::{Angles, Period};
 use super::phase_grid::Grid;
 use super::phase_target::{Laid, Target, wavelengths};
 use super::region_holes::{MOST, Sought};
-use super::singular_lines::singular_lines;
+use super::singular_lines::{Alike, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
 use super::stretch::{Stretch, bounded};
+use super::surface_frames::Aligned;
 use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
 use crate::field::{Block, Field};
@@ -58,6 +59,8 @@ pub struct Wanted {
     pub angle_weight: f64,
     /// The length over which directions, frames and stresses are smoothed, mm.
     pub smooth: Option<f64>,
+    /// Alignment of an axis of the cells with the region's surface, within a depth.
+    pub align: Option<Aligned>,
     /// The range in which cells may be stretched; any if none.
     pub stretch: Option<Stretch>,
     /// Moves the lattice (mm).
@@ -65,6 +68,16 @@ pub struct Wanted {
 }
 
 impl Wanted {
+    /// The length over which frames are averaged, mm, if they are.
+    pub(super) fn averaged(&self) -> Option<f64> {
+        self.align.map(|a| a.length(self.smooth)).or(self.smooth)
+    }
+
+    /// What counts as the same axes.
+    fn alike(&self) -> Alike {
+        if self.align.is_some() { Alike::Turned(cube()) } else { self.orientation.alike() }
+    }
+
     /// What an error of angle counts, if it is in its range.
     fn ratio(&self) -> Result<f64, Fault> {
         let ratio = self.angle_weight;
@@ -153,7 +166,7 @@ impl Phase {
         let lengths_range =
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         let axes = &found.target.frames;
-        let lines = singular_lines(&laid.grid, axes, &laid.inside, &wanted.orientation.alike(), 0.5 * lengths_range[0]);
+        let lines = singular_lines(&laid.grid, axes, &laid.inside, &wanted.alike(), 0.5 * lengths_range[0]);
         found.judged.distortion.singular = lines;
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
             tried += &found.judged.distortion.winds();
@@ -168,7 +181,7 @@ impl Phase {
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = solution.jacobian(bounds.center());
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
-        let keep = wanted.smooth.is_some() || wanted.by_principal || !periods.is_empty();
+        let keep = wanted.averaged().is_some() || wanted.by_principal || !periods.is_empty();
         let Target { frames, lengths, .. } = target;
         Ok(Phase {
             solution,
@@ -230,7 +243,7 @@ impl Phase {
         }
         let grid = self.solution.grid();
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None, None)?.at_nodes.into();
+        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None, None, None)?.at_nodes.into();
         Ok(self.frames.get_or_init(|| made).clone())
     }
 
@@ -346,7 +359,7 @@ fn targets(
     lengths: Option<&[Vec3]>,
     points: &[Vec3],
 ) -> Result<Vec<Mat3>, Fault> {
-    let smooth = wanted.smooth.is_some();
+    let smooth = wanted.averaged().is_some();
     let like: Vec<Mat3> = match smooth || wanted.orientation.is_combed() {
         true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
         false => Vec::new(),

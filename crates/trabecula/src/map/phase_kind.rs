@@ -1,6 +1,8 @@
 //! The solved map, as it is declared.
 
-use super::{Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared};
+use super::{
+    Aligned, Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared,
+};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, several};
@@ -33,6 +35,12 @@ pub struct PhaseKind {
     /// parts of a stress count by how much they differ between directions. None unless given.
     #[kind(unit = "mm", above = 0.0)]
     smooth: Option<f64>,
+    /// "surface": an axis of the cell, whichever is nearest, along the normal of the region's surface, and farther in what is asked for
+    /// there; without an orientation, what continues the surface's.
+    align: Option<Align>,
+    /// How deep that reaches below the surface; two wavelengths unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    align_depth: Option<f64>,
     /// The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say. The map is the
     /// one nearest to the target that keeps to it; an error where none is found. Any unless given.
     stretch: Option<[f64; 2]>,
@@ -201,6 +209,14 @@ pub enum TensorOrder {
     Voigt,
 }
 
+/// What cells are aligned with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
+#[kind(noun = "alignment")]
+pub enum Align {
+    /// The region's surface.
+    Surface,
+}
+
 /// What counts when phases are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(noun = "domain")]
@@ -265,6 +281,39 @@ impl PhaseKind {
         }
     }
 
+    /// The alignment with the surface.
+    fn aligned(&self, wavelength: &[Grade; 3]) -> Result<Option<Aligned>, Fault> {
+        match (self.align, self.align_depth) {
+            (None, None) => Ok(None),
+            (None, Some(depth)) => {
+                let message =
+                    "align_depth is how deep align reaches; give align = \"surface\" as well, or leave it out";
+                Err(Fault::new("align_depth", message).found(number(depth)))
+            }
+            (Some(_), _) if self.domain == Domain::Box => {
+                let message = "cells are aligned with the surface of the region, and domain = \"box\" leaves it out of account; leave domain out";
+                Err(Fault::new("align", message))
+            }
+            (Some(_), _) if matches!(self.wavelength, Some(GradeOrThree::Three(_))) => {
+                let message = "any axis of a cell may lie along the normal: three wavelengths have no axes of their own; give one, or leave align out";
+                Err(Fault::new("align", message))
+            }
+            (Some(_), depth) => {
+                let longest = wavelength.iter().filter_map(Grade::constant).fold(0.0, f64::max);
+                let depth = match (depth, longest > 0.0) {
+                    (Some(depth), _) => depth,
+                    (None, true) => 2.0 * longest,
+                    (None, false) => {
+                        let message =
+                            "the wavelength varies: give align_depth, how deep align = \"surface\" reaches (mm)";
+                        return Err(Fault::new("align", message));
+                    }
+                };
+                Aligned::new(depth).map(Some)
+            }
+        }
+    }
+
     /// The map of these wavelengths (mm).
     fn with(&self, wavelength: [Grade; 3], path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
@@ -276,6 +325,7 @@ impl PhaseKind {
                 "smooth is for a direction, a frame or a stress; angles are followed as they are given: leave it out";
             return Err(DesignError::new(below("smooth"), message).found(number(length)));
         }
+        let align = self.aligned(&wavelength).map_err(|f| DesignError::fault(path, f))?;
         let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
         let wanted = Wanted {
             wavelength,
@@ -284,6 +334,7 @@ impl PhaseKind {
             weight: weight.transpose()?,
             angle_weight: self.angle_weight,
             smooth: self.smooth,
+            align,
             stretch: self.stretch.map(Stretch::new).transpose().map_err(|f| DesignError::fault(path, f))?,
             offset: self.offset,
         };

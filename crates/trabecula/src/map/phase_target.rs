@@ -7,6 +7,7 @@ use super::phase::Wanted;
 use super::phase_grid::Grid;
 use super::principal_lengths::along_axes;
 use super::smooth_frames::Smoothing;
+use super::surface_frames::Surface;
 use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
@@ -27,6 +28,8 @@ pub(super) struct Laid {
     pub depth: Vec<f64>,
     /// Whether nodes are in the region.
     pub inside: Vec<bool>,
+    /// The surface that cells are aligned with, if they are.
+    pub surface: Option<Surface>,
     /// The wavelengths that are given, mm.
     pub given: Vec<Vec3>,
 }
@@ -40,9 +43,10 @@ impl Laid {
         if let Some(region) = region {
             depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096)).for_each(|(d, p)| region.values(p, d));
         }
+        let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
         let reach = 1e-9 * norm(bounds.size());
         let inside = depth.iter().map(|d| *d <= reach).collect();
-        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, given })
+        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, surface, given })
     }
 
     /// The root of the weight of a node; it falls off by e outside the region over some steps of the grid.
@@ -110,9 +114,9 @@ impl Target {
     /// node is `outside`.
     pub fn new(laid: &Laid, wanted: &Wanted, outside: Option<&[f64]>) -> Result<Target, Fault> {
         let weight: Vec<f64> = (0..laid.grid.len()).map(|n| laid.nearness(FALL, n).powi(2)).collect();
-        let smoothing = wanted.smooth.map(|length| Smoothing { length, weight: &weight });
+        let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
         let Frames { at_nodes: frames, trust, range } =
-            wanted.orientation.frames(&laid.grid, &laid.nodes, smoothing.as_ref(), outside)?;
+            wanted.orientation.frames(&laid.grid, &laid.nodes, smoothing.as_ref(), laid.surface.as_ref(), outside)?;
         checkpoint();
         let lengths = match wanted.by_principal {
             true => {

@@ -52,10 +52,9 @@ impl Smoothing<'_> {
         self.averages(grid, tensors)
     }
 
-    /// The frames of principal directions, averaged. `gaps` are those of the three principal values to the nearest other, over the
-    /// greatest difference in the part.
-    pub fn frames(&self, grid: &Grid, frames: &[Mat3], gaps: &[Vec3]) -> Averages {
-        let own: Vec<[f64; 10]> = frames.iter().zip(gaps).map(|(f, g)| Octahedral::of(f, g).0).collect();
+    /// The frames at the nodes, averaged.
+    pub fn frames(&self, grid: &Grid, frame: impl Fn(usize) -> Octahedral) -> Averages {
+        let own: Vec<[f64; 10]> = (0..grid.len()).map(|n| frame(n).0).collect();
         let all = self.averages(grid, &own);
         let most = all.iter().fold(0.0f64, |m, q| m.max(q[9]));
         let whole = self.averages(grid, &vec![[1.0]; own.len()]).into_iter().map(|[w]| w).collect();
@@ -98,11 +97,12 @@ pub(super) fn trusted(gap: f64) -> f64 {
 
 /// A harmonic polynomial of degree four, by the coefficients of x⁴, x³y, x²y², xy³, y⁴, x³z, x²yz, xy²z, y³z, from which those with
 /// higher powers of z follow; and the sum of the confidences of the frames that it is made of.
-struct Octahedral([f64; 10]);
+pub(super) struct Octahedral([f64; 10]);
 
 impl Octahedral {
-    /// Of a frame with these gaps of its principal values, times its confidence.
-    fn of(frame: &Mat3, gaps: &Vec3) -> Octahedral {
+    /// Of a frame, times its confidence. `gaps` are those of its principal values to the nearest other, over the greatest difference in
+    /// the part.
+    pub fn of(frame: &Mat3, gaps: &Vec3) -> Octahedral {
         // The axis whose value is farthest from the others, and the confidence in the other two.
         let k = (0..3).fold(0, |m, i| if gaps[i] > gaps[m] { i } else { m });
         let sure = trusted(gaps[k]);
@@ -121,6 +121,14 @@ impl Octahedral {
         out.iter_mut().for_each(|c| *c *= sure);
         out[9] = sure;
         Octahedral(out)
+    }
+
+    pub fn times(self, by: f64) -> Octahedral {
+        Octahedral(self.0.map(|c| c * by))
+    }
+
+    pub fn plus(self, other: Octahedral) -> Octahedral {
+        Octahedral(core::array::from_fn(|c| self.0[c] + other.0[c]))
     }
 
     /// The gradient at a position, of the polynomial plus ⅗ r⁴ times the confidence: a sum of convex polynomials.

@@ -25,6 +25,7 @@ mod spacing;
 mod streams;
 mod stretch;
 mod surface;
+mod surface_frames;
 mod tets;
 mod thickness;
 mod tiling;

@@ -30,6 +30,7 @@ fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Pha
         angle_weight: 1.0,
         smooth,
         by_principal: false,
+        align: None,
         stretch: None,
         offset: [0.0; 3],
     };

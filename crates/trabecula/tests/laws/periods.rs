@@ -28,6 +28,7 @@ fn wanted(wavelength: f64, orientation: Orientation) -> Wanted {
         angle_weight: 1.0,
         smooth: None,
         by_principal: false,
+        align: None,
         stretch: None,
         offset: [0.0; 3],
     }

@@ -31,6 +31,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         angle_weight: 1.0,
         smooth: None,
         by_principal: false,
+        align: None,
         stretch: None,
         offset: [0.1, 0.2, 0.3],
     };

@@ -16,6 +16,7 @@ fn solved(stress: [Grade; 6], smooth: Option<f64>) -> Phase {
         weight: None,
         angle_weight: 1.0,
         smooth,
+        align: None,
         stretch: None,
         offset: [0.0; 3],
     };

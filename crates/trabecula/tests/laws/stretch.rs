@@ -14,6 +14,7 @@ fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> Wanted {
         angle_weight: 1.0,
         smooth: None,
         by_principal: false,
+        align: None,
         stretch: range.map(|r| Stretch::new(r).expect("range")),
         offset: [0.0; 3],
     }

@@ -66,8 +66,10 @@ fn where_values_agree_the_neighbours_decide() {
         let values = nodes.iter().map(|p| tensor(*p)[c]).collect();
         Grade::from(Samples::new(g.origin, g.step, g.shape, values).expect("samples"))
     };
-    let frames =
-        Orientation::Stress(core::array::from_fn(component)).frames(&g, &nodes, None, None).expect("frames").at_nodes;
+    let frames = Orientation::Stress(core::array::from_fn(component))
+        .frames(&g, &nodes, None, None, None)
+        .expect("frames")
+        .at_nodes;
     for (n, f) in frames.iter().enumerate() {
         assert!((determinant(f) - 1.0).abs() < 1e-9);
         if nodes[n][0] < 4.6 {
@@ -89,7 +91,8 @@ fn directions_are_lines_and_frames_are_orthonormal() {
     let (g, nodes) = grid();
     // The sign flips in the middle; lines do not care.
     let of = [formula("sin(x)*(y-3.3)"), formula("0.5*(y-3.3)"), formula("cos(x)*(y-3.3)")];
-    let frames = Orientation::Direction(Axis::Vector(of)).frames(&g, &nodes, None, None).expect("frames").at_nodes;
+    let frames =
+        Orientation::Direction(Axis::Vector(of)).frames(&g, &nodes, None, None, None).expect("frames").at_nodes;
     for (n, f) in frames.iter().enumerate() {
         let want = unit([nodes[n][0].sin(), 0.5, nodes[n][0].cos()]);
         let z = apply(f, [0.0, 0.0, 1.0]);
@@ -99,5 +102,7 @@ fn directions_are_lines_and_frames_are_orthonormal() {
         assert!(angle(&ff, &IDENTITY) < 1e-5);
     }
     let zero = Orientation::Direction(Axis::Vector([formula("x-1"), formula("y-2"), formula("z-3")]));
-    assert!(zero.frames(&g, &nodes, None, None).err().expect("zero").message.contains("(1.0000, 2.0000, 3.0000)"));
+    assert!(
+        zero.frames(&g, &nodes, None, None, None).err().expect("zero").message.contains("(1.0000, 2.0000, 3.0000)")
+    );
 }

@@ -23,6 +23,7 @@ fn about_z(angle: &str, wavelength: Grade) -> Wanted {
         angle_weight: 1.0,
         smooth: None,
         by_principal: false,
+        align: None,
         stretch: None,
         offset: [0.0; 3],
     }
@@ -48,6 +49,7 @@ fn what_does_not_vary_is_the_affine_map() {
         angle_weight: 1.0,
         smooth: None,
         by_principal: false,
+        align: None,
         stretch: None,
         offset,
     };
@@ -184,7 +186,7 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
     let grid = Grid::over(&b, [17, 21, 13]);
     let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
     let angles = [formula("30*y"), formula("10*x*z"), formula("40*x")];
-    let frames = Orientation::Angles(angles).frames(&grid, &nodes, None, None).expect("frames").at_nodes;
+    let frames = Orientation::Angles(angles).frames(&grid, &nodes, None, None, None).expect("frames").at_nodes;
     let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| frames.iter().map(|f| [f[0][i], f[1][i], f[2][i]]).collect());
     let depth: Vec<f64> = nodes.iter().map(|p| norm(sub(*p, b.center())) - 1.5).collect();
     for depth in [vec![-1.0; grid.len()], depth] {
