@@ -5,6 +5,7 @@ mod affine_kind;
 mod cohomology;
 mod distortion;
 mod edge_squares;
+mod fixed_faces;
 mod frame;
 mod integral;
 mod inverse;

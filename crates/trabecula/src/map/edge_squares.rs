@@ -52,7 +52,21 @@ impl EdgeSquares {
             faces.fold(share, |w, _| 0.5 * w) * roots[n] * roots[n + strides[a]] / (grid.step[a] * grid.step[a])
         };
         let edges = core::array::from_fn(|a| (0..grid.len()).into_par_iter().map(|n| weight(a, n)).collect());
-        EdgeSquares { grid, multigrid: Multigrid::new(grid.shape, grid.step, edges) }
+        EdgeSquares { grid, multigrid: Multigrid::new(grid.shape, grid.step, edges, Vec::new()) }
+    }
+
+    /// The function whose steps are nearest to none and whose values are near to those given, where they count: Σ m (Φᵢ − vᵢ)² is added.
+    pub fn pulled(&self, mass: Vec<f64>, values: &[f64], tilt: Option<&Tilt>) -> Vec<f64> {
+        let right = mass.iter().zip(values).map(|(m, v)| m * v).collect();
+        let multigrid = Multigrid::new(self.grid.shape, self.grid.step, self.multigrid.finest().edges.clone(), mass);
+        EdgeSquares { grid: self.grid, multigrid }.solve(right, vec![0.0; values.len()], tilt).values
+    }
+
+    /// What the squares of all differences at a node count.
+    pub fn about(&self, node: usize) -> f64 {
+        let edges = &self.multigrid.finest().edges;
+        let below = |a: usize| node.checked_sub(self.grid.strides()[a]).map_or(0.0, |m| edges[a][m]);
+        (0..3).map(|a| edges[a][node] + below(a)).sum()
     }
 
     /// The sum of the products of two sets of slopes along the edges above nodes, as errors count.
@@ -65,6 +79,15 @@ impl EdgeSquares {
     /// The function whose steps along the edges above the nodes are nearest to those of slopes, from `start` on; errors across the target
     /// count more or less than those along it, if there is a tilt.
     pub fn fit(&self, slopes: &[Vec3], start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
+        let mut right = flow(&self.grid, &self.multigrid.finest().edges, slopes);
+        if let Some(tilt) = tilt {
+            right.par_iter_mut().zip(tilt.wanted(slopes)).for_each(|(r, more)| *r += more);
+        }
+        self.solve(right, start, tilt)
+    }
+
+    /// The solution of the normal equations, from `start` on.
+    fn solve(&self, right: Vec<f64>, start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
         let none = vec![0.0; start.len()];
         let operator = |x: &[f64], out: &mut Vec<f64>| {
             self.multigrid.finest().apply(x, out, |_, _, product| product, &none);
@@ -73,11 +96,8 @@ impl EdgeSquares {
             }
         };
         let dot = |a: &[f64], b: &[f64]| sums(a.len(), |n| a[n] * b[n]);
-        let (mut x, mut r, mut q) =
-            (start, flow(&self.grid, &self.multigrid.finest().edges, slopes), vec![0.0; slopes.len()]);
-        if let Some(tilt) = tilt {
-            r.par_iter_mut().zip(tilt.wanted(slopes)).for_each(|(r, more)| *r += more);
-        }
+        let mut q = vec![0.0; start.len()];
+        let (mut x, mut r) = (start, right);
         let scale = dot(&r, &r).sqrt();
         operator(&x, &mut q);
         r.par_iter_mut().zip(&q).for_each(|(r, q)| *r -= q);

@@ -72,6 +72,21 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The function whose steps are nearest to none, as errors of an axis count, and which is pulled to values at nodes: `pull` is what
+    /// they count, relative to all differences at the node.
+    pub fn pulled(&self, axis: usize, pull: Vec<f64>, values: &[f64]) -> Vec<f64> {
+        let even;
+        let squares = match &self.weights {
+            Some((_, squares)) => squares,
+            None => {
+                even = EdgeSquares::new(self.grid, &vec![1.0; self.grid.len()], None);
+                &even
+            }
+        };
+        let mass = pull.iter().enumerate().map(|(n, m)| if *m > 0.0 { m * squares.about(n) } else { 0.0 }).collect();
+        squares.pulled(mass, values, self.tilt(axis).as_ref())
+    }
+
     pub fn solve(&self) -> Integral {
         let grid = &self.grid;
         let root = |n: usize| self.weights.as_ref().map_or(1.0, |(s, _)| s[n] * s[n]);

@@ -121,6 +121,7 @@ mod tests {
             by_principal: false,
             align: None,
             stretch: None,
+            fix: Vec::new(),
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

@@ -22,12 +22,14 @@ pub(super) struct Multigrid {
     levels: Vec<Level>,
 }
 
-/// Σ w (Φⱼ − Φᵢ)² over the edges of a grid, x running fastest.
+/// Σ w (Φⱼ − Φᵢ)² over the edges of a grid, x running fastest, and Σ m Φᵢ² over its nodes.
 pub(super) struct Level {
     shape: [usize; 3],
     /// For the edge above each node along each axis what the square of a difference counts; zero where there is no edge.
     pub edges: [Vec<f64>; 3],
-    /// One over the sum of a node's edges; zero where it has none.
+    /// What the square of a node's value counts; empty if nothing anywhere.
+    mass: Vec<f64>,
+    /// One over the sum of a node's edges and its mass; zero where it has none.
     inverse: Vec<f64>,
     /// The axes along which the next level has half as many nodes.
     halved: [bool; 3],
@@ -42,9 +44,10 @@ struct Work {
 }
 
 impl Multigrid {
-    /// For what the square of a difference along each edge counts; `step` is the length of the edges along each axis.
-    pub fn new(shape: [usize; 3], step: [f64; 3], edges: [Vec<f64>; 3]) -> Multigrid {
-        let (mut levels, mut step) = (vec![Level::new(shape, edges)], step);
+    /// For what the square of a difference along each edge counts, and what that of a node's value does (empty if nothing); `step` is the
+    /// length of the edges along each axis.
+    pub fn new(shape: [usize; 3], step: [f64; 3], edges: [Vec<f64>; 3], mass: Vec<f64>) -> Multigrid {
+        let (mut levels, mut step) = (vec![Level::new(shape, edges, mass)], step);
         while let Some(coarser) = levels.last_mut().and_then(|l| l.coarsened(&mut step)) {
             levels.push(coarser);
         }
@@ -85,14 +88,16 @@ fn descend(levels: &[Level], work: &mut [Work]) {
 }
 
 impl Level {
-    fn new(shape: [usize; 3], edges: [Vec<f64>; 3]) -> Level {
+    fn new(shape: [usize; 3], edges: [Vec<f64>; 3], mass: Vec<f64>) -> Level {
         let strides = [1, shape[0], shape[0] * shape[1]];
         let sum = |n: usize| -> f64 {
-            (0..3).map(|a| edges[a][n] + n.checked_sub(strides[a]).map_or(0.0, |m| edges[a][m])).sum()
+            let around =
+                (0..3).map(|a| edges[a][n] + n.checked_sub(strides[a]).map_or(0.0, |m| edges[a][m])).sum::<f64>();
+            around + mass.get(n).copied().unwrap_or(0.0)
         };
         let all = shape.iter().product();
         let inverse = (0..all).into_par_iter().map(sum).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
-        Level { shape, edges, inverse, halved: [false; 3] }
+        Level { shape, edges, mass, inverse, halved: [false; 3] }
     }
 
     /// The next level; `None` where no axis can be halved.
@@ -127,7 +132,13 @@ impl Level {
         };
         let all: usize = shape.iter().product();
         let edges = core::array::from_fn(|a| (0..all).into_par_iter().map(|n| edge(a, n)).collect());
-        Some(Level::new(shape, edges))
+        let mut next = Level::new(shape, edges, Vec::new());
+        if !self.mass.is_empty() {
+            let mut mass = vec![0.0; all];
+            self.restrict(&next, &self.mass, &mut mass);
+            next = Level::new(shape, next.edges, mass);
+        }
+        Some(next)
     }
 
     /// The nodes along an axis in which node `i` of the next level has a share, with the shares.
@@ -168,6 +179,9 @@ impl Level {
         let from = row * nx;
         let own = &x[from..][..nx];
         along(own, &self.edges[0][from..][..nx], out);
+        if let Some(mass) = self.mass.get(from..from + nx) {
+            out.iter_mut().zip(mass).zip(own).for_each(|((o, m), x)| *o += m * x);
+        }
         for (a, stride, at) in [(1, nx, row % ny), (2, nx * ny, row / ny)] {
             if at + 1 < self.shape[a] {
                 across(own, &x[from + stride..][..nx], &self.edges[a][from..][..nx], out);

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
+use super::fixed_faces::fixed;
 use super::frame::{self, Orientation, cube, in_mm};
 use super::integral::{Integral, Problem, Weights};
 use super::pace;
@@ -25,6 +26,7 @@ use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
+use crate::region::Region;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
 use geometry::progress::checkpoint;
@@ -63,6 +65,8 @@ pub struct Wanted {
     pub align: Option<Aligned>,
     /// The range in which cells may be stretched; any if none.
     pub stretch: Option<Stretch>,
+    /// Regions on whose parts of the surface the phase along the normal is a whole number.
+    pub fix: Vec<Region>,
     /// Moves the lattice (mm).
     pub offset: Vec3,
 }
@@ -71,6 +75,11 @@ impl Wanted {
     /// The length over which frames are averaged, mm, if they are.
     pub(super) fn averaged(&self) -> Option<f64> {
         self.align.map(|a| a.length(self.smooth)).or(self.smooth)
+    }
+
+    /// What moves phases whose target has a mean.
+    fn shift(&self, mean: &Mat3) -> Vec3 {
+        mean.map(|m| -dot(m, self.offset))
     }
 
     /// What counts as the same axes.
@@ -161,6 +170,9 @@ impl Phase {
         if let Some(range) = wanted.stretch {
             found = found.bounded(&laid, wanted, settings.region, range)?;
         }
+        if let (false, Some(region)) = (wanted.fix.is_empty(), settings.region) {
+            found = found.fixed(&laid, wanted, region)?;
+        }
         let wavelength = found.target.wavelength(&laid);
         let mean_length = mean_within(&laid.inside, wavelength);
         let lengths_range =
@@ -174,7 +186,7 @@ impl Phase {
         }
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
         let stress_range = target.range;
-        let shift = mean.map(|m| -dot(m, wanted.offset));
+        let shift = wanted.shift(&mean);
         let corner = norm(laid.grid.step);
         let max_lipschitz = solution.max_lipschitz(bounds, |n| laid.depth[n] <= corner);
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
@@ -410,6 +422,16 @@ impl Found {
     fn is_better_than(&self, single: &Found) -> bool {
         let (own, other) = (&self.judged, &single.judged);
         (own.fold.is_none() || other.fold.is_some()) && own.missed <= MISSED[1] * other.missed
+    }
+
+    /// The solution with whole phases on faces.
+    fn fixed(self, laid: &Laid, wanted: &Wanted, region: &dyn Field) -> Result<Found, Fault> {
+        let Found { target, weights, solution, periods, mean, steps, .. } = self;
+        let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
+        let solution = fixed(&problem, laid, region, &wanted.fix, wanted.shift(&mean), solution)?;
+        let weights = problem.weights;
+        let judged = Judged::of(laid, wanted, Some(region), &target, &solution)?;
+        Ok(Found { target, weights, solution, periods, mean, steps, judged })
     }
 
     /// The solution whose cells are stretched within a range.

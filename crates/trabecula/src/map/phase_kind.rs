@@ -3,10 +3,11 @@
 use super::{
     Aligned, Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared,
 };
-use crate::environment::Environment;
+use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, several};
 use crate::kind::{DesignError, Fault, Key, Kind};
+use crate::region::{Notes, Region, RegionKind};
 use geometry::fault::number;
 use geometry::math::{IDENTITY, Mat3};
 
@@ -44,6 +45,10 @@ pub struct PhaseKind {
     /// The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say. The map is the
     /// one nearest to the target that keeps to it; an error where none is found. Any unless given.
     stretch: Option<[f64; 2]>,
+    /// Regions: on the parts of the surface in each of them the phase along the normal is a whole number, so that the lattice ends there
+    /// with whole cells, as many as fit best, and parts that meet there fit.
+    #[kind(default)]
+    fix: Vec<RegionKind>,
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
@@ -314,6 +319,19 @@ impl PhaseKind {
         }
     }
 
+    /// The regions of the faces that are fixed.
+    fn fixed(&self, path: &str, environment: &Environment) -> Result<Vec<Region>, DesignError> {
+        if !self.fix.is_empty() && self.domain == Domain::Box {
+            let message =
+                "faces are those of the region, and domain = \"box\" leaves it out of account; leave domain out";
+            return Err(DesignError::new(format!("{path}.fix"), message));
+        }
+        let built = |(i, of): (usize, &RegionKind)| {
+            environment::region(of, &format!("{path}.fix[{i}]"), environment.loader, &mut Notes::default())
+        };
+        self.fix.iter().enumerate().map(built).collect()
+    }
+
     /// The map of these wavelengths (mm).
     fn with(&self, wavelength: [Grade; 3], path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
@@ -336,6 +354,7 @@ impl PhaseKind {
             smooth: self.smooth,
             align,
             stretch: self.stretch.map(Stretch::new).transpose().map_err(|f| DesignError::fault(path, f))?,
+            fix: self.fixed(path, environment)?,
             offset: self.offset,
         };
         let region: &dyn Field = &**environment.region;

@@ -56,6 +56,14 @@ impl Spline {
         spline
     }
 
+    /// The values at the nodes.
+    pub fn at_nodes(&self) -> [Vec<f64>; 3] {
+        let nodes: Vec<Vec3> = (0..self.grid.len()).map(|n| self.grid.node(n)).collect();
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        self.values(&nodes, &mut u);
+        core::array::from_fn(|i| u.iter().map(|u| u[i]).collect())
+    }
+
     pub fn grid(&self) -> &Grid {
         &self.grid
     }

@@ -136,12 +136,7 @@ fn any_normal(v: Vec3) -> Vec3 {
 /// The map near to `solution` whose stretches are in a range in the cells of the grid of which a node `counts`.
 pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: Solution) -> Solution {
     let grid = *solution.grid();
-    let mut values: [Vec<f64>; 3] = {
-        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let mut u = vec![[0.0; 3]; nodes.len()];
-        solution.spline.values(&nodes, &mut u);
-        core::array::from_fn(|i| u.iter().map(|u| u[i]).collect())
-    };
+    let mut values = solution.spline.at_nodes();
     let cells = Cells::new(&grid);
     let middles: Vec<Vec3> = (0..cells.len()).map(|c| cells.middle(c)).collect();
     let mut wound = vec![[[0.0; 3]; 3]; middles.len()];

@@ -8,6 +8,7 @@ mod crease;
 mod damage;
 mod disclinations;
 mod fields;
+mod fixed_faces;
 mod flush;
 mod islands;
 mod local_thickness;

@@ -32,6 +32,7 @@ fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Pha
         by_principal: false,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset: [0.0; 3],
     };
     Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)

@@ -30,6 +30,7 @@ fn wanted(wavelength: f64, orientation: Orientation) -> Wanted {
         by_principal: false,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset: [0.0; 3],
     }
 }

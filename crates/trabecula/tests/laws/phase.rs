@@ -33,6 +33,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         by_principal: false,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset: [0.1, 0.2, 0.3],
     };
     Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))

@@ -18,6 +18,7 @@ fn solved(stress: [Grade; 6], smooth: Option<f64>) -> Phase {
         smooth,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset: [0.0; 3],
     };
     Phase::solve(&BOX, &wanted, &Settings::default()).unwrap_or_else(|f| panic!("{f}"))

@@ -16,6 +16,7 @@ fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> Wanted {
         by_principal: false,
         align: None,
         stretch: range.map(|r| Stretch::new(r).expect("range")),
+        fix: Vec::new(),
         offset: [0.0; 3],
     }
 }

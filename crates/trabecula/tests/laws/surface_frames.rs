@@ -18,6 +18,7 @@ fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> Want
         smooth: None,
         align: depth.map(|d| Aligned::new(d).expect("depth")),
         stretch: None,
+        fix: Vec::new(),
         offset: [0.0; 3],
     }
 }

@@ -25,6 +25,7 @@ fn about_z(angle: &str, wavelength: Grade) -> Wanted {
         by_principal: false,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset: [0.0; 3],
     }
 }
@@ -51,6 +52,7 @@ fn what_does_not_vary_is_the_affine_map() {
         by_principal: false,
         align: None,
         stretch: None,
+        fix: Vec::new(),
         offset,
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");

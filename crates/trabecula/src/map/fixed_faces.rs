@@ -1,0 +1,179 @@
+//! Faces of the region on which a phase is a whole number, so that the lattice ends there with whole cells.
+//!
+//! Of the nodes next to such a face each knows the phase on the face: its own, less what lies between along the normal. That is pulled to
+//! a whole number by a heavy weight in the same least squares: on the largest face to the one nearest to its mean, on others so that as
+//! many cells lie between as is nearest to what there were.
+
+use super::frame::in_mm;
+use super::integral::Problem;
+use super::phase_target::Laid;
+use super::solution::Solution;
+use super::spline::Spline;
+use crate::field::Field;
+use crate::region::Region;
+use geometry::fault::{Fault, number};
+use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
+use geometry::progress::checkpoint;
+use geometry::union_find::{labels, singles, unite};
+
+/// Nodes count that are at most this many steps from a face.
+const NEAR: f64 = 1.0;
+/// What the phase on a face counts, relative to all differences at the node.
+const PULL: f64 = 1e3;
+/// The cosine of the greatest angle between the normals of adjacent nodes of one face, and of that between a face's normal and the
+/// gradient of the phase that is fixed on it.
+const SMOOTH: f64 = 0.8;
+const ALONG: f64 = 0.866;
+/// Solutions: what lies between a node and the face follows from the Jacobian of the last.
+const PASSES: usize = 3;
+
+/// A node next to a face.
+struct Near {
+    node: usize,
+    /// Its signed distance from the surface, mm, and the outward normal.
+    distance: f64,
+    normal: Vec3,
+}
+
+/// A face, and the axis of the cell along its normal.
+struct Face {
+    nodes: Vec<Near>,
+    axis: usize,
+    whole: f64,
+}
+
+/// The solution whose phases, `shift` added, are whole on the parts of the surface of `region` that lie in the regions of `fix`.
+///
+/// # Errors
+/// A region that holds no part of the surface; cells that do not lie along a normal.
+pub(super) fn fixed(
+    problem: &Problem,
+    laid: &Laid,
+    region: &dyn Field,
+    fix: &[Region],
+    shift: Vec3,
+    solution: Solution,
+) -> Result<Solution, Fault> {
+    let mut faces = Vec::new();
+    for (i, of) in fix.iter().enumerate() {
+        faces.extend(faces_in(laid, region, &**of, i)?.into_iter().map(|nodes| face(nodes, laid, &solution, i)));
+    }
+    let mut faces = faces.into_iter().collect::<Result<Vec<Face>, Fault>>()?;
+    let mut solution = solution;
+    for pass in 0..PASSES {
+        checkpoint();
+        let mut values = solution.spline.at_nodes();
+        for (axis, values) in values.iter_mut().enumerate() {
+            let (mut mass, mut off) = (vec![0.0; values.len()], vec![0.0; values.len()]);
+            let own: Vec<(&mut Face, Vec<f64>)> = faces
+                .iter_mut()
+                .filter(|f| f.axis == axis)
+                .map(|f| {
+                    let on_face = f.nodes.iter().map(|n| on_face(n, axis, laid, &solution, shift)).collect();
+                    (f, on_face)
+                })
+                .collect();
+            let mean = |on_face: &[f64]| on_face.iter().sum::<f64>() / on_face.len() as f64;
+            // A phase may be moved by any constant: what counts is how many cells there are between faces, from the largest one on.
+            let first = own.iter().max_by_key(|(f, _)| f.nodes.len()).map_or(0.0, |(_, on_face)| mean(on_face));
+            for (face, on_face) in own {
+                if pass == 0 {
+                    face.whole = first.round() + (mean(&on_face) - first).round();
+                }
+                for (n, phase) in face.nodes.iter().zip(on_face) {
+                    (mass[n.node], off[n.node]) = (PULL, face.whole - phase);
+                }
+            }
+            if mass.iter().any(|m| *m > 0.0) {
+                let change = problem.pulled(axis, mass, &off);
+                values.iter_mut().zip(change).for_each(|(v, d)| *v += d);
+            }
+        }
+        solution = Solution { spline: Spline::through(laid.grid, values), winding: solution.winding };
+    }
+    Ok(solution)
+}
+
+/// The phase on the face at the foot of a node.
+fn on_face(near: &Near, axis: usize, laid: &Laid, solution: &Solution, shift: Vec3) -> f64 {
+    let p = laid.nodes[near.node];
+    let mut u = [[0.0; 3]];
+    solution.phases(&[p], &mut u);
+    u[0][axis] + shift[axis] - near.distance * dot(solution.jacobian(p)[axis], near.normal)
+}
+
+/// A face, with the axis whose phase changes most along its normal.
+fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Result<Face, Fault> {
+    let mut along = [0.0; 3];
+    for n in &nodes {
+        let j = solution.jacobian(laid.nodes[n.node]);
+        (0..3).for_each(|i| along[i] += dot(j[i], n.normal).abs() / norm(j[i]) / nodes.len() as f64);
+    }
+    let axis = (0..3).fold(0, |m, i| if along[i] > along[m] { i } else { m });
+    if along[axis] < ALONG {
+        let degrees = along[axis].min(1.0).acos().to_degrees();
+        let message = format!(
+            "no axis of the cells is along the normal of the surface at {}: the nearest is {degrees:.0} degrees off, and at most {:.0} can be \
+             taken. Turn the cells along it (align = \"surface\", direction), or leave it out",
+            in_mm(laid.nodes[nodes[0].node]),
+            ALONG.acos().to_degrees()
+        );
+        return Err(Fault::new(format!("fix[{index}]"), message));
+    }
+    Ok(Face { nodes, axis, whole: 0.0 })
+}
+
+/// The faces of the surface that lie in a region, by the nodes next to each.
+fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Result<Vec<Vec<Near>>, Fault> {
+    let (grid, reach) = (&laid.grid, NEAR * laid.longest());
+    let close: Vec<usize> = (0..grid.len()).filter(|n| laid.depth[*n].abs() <= reach).collect();
+    let points: Vec<Vec3> = close.iter().map(|n| laid.nodes[*n]).collect();
+    let (mut distance, mut gradient) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    region.gradients(&points, &mut distance, &mut gradient);
+    let feet: Vec<Vec3> = points.iter().zip(&distance).zip(&gradient).map(|((p, d), g)| foot(*p, *d, *g)).collect();
+    let mut inside = vec![0.0; points.len()];
+    of.values(&feet, &mut inside);
+    let mut at = vec![usize::MAX; grid.len()];
+    let mut found: Vec<Near> = Vec::new();
+    for (i, node) in close.into_iter().enumerate() {
+        if inside[i] <= 0.0 && norm(gradient[i]) > 0.5 {
+            at[node] = found.len();
+            found.push(Near { node, distance: distance[i], normal: unit(gradient[i]) });
+        }
+    }
+    if found.is_empty() {
+        let message = format!(
+            "the region holds no part of the surface that the phase grid sees (steps of {} mm); give one that the face lies in",
+            number(laid.longest())
+        );
+        return Err(Fault::new(format!("fix[{index}]"), message));
+    }
+    Ok(parts(laid, found, &at))
+}
+
+/// The point of the surface nearest to one.
+fn foot(p: Vec3, distance: f64, gradient: Vec3) -> Vec3 {
+    let size = norm(gradient);
+    if size > 0.5 { sub(p, scale(gradient, distance / (size * size))) } else { add(p, gradient) }
+}
+
+/// Nodes by the face that they are next to: adjacent ones with nearly the same normal.
+fn parts(laid: &Laid, found: Vec<Near>, at: &[usize]) -> Vec<Vec<Near>> {
+    let mut root = singles(found.len());
+    for (i, near) in found.iter().enumerate() {
+        let index = laid.grid.index(near.node);
+        for (a, stride) in laid.grid.strides().into_iter().enumerate() {
+            if index[a] + 1 == laid.grid.shape[a] {
+                continue;
+            }
+            let j = at[near.node + stride];
+            if j != usize::MAX && dot(near.normal, found[j].normal) > SMOOTH {
+                unite(&mut root, i as u32, j as u32);
+            }
+        }
+    }
+    let (label, count) = labels(&mut root);
+    let mut faces: Vec<Vec<Near>> = (0..count).map(|_| Vec::new()).collect();
+    found.into_iter().zip(label).for_each(|(near, face)| faces[face as usize].push(near));
+    faces
+}
