@@ -158,6 +158,8 @@ def main():
     nodes, tets = blocks((1, 1, 1), 8.0)
     same = {name: np.tile(v, (len(nodes), 1)) for name, v in TURN.items()}
     (FILES / "turn.vtu").write_text(vtu(nodes - 4.0, tets, **same), encoding="utf-8")
+    rows = [",".join(f"{v:g}" for v in (*point, *TURN["stress_voigt"])) for point in nodes - 4.0]
+    (FILES / "turn.csv").write_text("\n".join(["x,y,z,s11,s22,s33,s23,s13,s12", *rows]) + "\n", encoding="utf-8")
     (FILES / "block.vtu").write_text(vtu(*blocks((2, 1, 1), 4.0)), encoding="utf-8")
     (FILES / "line.csv").write_text("x,y,z\n-1,0,0\n9,0,0\n", encoding="utf-8")
     (FILES / "control.csv").write_text("x,y,z,value\n0,1,1,0.6\n0,5,1,0.3\n0,3,3,0.5\n", encoding="utf-8")

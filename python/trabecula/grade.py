@@ -99,20 +99,35 @@ def field(
     array: str,
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     component: int | None = None,
-    invariant: Literal["magnitude", "von_mises", "mean"] | None = None,
+    invariant: Literal["magnitude", "von_mises", "mean", "max_principal", "min_principal", "strain_energy"] | None = None,
+    order: Literal["vtk", "voigt", "abaqus"] | None = None,
+    nu: float | None = None,
     remap: Stops | None = None,
 ) -> dict:
     """An array of a result on a mesh of volume elements, from a file.
 
-    path: Path of the file (vtu, vtk, vti; frd of CalculiX), relative to the design file.
-    array: Name of the array, of points or cells. In an FRD "STRESS" is that of the last step, "STRESS@2" that of the
-        second.
+    path: Path of the file (vtu, vtk, vti; frd of CalculiX; in Python also med, e, exo, msh, xdmf, avs), relative to the
+        design file.
+    array: Name of the array, of points or cells. Where a file has several steps, "STRESS" is that of the last,
+        "STRESS@2" that of the second.
     unit: Unit of the file's coordinates (mm unless given). [optional]
     component: Which of its components, from 0, where it has several. [from 0, optional]
     invariant: A number made of all its components. [optional]
+    order: The order of the six components of a tensor, on which its principal values depend; `"vtk"` unless given.
+        [optional]
+    nu: Poisson's ratio, for the strain energy; 0.3 unless given. [above -1 to 0.5, optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    given = settings(path=os.fspath(path), array=array, unit=unit, component=component, invariant=invariant, remap=pairs(remap))
+    given = settings(
+        path=os.fspath(path),
+        array=array,
+        unit=unit,
+        component=component,
+        invariant=invariant,
+        order=order,
+        nu=nu,
+        remap=pairs(remap),
+    )
     return {"field": given}
 
 

@@ -48,12 +48,15 @@ def spartan(
 
 @named
 def phase(
-    wavelength: float | dict | Sequence[float | dict] | None = None,
+    wavelength: float | dict | Sequence[float | dict] | dict | None = None,
     rotate: Sequence[float | dict] | None = None,
     *,
     weight: float | dict | None = None,
     angle_weight: float | None = None,
     smooth: float | None = None,
+    align: Literal["surface"] | None = None,
+    align_depth: float | None = None,
+    stretch: Sequence[float] | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: Literal["region", "box"] | None = None,
@@ -68,8 +71,9 @@ def phase(
     """Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At
     most one of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 
-    wavelength: Cell edge, one number or three; each may vary. Left out where the level has a fraction and a thickness
-        or a pore, from which it follows wherever they vary; three numbers are ratios then. [mm, above 0, optional]
+    wavelength: Cell edge, one number or three, along the cell's axes or, { principal = [a, b, c] }, the principal
+        directions of the stress; each may vary. Left out where the level has a fraction and a thickness or a pore, from
+        which it follows wherever they vary; three numbers are ratios then. [mm, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. Each may vary. [degrees, optional]
     weight: Weight of the cell's shape here, compared with other positions (0 or more): where no map can follow
         everything, the error goes where this is small. [optional]
@@ -78,6 +82,12 @@ def phase(
     smooth: Length over which a direction, a frame or a stress is smoothed, without regard to signs and order, before
         cells follow it; parts of a stress count by how much they differ between directions. None unless given. [mm,
         above 0, optional]
+    align: "surface": an axis of the cell, whichever is nearest, along the normal of the region's surface, and farther
+        in what is asked for there; without an orientation, what continues the surface's. [optional]
+    align_depth: How deep that reaches below the surface; two wavelengths unless given. [mm, above 0, optional]
+    stretch: The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say.
+        The map is the one nearest to the target that keeps to it; an error where none is found. Any unless given.
+        [optional]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     step: Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given. [mm, above
         0, optional]
@@ -88,8 +98,8 @@ def phase(
     rotate_z: The angle about z alone. [degrees, optional]
     direction: Direction of the cell's z axis; its sign and length do not matter. [optional]
     frame: The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }. [optional]
-    stress: A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, or
-        the field of a result. [optional]
+    stress: A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, the
+        field of a result, a table, or several load cases, { cases = [...] }. [optional]
     """
     given = settings(
         wavelength=wavelength,
@@ -97,6 +107,9 @@ def phase(
         weight=weight,
         angle_weight=angle_weight,
         smooth=smooth,
+        align=align,
+        align_depth=align_depth,
+        stretch=stretch,
         offset=offset,
         step=step,
         domain=domain,

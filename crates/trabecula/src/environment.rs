@@ -8,7 +8,7 @@ pub(crate) use picture_stack::{names_pictures, picture_stack};
 use crate::csg_tree::CsgSolid;
 use crate::kind::DesignError;
 use crate::region::{Context, HalfSpace, HalfSpaceKind, Notes, Region, RegionKind};
-use geometry::formats::Elements;
+use geometry::formats::{Data, Elements, RESULTS};
 use geometry::math::Vec3;
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
@@ -33,6 +33,13 @@ pub trait Loader {
     /// The finite elements of the file at `path`, which is of none of the formats read here; or one sentence why not.
     fn elements(&self, path: &str) -> Result<ZonedElements, String> {
         Err(format!("{path}: only vtu and vtk files are read here"))
+    }
+
+    /// The finite elements and the array `array` of the result at `path`, which is of none of the formats read here; of the other arrays
+    /// the names alone. Or one sentence why not.
+    fn result(&self, path: &str, array: &str) -> Result<Data, String> {
+        let _ = array;
+        Err(format!("{path}: the name must end in {}", RESULTS.join(", ")))
     }
 
     /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this

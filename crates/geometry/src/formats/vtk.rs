@@ -54,6 +54,27 @@ pub struct Data {
     pub arrays: Vec<Array>,
 }
 
+impl Data {
+    /// Refuses cells of points that are not there and arrays that do not have a tuple for each point or cell; arrays without numbers
+    /// pass.
+    pub fn check(&self) -> Result<(), Fault> {
+        let (points, cells) = match &self.shape {
+            Shape::Mesh(elements) => {
+                elements.check()?;
+                (elements.points.len(), elements.kinds.len())
+            }
+            Shape::Image { nodes, .. } => {
+                let product = |n: [usize; 3]| n.into_iter().fold(1, usize::saturating_mul);
+                (product(*nodes), product(nodes.map(|n| n.saturating_sub(1).max(1))))
+            }
+        };
+        self.arrays
+            .iter()
+            .filter(|a| !a.values.is_empty())
+            .try_for_each(|a| check(core::slice::from_ref(a), points, cells))
+    }
+}
+
 pub(super) fn fault(message: impl Into<String>) -> Fault {
     Fault::new("", message)
 }

@@ -8,6 +8,7 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let what = match widths {
         [4] => "four numbers x, y, z, value",
+        [9] => "nine numbers x, y, z, 11, 22, 33, 23, 13, 12 (or columns that name them)",
         _ => "x, y, z, or x, y, z, value in all rows",
     };
     let fault = |n: usize, message: String| Fault::new("", format!("line {}: {message}", n + 1));
@@ -35,4 +36,37 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         return Err(Fault::new("", format!("the file has no rows of {what}")));
     }
     Ok(rows)
+}
+
+/// The columns that the first line names so, in this order. Other columns may hold anything.
+pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault> {
+    let fault = |n: usize, message: String| Fault::new("", format!("line {}: {message}", n + 1));
+    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    let mut lines = lines.map(|(n, l)| (n, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
+    let Some((_, first)) = lines.next() else { return Err(Fault::new("", "the file is empty")) };
+    // Names may have spaces, unless these are what separates them.
+    let separator = [',', ';', '\t'].into_iter().find(|s| first.contains(*s)).unwrap_or(' ');
+    let words = |line: &str| -> Vec<String> {
+        let all = line.split(separator).map(|w| w.trim().trim_matches('"').trim().to_string());
+        all.filter(|w| separator != ' ' || !w.is_empty()).collect()
+    };
+    let all = words(first);
+    let place = |name: &String| {
+        all.iter().position(|w| w == name).ok_or_else(|| {
+            let there = all.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(", ");
+            Fault::new("", format!("no column is named \"{name}\"; there are {there}"))
+        })
+    };
+    let places = names.iter().map(place).collect::<Result<Vec<usize>, Fault>>()?;
+    let rows = lines.map(|(n, line)| {
+        let row = words(line);
+        let read = |(place, name): (&usize, &String)| {
+            let found = row.get(*place).map_or("", String::as_str);
+            let value = found.parse().ok().filter(|v: &f64| v.is_finite());
+            value.ok_or_else(|| fault(n, format!("expected a finite number as {name}, found \"{found}\"")))
+        };
+        places.iter().zip(names).map(read).collect::<Result<Vec<f64>, Fault>>()
+    });
+    let rows = rows.collect::<Result<Vec<_>, Fault>>()?;
+    if rows.is_empty() { Err(Fault::new("", "the file has names of columns, but no rows")) } else { Ok(rows) }
 }

@@ -1,9 +1,10 @@
 //! Results on meshes from a file: an array of points or cells.
 
+use super::invariant::{Invariant, TensorOrder};
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
-use crate::kind::{DesignError, Kind, Unit};
+use crate::kind::{DesignError, Key, Kind, Unit};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{self, Shape};
 use geometry::math::{Aabb, Vec3, scale};
@@ -13,11 +14,12 @@ const UNCOVERED: f64 = 0.01;
 
 /// An array of a result on a mesh of volume elements, from a file.
 #[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(name = "Field", noun = "a field of a result")]
+#[kind(name = "Field", noun = "a field of a result", check = FieldKind::complete)]
 pub struct FieldKind {
-    /// Path of the file (vtu, vtk, vti; frd of CalculiX), relative to the design file.
+    /// Path of the file (vtu, vtk, vti; frd of CalculiX; in Python also med, e, exo, msh, xdmf, avs), relative to the design file.
     path: String,
-    /// Name of the array, of points or cells. In an FRD "STRESS" is that of the last step, "STRESS@2" that of the second.
+    /// Name of the array, of points or cells. Where a file has several steps, "STRESS" is that of the last, "STRESS@2" that of the
+    /// second.
     array: String,
     /// Unit of the file's coordinates (mm unless given).
     unit: Option<Unit>,
@@ -25,47 +27,39 @@ pub struct FieldKind {
     component: Option<u32>,
     /// A number made of all its components.
     invariant: Option<Invariant>,
+    /// The order of the six components of a tensor, on which its principal values depend; `"vtk"` unless given.
+    order: Option<TensorOrder>,
+    /// Poisson's ratio, for the strain energy; 0.3 unless given.
+    #[kind(above = -1.0, max = 0.5, hints("poisson", "poissons_ratio", "poisson_ratio"))]
+    nu: Option<f64>,
     /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
 }
 
-/// A number that does not depend on the axes in which a vector or a tensor is given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
-#[kind(noun = "invariant")]
-pub enum Invariant {
-    /// The length of a vector; of a tensor the root of the sum of the squares of its nine components.
-    Magnitude,
-    /// The equivalent stress of von Mises, never negative.
-    #[kind(rename = "von_mises")]
-    VonMises,
-    /// The mean of the three normal components: positive in tension, negative in compression.
-    Mean,
-}
+/// Poisson's ratio, where none is given.
+const NU: f64 = 0.3;
 
-impl Invariant {
-    /// Of the components of a vector (three) or a tensor (six, normal ones first, or nine, row by row).
-    fn of(self, t: &[f64]) -> f64 {
-        let (normal, shear) = match t {
-            [xx, xy, xz, yx, yy, yz, zx, zy, zz] => {
-                ([*xx, *yy, *zz], [xy, xz, yx, yz, zx, zy].map(|s| s * s).iter().sum::<f64>())
-            }
-            [xx, yy, zz, rest @ ..] => ([*xx, *yy, *zz], 2.0 * rest.iter().map(|s| s * s).sum::<f64>()),
-            _ => return f64::NAN,
-        };
-        let [x, y, z] = normal;
-        match self {
-            Invariant::Magnitude => (x * x + y * y + z * z + shear).sqrt(),
-            Invariant::VonMises => {
-                let differences = (x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2);
-                (0.5 * differences + 1.5 * shear).sqrt()
-            }
-            Invariant::Mean => (x + y + z) / 3.0,
+impl FieldKind {
+    fn complete(&self, _: &Key) -> Result<(), Fault> {
+        match self.nu.is_some() && self.invariant != Some(Invariant::StrainEnergy) {
+            true => Err(Fault::new("nu", "Poisson's ratio is for invariant = \"strain_energy\" alone; leave it out")),
+            false => Ok(()),
         }
     }
 
-    /// Whether it is defined for this number of components.
-    fn takes(self, components: usize) -> bool {
-        matches!(components, 6 | 9) || components == 3 && self == Invariant::Magnitude
+    /// Refuses what makes one number of an array of which all components are taken.
+    fn whole(&self, path: &str) -> Result<(), DesignError> {
+        let wrong = |key: &str, message: &str| Err(DesignError::new(format!("{path}.{key}"), message));
+        let taken = "all components of the array are taken here; leave it out";
+        match self {
+            FieldKind { component: Some(_), .. } => wrong("component", taken),
+            FieldKind { invariant: Some(_), .. } => wrong("invariant", taken),
+            FieldKind { remap: Some(_), .. } => wrong("remap", taken),
+            FieldKind { order: Some(_), .. } => {
+                wrong("order", "give the order of a tensor next to its field, not in it")
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -111,7 +105,8 @@ fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Sampl
     let made = columns(spec, path, environment, |array| {
         let invariant = invariant(spec, path, array)?;
         let chosen = if invariant.is_none() { component(spec, path, array)? } else { 0 };
-        Ok((1, move |t: &[f64], _| invariant.map_or_else(|| t[chosen], |i| i.of(t))))
+        let (order, nu) = (spec.order.unwrap_or_default(), spec.nu.unwrap_or(NU));
+        Ok((1, move |t: &[f64], _| invariant.map_or_else(|| t[chosen], |i| i.of(t, order, nu))))
     })?;
     let one = made.into_iter().next();
     one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
@@ -161,6 +156,7 @@ pub(crate) fn several<const N: usize>(
     environment: &Environment,
     order: impl Fn(usize) -> Option<[usize; N]>,
 ) -> Result<[Grade; N], DesignError> {
+    spec.whole(path)?;
     let made = columns(spec, path, environment, |array| {
         let order = order(array.components).ok_or_else(|| wrong_components(path, array, "a tensor has six or nine"))?;
         Ok((N, move |t: &[f64], c: usize| t[order[c]]))
@@ -172,6 +168,7 @@ pub(crate) fn several<const N: usize>(
 /// not count between them.
 pub(crate) fn lines(spec: &FieldKind, path: &str, environment: &Environment) -> Result<[Grade; 6], DesignError> {
     const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]];
+    spec.whole(path)?;
     let made = columns(spec, path, environment, |array| {
         if array.components != 3 {
             return Err(wrong_components(path, array, "a vector has three"));
@@ -206,14 +203,14 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     choose: impl Fn(&formats::Array) -> Result<(usize, F), DesignError>,
 ) -> Result<Vec<Samples>, DesignError> {
     let at = format!("{path}.path");
-    let file = environment.load(&spec.path, &at)?;
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let kind = extension(&spec.path);
-    if !formats::RESULTS.contains(&kind.as_str()) {
-        let message = format!("the name must end in {}; found \"{}\"", formats::RESULTS.join(", "), spec.path);
-        return Err(DesignError::new(at, message).found(&spec.path));
-    }
-    let data = formats::read_result(&file, &kind, &spec.array).map_err(wrong)?;
+    let data = if formats::RESULTS.contains(&kind.as_str()) {
+        formats::read_result(&environment.load(&spec.path, &at)?, &kind, &spec.array).map_err(wrong)?
+    } else {
+        let read = environment.loader.result(&spec.path, &spec.array);
+        read.map_err(|m| DesignError::new(&at, m).found(&spec.path))?
+    };
     let array = pick(&data.arrays, Some(&spec.array))
         .map_err(|m| DesignError::new(format!("{path}.array"), m).found(&spec.array))?;
     if let Some(n) = array.values.iter().position(|v| !v.is_finite()) {

@@ -136,12 +136,17 @@ impl Samples {
         (mix(front, back, z), slope)
     }
 
-    /// Numbers given at points, put on a grid over `bounds`: the mean of the nearest `neighbours`, weighted by one over
-    /// the square of the distance (Shepard).
+    /// Numbers given at points, put on grids over `bounds`, one for each of `N`: the mean of the nearest `neighbours`, weighted by one
+    /// over the square of the distance (Shepard).
     ///
     /// # Errors
     /// No points; numbers or positions that are not finite.
-    pub fn scattered(points: &[Vec3], values: &[f64], neighbours: usize, bounds: &Aabb) -> Result<Samples, Fault> {
+    pub fn scattered<const N: usize>(
+        points: &[Vec3],
+        values: &[[f64; N]],
+        neighbours: usize,
+        bounds: &Aabb,
+    ) -> Result<[Samples; N], Fault> {
         if points.is_empty() {
             return Err(Fault::new("path", "there are no points"));
         }
@@ -191,16 +196,19 @@ impl Samples {
                 }
             }
             let least = 1e-24 * dot(spread, spread);
-            let (mut sum, mut weights) = (0.0, 0.0);
+            let (mut sum, mut weights) = ([0.0; N], 0.0);
             for (d, n) in near {
                 let w = 1.0 / d.max(least);
-                (sum, weights) = (sum + w * values[n], weights + w);
+                sum.iter_mut().zip(&values[n]).for_each(|(s, v)| *s += w * v);
+                weights += w;
             }
-            sum / weights
+            sum.map(|s| s / weights)
         };
         use rayon::prelude::*;
-        let values = (0..shape.iter().product()).into_par_iter().map(at).collect();
-        Samples::new(bounds.min, step, shape, values)
+        let all: Vec<[f64; N]> = (0..shape.iter().product()).into_par_iter().map(at).collect();
+        let one = |c: usize| Samples::new(bounds.min, step, shape, all.iter().map(|v| v[c]).collect());
+        let made = (0..N).map(one).collect::<Result<Vec<Samples>, Fault>>()?;
+        made.try_into().map_err(|_| Fault::new("path", "there are no numbers"))
     }
 
     /// Numbers given at the points of a mesh of tetrahedra, put on a grid over `bounds`, linear in each tetrahedron: one
@@ -423,17 +431,18 @@ mod tests {
     #[test]
     fn scattered_points_are_met_and_nothing_overshoots() {
         let points: Vec<Vec3> = positions(300).collect();
-        let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
-        let s = Samples::scattered(&points, &values, 8, &UNIT).unwrap();
+        let values: Vec<[f64; 2]> = points.iter().map(|p| [linear(*p), -2.0 * linear(*p)]).collect();
+        let [s, other] = Samples::scattered(&points, &values, 8, &UNIT).unwrap();
         let worst = positions(900).skip(300).fold(0.0f64, |m, p| m.max((s.at(p).0 - linear(p)).abs()));
         // A field of slope 2.3 over points 0.15 apart; corners have theirs on one side.
         assert!(worst < 0.45, "{worst}");
         let mean = positions(900).skip(300).map(|p| s.at(p).0 - linear(p)).sum::<f64>() / 600.0;
         assert!(mean.abs() < 0.02, "{mean}");
         let all = s.bound(&Aabb::ALL);
-        let given = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let given = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), [v, _]| (a.min(*v), b.max(*v)));
+        assert!(positions(99).all(|p| other.at(p).0 == -2.0 * s.at(p).0));
         assert!(all.lo >= given.0 - 1e-12 && all.hi <= given.1 + 1e-12);
-        let one = Samples::scattered(&[[3.0, 0.0, 0.0]], &[7.0], 8, &UNIT).unwrap();
+        let [one] = Samples::scattered(&[[3.0, 0.0, 0.0]], &[[7.0]], 8, &UNIT).unwrap();
         assert_eq!(one.at([0.3; 3]).0, 7.0);
     }
 }

@@ -1,11 +1,15 @@
 //! Numbers at scattered points, from a table.
 
-use super::csv::table;
+use super::csv::{named, table};
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
-use crate::kind::{DesignError, Kind};
+use crate::environment::Environment;
+use crate::kind::{DesignError, Kind, Unit};
 use geometry::fault::Fault;
-use geometry::math::Vec3;
+use geometry::math::{Aabb, Vec3, scale};
+
+/// The share of the region's bounds along each axis that a table of tensors has to reach over: middles of large elements do.
+const COVERED: f64 = 0.5;
 
 /// Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the distance.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -26,8 +30,58 @@ impl BuildGrade for PointsKind {
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
         let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
-        let (positions, values): (Vec<Vec3>, Vec<f64>) = rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
-        let samples = Samples::scattered(&positions, &values, self.neighbours as usize, &environment.region.bounds());
-        sampled(samples.map_err(wrong)?, &self.remap, of)
+        let (positions, values): (Vec<Vec3>, Vec<[f64; 1]>) = rows.iter().map(|r| ([r[0], r[1], r[2]], [r[3]])).unzip();
+        let bounds = environment.region.bounds();
+        let [one] = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
+        sampled(one, &self.remap, of)
+    }
+}
+
+/// Tensors at scattered points, from a file: the mean of the nearest, weighted by one over the square of the distance.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Table", noun = "a table of tensors")]
+pub struct TableKind {
+    /// Path of a table (csv), relative to the design file.
+    path: String,
+    /// The names, in the table's first line, of x, y, z and the components 11, 22, 33, 23, 13, 12; unless given, the table has these nine
+    /// columns alone, in this order.
+    columns: Option<[String; 9]>,
+    /// Unit of the coordinates (mm unless given).
+    unit: Option<Unit>,
+    /// Number of nearest points that count.
+    #[kind(default = 8, min = 1.0, max = 64.0)]
+    neighbours: u32,
+}
+
+impl TableKind {
+    /// The components 11, 22, 33, 23, 13, 12.
+    pub(crate) fn grades(&self, path: &str, environment: &Environment) -> Result<[Grade; 6], DesignError> {
+        let at = format!("{path}.path");
+        let file = environment.load(&self.path, &at)?;
+        let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
+        let text = String::from_utf8_lossy(&file);
+        let rows = match &self.columns {
+            Some(names) => named(&text, names),
+            None => table(&text, &[9]),
+        };
+        let unit = self.unit.map_or(1.0, Unit::in_mm);
+        let of = |r: &Vec<f64>| (scale([r[0], r[1], r[2]], unit), [r[3], r[4], r[5], r[6], r[7], r[8]]);
+        let (positions, values): (Vec<Vec3>, Vec<[f64; 6]>) = rows.map_err(wrong)?.iter().map(of).unzip();
+        let (bounds, all) = (environment.region.bounds(), positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)));
+        let (size, met) = (bounds.size(), all.intersection(bounds).size());
+        if (0..3).any(|a| met[a] < COVERED * size[a]) {
+            let message = format!(
+                "{}: the points reach from {:?} to {:?} mm, the region from {:?} to {:?}{}",
+                self.path,
+                all.min,
+                all.max,
+                bounds.min,
+                bounds.max,
+                if self.unit.is_none() { "; are they in mm? give their unit, such as unit = \"m\"" } else { "" }
+            );
+            return Err(DesignError::new(at, message).found(&self.path));
+        }
+        let made = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
+        Ok(made.map(Grade::from))
     }
 }

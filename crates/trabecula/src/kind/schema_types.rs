@@ -31,16 +31,37 @@ pub(super) fn one_of_types(schema: &Node, defs: &Defs) -> Node {
             let all: Vec<&str> = choices.iter().flat_map(types).collect();
             let differ = all.iter().enumerate().all(|(i, t)| !all[..i].contains(t))
                 && choices.iter().all(|c| !types(c).is_empty());
-            // The condition of a table with sets of keys would hold for other values too; `words` alone sees to that.
-            let conditional = choices.iter().any(|c| c.get("if").is_some());
-            if !differ || conditional && all.iter().any(|t| !["object", "string"].contains(t)) {
+            if !differ {
                 return table;
             }
-            let one = merged(&choices);
+            // The condition of a table with sets of keys would hold for other values too; of words `merged` sees to that.
+            let others = all.iter().any(|t| !["object", "string"].contains(t));
+            let one =
+                if others { merged(&choices.iter().map(of_tables).collect::<Vec<Node>>()) } else { merged(&choices) };
             table.entries().filter(|e| e.0 != "anyOf").fold(one, |one, (key, node)| one.with(key, node.clone()))
         }
         _ => schema.clone(),
     }
+}
+
+/// A schema whose condition, if it has one, holds for tables alone.
+fn of_tables(schema: &Node) -> Node {
+    let (condition, rest) = parted(schema);
+    match schema.get("if") {
+        Some(_) => rest.with("if", Node::table([("type", "object".into())])).with("then", condition),
+        None => rest,
+    }
+}
+
+/// The condition of a schema, and what else it has.
+fn parted(schema: &Node) -> (Node, Node) {
+    let anything: Node = Value::Table(Vec::new()).into();
+    schema.entries().fold((anything.clone(), anything), |(condition, rest), (key, node)| {
+        match ["if", "then", "else"].contains(&key) {
+            true => (condition.with(key, node.clone()), rest),
+            false => (condition, rest.with(key, node.clone())),
+        }
+    })
 }
 
 /// A reference as what it refers to, with its name.
@@ -63,7 +84,6 @@ pub(super) fn merged(choices: &[Node]) -> Node {
 /// Adds the words that text may be. Editors offer the words in an `anyOf` but look into no `then`, which alone refuses others with
 /// a list of these; hence the second choice of `anyOf`, which allows anything.
 fn words(schema: Node, words: &Node) -> Node {
-    const CONDITION: [&str; 3] = ["if", "then", "else"];
     let anything: Node = Value::Table(Vec::new()).into();
     let words = match words.get("x-kind").and_then(Node::as_text) {
         Some(name) => reference(name),
@@ -72,13 +92,11 @@ fn words(schema: Node, words: &Node) -> Node {
             .filter(|e| ["enum", "x-taplo"].contains(&e.0))
             .fold(anything.clone(), |out, (key, node)| out.with(key, node.clone())),
     };
-    let (condition, rest): (Vec<_>, Vec<_>) = schema.entries().partition(|e| CONDITION.contains(&e.0));
-    let table = |entries: Vec<(&str, &Node)>| -> Node {
-        entries.into_iter().fold(anything.clone(), |out, (key, node)| out.with(key, node.clone()))
-    };
-    let schema = table(rest)
+    let conditional = schema.get("if").is_some();
+    let (condition, rest) = parted(&schema);
+    let schema = rest
         .with("anyOf", vec![words.clone(), anything.clone()].into())
         .with("if", Node::table([("type", "string".into())]))
         .with("then", words);
-    if condition.is_empty() { schema } else { schema.with("else", table(condition)) }
+    if conditional { schema.with("else", condition) } else { schema }
 }

@@ -5,14 +5,16 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
+use super::load_cases::Stress;
 use super::phase_grid::Grid;
+use super::principal::{Principal, range};
 use super::singular_lines::Alike;
 use super::smooth_frames::{Averages, LEAST_AVERAGE, Octahedral, Smoothing};
 use super::surface_frames::Surface;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{
-    IDENTITY, Mat3, Vec3, cross, determinant, dot, eigen, norm, product, rotation, scale, sub, transpose, unit,
+    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
 use geometry::progress::checkpoint;
 
@@ -30,8 +32,8 @@ pub enum Orientation {
         /// The third axis.
         z: Axis,
     },
-    /// The axes along the principal directions of a symmetric tensor, given as 11, 22, 33, 23, 13, 12.
-    Stress([Grade; 6]),
+    /// The axes along the principal directions of a stress.
+    Stress(Stress),
 }
 
 /// The direction of an axis.
@@ -142,8 +144,7 @@ impl Orientation {
                 sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing, outside)?, nodes)?)
             }
             Orientation::Stress(of) => {
-                let values = columns(of, nodes, "stress")?;
-                let found: Vec<Principal> = values.par_iter().map(Principal::of).collect();
+                let found = of.principal(nodes)?;
                 let range = range(&found, outside);
                 if range == 0.0 {
                     return Err(no_principal());
@@ -164,12 +165,7 @@ impl Orientation {
 
     /// The frames that are asked for at nodes, without regard to signs and order; how far apart principal values are, relative to the
     /// range of those in the part; and that range. Where cells are not turned at all, nothing is asked for.
-    fn asked(
-        &self,
-        grid: &Grid,
-        nodes: &[Vec3],
-        outside: Option<&[f64]>,
-    ) -> Result<(Vec<Mat3>, Box<dyn Fn(usize) -> Vec3>, f64), Fault> {
+    fn asked(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<Asked, Fault> {
         if let Orientation::Stress(_) = self {
             let found = self.principal(nodes)?;
             let range = range(&found, outside);
@@ -190,7 +186,7 @@ impl Orientation {
     /// The principal directions of a stress at points; none of other orientations.
     pub(super) fn principal(&self, points: &[Vec3]) -> Result<Vec<Principal>, Fault> {
         let Orientation::Stress(of) = self else { return Ok(Vec::new()) };
-        Ok(columns(of, points, "stress")?.par_iter().map(Principal::of).collect())
+        of.principal(points)
     }
 
     /// Whether it is the same everywhere.
@@ -199,7 +195,7 @@ impl Orientation {
             Orientation::Angles(of) => constant(of),
             Orientation::Direction(of) => of.is_constant(),
             Orientation::Frame { x, z } => x.is_constant() && z.is_constant(),
-            Orientation::Stress(of) => constant(of),
+            Orientation::Stress(of) => of.is_constant(),
         }
     }
 
@@ -237,8 +233,7 @@ impl Orientation {
     /// The range of a stress at points, against which directions are more or less sure; 0 for other orientations.
     pub(super) fn stress_range(&self, points: &[Vec3]) -> Result<f64, Fault> {
         let Orientation::Stress(of) = self else { return Ok(0.0) };
-        let values = columns(of, points, "stress")?;
-        Ok(range(&values.par_iter().map(Principal::of).collect::<Vec<_>>(), None))
+        of.principal(points).map(|found| range(&found, None))
     }
 
     /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is that of a stress
@@ -263,15 +258,12 @@ impl Orientation {
             }
             Orientation::Frame { x, z } => squared(signed(x, "frame.x", 0)?, signed(z, "frame.z", 2)?, points),
             Orientation::Stress(of) => {
-                let (values, turns) = (columns(of, points, "stress")?, cube());
+                let (found, turns) = (of.principal(points)?, cube());
                 if range == 0.0 {
                     return Err(no_principal());
                 }
-                let of = |(t, like): (&[f64; 6], &Mat3)| {
-                    let p = Principal::of(t);
-                    settled(&p.frame, &p.own_gaps(range), like, &turns)
-                };
-                Ok(values.par_iter().zip(like).map(of).collect())
+                let one = |(p, like): (&Principal, &Mat3)| settled(&p.frame, &p.own_gaps(range), like, &turns);
+                Ok(found.par_iter().zip(like).map(one).collect())
             }
         }
     }
@@ -285,6 +277,9 @@ fn averaged(grid: &Grid, frames: Vec<Mat3>, averages: &Averages, range: f64, out
     Frames { at_nodes: frames, trust: Some(averages.trust()), range }
 }
 
+/// Frames at nodes, the gaps of each and the range of a stress.
+type Asked = (Vec<Mat3>, Box<dyn Fn(usize) -> Vec3>, f64);
+
 /// Frames at the nodes of a grid.
 pub(super) struct Frames {
     pub at_nodes: Vec<Mat3>,
@@ -296,54 +291,6 @@ pub(super) struct Frames {
 
 /// A gap between principal values, over the greatest value, below which they count as equal.
 pub(super) const DOUBT: f64 = 0.05;
-/// A share of the range in the part: a stress that is less counts as one of this size, so that its rounding has no
-/// direction.
-const LEAST: f64 = 1e-3;
-
-/// The principal directions of a symmetric tensor, as a right-handed frame, and its principal values.
-pub(super) struct Principal {
-    pub frame: Mat3,
-    pub values: Vec3,
-}
-
-impl Principal {
-    /// Of the tensor 11, 22, 33, 23, 13, 12.
-    fn of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Principal {
-        let (values, axes) = eigen(&[[*xx, *xy, *xz], [*xy, *yy, *yz], [*xz, *yz, *zz]]);
-        let frame = transpose(&axes);
-        Principal { frame: if determinant(&frame) < 0.0 { frame.map(|r| r.map(|c| -c)) } else { frame }, values }
-    }
-
-    /// The greatest difference of two values.
-    pub fn difference(&self) -> f64 {
-        let [a, b, c] = self.values;
-        (a - b).abs().max((b - c).abs()).max((c - a).abs())
-    }
-
-    /// How far each value is from the nearest other.
-    fn gaps(&self) -> Vec3 {
-        let v = self.values;
-        [0, 1, 2].map(|i| (v[i] - v[(i + 1) % 3]).abs().min((v[i] - v[(i + 2) % 3]).abs()))
-    }
-
-    /// The same over the greatest value; `range` is that in the part.
-    fn own_gaps(&self, range: f64) -> Vec3 {
-        scale(self.gaps(), 1.0 / self.size(range))
-    }
-
-    /// The greatest value; `range` is that in the part.
-    pub fn size(&self, range: f64) -> f64 {
-        self.values.iter().fold(LEAST * range, |m, v| m.max(v.abs()))
-    }
-}
-
-/// The difference of two principal values that counts as large in a part: √3 times the root of the mean square of the greatest ones,
-/// which is the greatest of all in a bent beam. A peak at a corner hardly changes it, nor do parts that carry nothing.
-fn range(found: &[Principal], outside: Option<&[f64]>) -> f64 {
-    let counted = || found.iter().enumerate().filter(|(n, _)| outside.is_none_or(|d| d[*n] == 0.0));
-    let squares: f64 = counted().map(|(_, p)| p.difference().powi(2)).sum();
-    (3.0 * squares / counted().count() as f64).sqrt()
-}
 
 fn no_principal() -> Fault {
     let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
@@ -353,7 +300,7 @@ fn no_principal() -> Fault {
 /// The principal directions of the greatest values of tensors v vᵀ or sums of such.
 fn along(tensors: &[[f64; 6]], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
     let one = |(t, p): (&[f64; 6], &Vec3)| {
-        let Principal { frame, values } = Principal::of(t);
+        let Principal { frame, values, .. } = Principal::of(t);
         let i = (0..3).fold(0, |m, i| if values[i] > values[m] { i } else { m });
         if values[i] < 1e-12 * (t[0] + t[1] + t[2]).max(f64::MIN_POSITIVE) {
             return Err(no_direction(key, *p));
@@ -403,7 +350,7 @@ fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fau
 }
 
 /// Values of several grades at points: one tuple for each point.
-fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
+pub(super) fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
     let mut out = vec![[0.0; N]; points.len()];
     let mut values = vec![0.0; points.len()];
     for (c, grade) in of.iter().enumerate() {

@@ -1,11 +1,12 @@
 //! The solved map, as it is declared.
 
+use super::stress_kind::StressKind;
 use super::{
     Aligned, Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared,
 };
 use crate::environment::{self, Environment};
 use crate::field::Field;
-use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, several};
+use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines};
 use crate::kind::{DesignError, Fault, Key, Kind};
 use crate::region::{Notes, Region, RegionKind};
 use geometry::fault::number;
@@ -126,10 +127,10 @@ pub struct AlongFrame {
 /// Turned to the principal directions of a tensor.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct AlongStress {
-    /// A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, or the field of a
-    /// result.
+    /// A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, the field of a result, a
+    /// table, or several load cases, { cases = [...] }.
     #[kind(keyword)]
-    stress: TensorKind,
+    stress: StressKind,
 }
 
 /// A number that may vary, or three of them, along the cell's axes or those of a stress.
@@ -180,38 +181,6 @@ pub struct FrameKind {
     x: VectorKind,
     /// Direction of the cell's z axis.
     z: VectorKind,
-}
-
-/// A symmetric tensor that may vary.
-#[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(untagged, noun = "six numbers [11, 22, 33, 23, 13, 12], each of which may vary, or the field of a result")]
-pub enum TensorKind {
-    /// By its components 11, 22, 33, 23, 13, 12.
-    Components(Box<[GradeSpec; 6]>),
-    /// An array of six or nine numbers of a result.
-    Field(TensorField),
-}
-
-/// An array of six or nine numbers for each point or cell of a result.
-#[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(noun = "a tensor")]
-pub struct TensorField {
-    /// An array of six or nine components of a result.
-    field: FieldKind,
-    /// The order of six components.
-    #[kind(default)]
-    order: TensorOrder,
-}
-
-/// The order of the six components of a symmetric tensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "order")]
-pub enum TensorOrder {
-    /// 11, 22, 33, 12, 23, 13, as in VTK.
-    #[default]
-    Vtk,
-    /// 11, 22, 33, 23, 13, 12, as in Voigt's notation.
-    Voigt,
 }
 
 /// What cells are aligned with.
@@ -401,23 +370,13 @@ impl OrientationKind {
             OrientationKind::Frame(AlongFrame { frame }) => {
                 Orientation::Frame { x: vector(&frame.x, "frame.x")?, z: vector(&frame.z, "frame.z")? }
             }
-            OrientationKind::Stress(of) => Orientation::Stress(match &of.stress {
-                TensorKind::Components(of) => each(of, &below("stress"), &any)?,
-                TensorKind::Field(of) => {
-                    several(&of.field, &below("stress.field"), environment, |n| match (n, of.order) {
-                        (9, _) => Some([0, 4, 8, 5, 2, 1]),
-                        (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
-                        (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
-                        _ => None,
-                    })?
-                }
-            }),
+            OrientationKind::Stress(of) => Orientation::Stress(of.stress.build(&below("stress"), environment)?),
         })
     }
 }
 
 /// The same for each, with its index in the path.
-fn each<const N: usize>(
+pub(super) fn each<const N: usize>(
     of: &[GradeSpec; N],
     path: &str,
     one: &impl Fn(&GradeSpec, String) -> Result<Grade, DesignError>,

@@ -7,8 +7,9 @@
 
 use rayon::prelude::*;
 
-use super::frame::{DOUBT, Principal};
+use super::frame::DOUBT;
 use super::phase_grid::Grid;
+use super::principal::Principal;
 use super::smooth_frames::{Smoothing, trusted};
 use geometry::math::{Mat3, Vec3, transpose};
 

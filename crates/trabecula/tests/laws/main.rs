@@ -11,6 +11,7 @@ mod fields;
 mod fixed_faces;
 mod flush;
 mod islands;
+mod load_cases;
 mod local_thickness;
 mod measured;
 mod noisy_stress;

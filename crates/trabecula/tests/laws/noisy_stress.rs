@@ -68,7 +68,7 @@ fn a_bent_beam_is_followed_through_noise() {
             s[0] += (p[1] - 12.0) / 12.0;
             s
         });
-        let map = solved(&b, Orientation::Stress(stress), Some(WAVELENGTH)).expect("no fold");
+        let map = solved(&b, Orientation::Stress(stress.into()), Some(WAVELENGTH)).expect("no fold");
         assert!(points(&b, 20_000).all(|p| determinant(&map.jacobian(p)) > 0.0));
         let loaded = points(&b, 20_000).filter(|p| (p[1] - 12.0).abs() > 1.2);
         let angle = mean(loaded.map(|p| off_axis(&map.jacobian(p), [1.0, 0.0, 0.0])));
@@ -88,7 +88,7 @@ fn a_peak_does_not_hide_the_rest() {
             let (s, c) = turned(p).sin_cos();
             [c * c + 0.4 * s * s, s * s + 0.4 * c * c, -0.3, 0.0, 0.0, 0.6 * s * c].map(|v| by * v)
         });
-        let map = solved(&b, Orientation::Stress(stress), smooth).expect("no fold");
+        let map = solved(&b, Orientation::Stress(stress.into()), smooth).expect("no fold");
         let away: Vec<Vec3> = points(&b, 5000).filter(|p| norm(*p) > 6.0).collect();
         let along = |p: Vec3| [turned(p).cos(), turned(p).sin(), 0.0];
         let angle = mean(away.iter().map(|p| off_axis(&map.jacobian(*p), along(*p))));
@@ -103,7 +103,7 @@ fn a_peak_does_not_hide_the_rest() {
 fn what_folds_names_the_smoothing_length() {
     let b = Aabb { min: [0.0; 3], max: [24.0, 24.0, 9.0] };
     let noisy = samples(&b, |_, random| [0.0; 6].map(|_| random()));
-    let message = solved(&b, Orientation::Stress(noisy), None).err().expect("no map follows noise");
+    let message = solved(&b, Orientation::Stress(noisy.into()), None).err().expect("no map follows noise");
     assert!(message.contains("smooth"), "{message}");
 }
 
@@ -118,7 +118,7 @@ fn a_turning_stress_stays_what_it_is() {
             let hoop = [y * y, x * x, 0.0, 0.0, 0.0, -x * y];
             hoop.map(|v| v + noise * random())
         });
-        let map = solved(&b, Orientation::Stress(stress), Some(1.5)).expect("no fold");
+        let map = solved(&b, Orientation::Stress(stress.into()), Some(1.5)).expect("no fold");
         mean(points(&b, 20_000).map(|p| off_axis(&map.jacobian(p), scale([-p[1], p[0], 0.0], 1.0 / p[0].hypot(p[1])))))
     });
     assert!(found[1] < 1.5 * found[0] && found[2] < 1.5 * found[0], "{found:?}");

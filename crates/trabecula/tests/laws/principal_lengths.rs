@@ -12,7 +12,7 @@ fn solved(stress: [Grade; 6], smooth: Option<f64>) -> Phase {
     let wanted = Wanted {
         wavelength: LENGTHS.map(Grade::Constant),
         by_principal: true,
-        orientation: Orientation::Stress(stress),
+        orientation: Orientation::Stress(stress.into()),
         weight: None,
         angle_weight: 1.0,
         smooth,

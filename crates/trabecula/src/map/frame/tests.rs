@@ -66,10 +66,8 @@ fn where_values_agree_the_neighbours_decide() {
         let values = nodes.iter().map(|p| tensor(*p)[c]).collect();
         Grade::from(Samples::new(g.origin, g.step, g.shape, values).expect("samples"))
     };
-    let frames = Orientation::Stress(core::array::from_fn(component))
-        .frames(&g, &nodes, None, None, None)
-        .expect("frames")
-        .at_nodes;
+    let stress: [Grade; 6] = core::array::from_fn(component);
+    let frames = Orientation::Stress(stress.into()).frames(&g, &nodes, None, None, None).expect("frames").at_nodes;
     for (n, f) in frames.iter().enumerate() {
         assert!((determinant(f) - 1.0).abs() < 1e-9);
         if nodes[n][0] < 4.6 {

@@ -369,7 +369,7 @@ fn misfits_are_those_of_the_report() {
     // Tension along a direction that turns, the same in all directions across it.
     let bar = ["cos(0.07*x)^2", "sin(0.07*x)^2", "0", "0", "0", "cos(0.07*x)*sin(0.07*x)"].map(formula);
     let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
-    let laid = |stress| Wanted { orientation: Orientation::Stress(stress), ..turned.clone() };
+    let laid = |stress: [Grade; 6]| Wanted { orientation: Orientation::Stress(stress.into()), ..turned.clone() };
     for wanted in [turned.clone(), laid(stress), laid(bar)] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.solution.grid();
