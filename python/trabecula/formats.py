@@ -7,8 +7,8 @@ import os
 from . import _core
 
 __all__ = [
-    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "TET_READS", "TET_WRITES"),
-    *("STDIN", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
+    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "RESULT_READS", "TET_READS"),
+    *("TET_WRITES", "STDIN", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
 ]
 
 DESIGNS = ("toml", "json")
@@ -22,6 +22,8 @@ VOXEL_WRITES = ("npy", "vti")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
 MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+#: Formats of results: those of the core, and those that results.py reads.
+RESULT_READS = ("vtu", "vtk", "vti", "frd", "med", "rmed", "e", "exo", "msh", "xdmf", "avs")
 TET_READS = ("vtu", "vtk", "frd", *MESHIO_READS)
 TET_WRITES = ("vtu", *MESHIO_WRITES)
 

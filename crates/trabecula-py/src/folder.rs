@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use geometry::formats::Elements;
+use geometry::formats::{Array, Data, Elements, Shape};
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -40,6 +40,10 @@ impl Loader for Folder {
         elements(&self.0.join(Path::new(path)).to_string_lossy())
     }
 
+    fn result(&self, path: &str, array: &str) -> Result<Data, String> {
+        result(&self.0.join(Path::new(path)).to_string_lossy(), array)
+    }
+
     fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
         tetrahedra(name, surface, size, limit)
     }
@@ -55,6 +59,18 @@ type Read<'py> = (
     Vec<(i64, String)>,
 );
 
+/// Points, connectivity, ends and kinds of the elements of a result that Python read; name, whether of cells, and number of components of
+/// each of its arrays; and the numbers of the one that is asked for, under its index among them.
+type ReadResult<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, u8>,
+    Vec<(String, bool, usize)>,
+    Option<usize>,
+    PyReadonlyArray1<'py, f64>,
+);
+
 /// What an exception says.
 fn words(py: Python<'_>, e: &PyErr) -> String {
     e.value(py).to_string()
@@ -66,16 +82,46 @@ fn elements(path: &str) -> Result<ZonedElements, String> {
         let read = || -> PyResult<ZonedElements> {
             let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
             let (points, connectivity, ends, kinds, zones, names): Read<'_> = read.extract()?;
-            let elements = Elements {
-                points: rows(&points),
-                connectivity: connectivity.as_array().to_vec(),
-                ends: ends.as_array().iter().map(|e| *e as usize).collect(),
-                kinds: kinds.as_array().to_vec(),
-            };
+            let elements = made(&points, &connectivity, &ends, &kinds);
             Ok(ZonedElements { elements, zones: zones.as_array().to_vec(), names })
         };
         read().map_err(|e| words(py, &e))
     })
+}
+
+fn made(
+    points: &PyReadonlyArray2<'_, f64>,
+    connectivity: &PyReadonlyArray1<'_, u32>,
+    ends: &PyReadonlyArray1<'_, u64>,
+    kinds: &PyReadonlyArray1<'_, u8>,
+) -> Elements {
+    Elements {
+        points: rows(points),
+        connectivity: connectivity.as_array().to_vec(),
+        ends: ends.as_array().iter().map(|e| *e as usize).collect(),
+        kinds: kinds.as_array().to_vec(),
+    }
+}
+
+/// The result of a file of a format that Python reads, with the numbers of one array.
+fn result(path: &str, array: &str) -> Result<Data, String> {
+    let data = Python::attach(|py| {
+        let read = || -> PyResult<Data> {
+            let read = py.import("trabecula.results")?.getattr("read")?.call1((path, array))?;
+            let (points, connectivity, ends, kinds, names, chosen, values): ReadResult<'_> = read.extract()?;
+            let mut arrays: Vec<Array> = names
+                .into_iter()
+                .map(|(name, of_cells, components)| Array { name, of_cells, components, values: Vec::new() })
+                .collect();
+            if let Some(array) = chosen.and_then(|i| arrays.get_mut(i)) {
+                array.values = values.as_array().to_vec();
+            }
+            Ok(Data { shape: Shape::Mesh(made(&points, &connectivity, &ends, &kinds)), arrays })
+        };
+        read().map_err(|e| words(py, &e))
+    })?;
+    data.check().map_err(|f| format!("{path}: {}", f.message))?;
+    Ok(data)
 }
 
 /// The series of DICOM that Python read.
