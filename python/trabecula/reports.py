@@ -264,6 +264,8 @@ class DistortionReport(Report):
     spacing: list[MapSpread]
     """|∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
     whichever is greater."""
+    stretch: list[float]
+    """Least and greatest length of a cell over the one asked for, along any direction."""
     turn: float
     """Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees."""
 
