@@ -243,7 +243,6 @@ class DistortionReport(Report):
         "anisotropy": "MapSpread",
         "curl": "MapSpread",
         "shear": "MapSpread",
-        "singular_lines": "SingularLineReport",
         "spacing": "MapSpread",
     }
 
@@ -259,8 +258,6 @@ class DistortionReport(Report):
     """Share of points and axes with a spacing ratio outside 1/1.5 to 1.5."""
     shear: MapSpread
     """Greatest deviation from a right angle between two gradients, degrees."""
-    singular_lines: list[SingularLineReport]
-    """Lines round which the wanted axes do not come back to themselves, at least half a wavelength long, the longest first."""
     spacing: list[MapSpread]
     """|∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
     whichever is greater."""
@@ -398,6 +395,7 @@ class LatticeReport(Report):
     _parts = {
         "distortion": "DistortionReport",
         "periods": "PeriodReport",
+        "singular": "SingularLineReport",
         "tets": "TilingReport",
     }
 
@@ -422,6 +420,9 @@ class LatticeReport(Report):
     """Of a sheet: the same of the void f < 0 and of the void f > 0, mm."""
     porosity: float | list[float]
     """1 − fraction."""
+    singular: list[SingularLineReport] | None
+    """Lines round which the axes that a solved map is asked for do not come back to themselves, at least half a wavelength
+    long, the longest first. None without a solved map."""
     tets: TilingReport | None
     """The tetrahedral mesh of a lattice over tetrahedra, and the cells in it."""
     thickness: float | list[float] | None
@@ -611,10 +612,11 @@ class SimplifyReport(Report):
 class SingularLineReport(Report):
     """A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there."""
 
-    ends: list[list[float]]
-    """Its ends, mm, to a step of the map's grid; the same point where it is closed."""
     length: float
     """Its length within the region, mm, to about a tenth."""
+    points: list[list[float]]
+    """Points along it from end to end, mm, to a step of the map's grid; the first comes again at the end where it is closed.
+    Lines that meet are lines of their own."""
     turn: float
     """By what the axes are turned once round it, degrees."""
 

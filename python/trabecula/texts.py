@@ -87,6 +87,7 @@ def _lattice(it: Report) -> Iterator[str]:
         yield from _tiling(it.tets)
     if it.distortion:
         yield from _distortion(it.distortion)
+    yield from _singular(it.singular or [])
     for period in it.periods or []:
         yield _period(period)
 
@@ -167,11 +168,14 @@ def _distortion(it: Report) -> Iterator[str]:
         f"most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
     )
     yield f"  turn       {it.turn:.1f}° per cell at most"
-    for line in it.singular_lines[:3]:
-        a, b = line.ends
+
+
+def _singular(lines: list[Report]) -> Iterator[str]:
+    for line in lines[:3]:
+        a, b = line.points[0], line.points[-1]
         place = f"from {point(a)} to {point(b)} mm" if a != b else f"closed, through {point(a)} mm"
         yield f"  singular   {line.length:.1f} mm, axes turned by {line.turn:.0f}° once round it, {place}"
-    if more := it.singular_lines[3:]:
+    if more := lines[3:]:
         yield f"             and {counted(len(more), 'shorter one')}"
 
 

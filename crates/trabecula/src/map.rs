@@ -17,6 +17,7 @@ mod phase;
 mod phase_grid;
 mod phase_kind;
 mod phase_target;
+mod pierced_faces;
 mod poisson;
 mod principal;
 mod principal_lengths;

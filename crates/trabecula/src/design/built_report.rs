@@ -10,7 +10,7 @@ use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
-use crate::map::{Distortion, Period, Spread};
+use crate::map::{Distortion, Period, SingularLine, Spread};
 use crate::report::*;
 use crate::truss::Beams;
 use geometry::math::Mat3;
@@ -147,6 +147,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
         distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
+        singular: lattice.map.solved().map(|map| singular(&map.distortion().singular)),
         periods: lattice.map.solved().map(|map| periods(map.periods())).filter(|p| !p.is_empty()),
         tets: None,
     }
@@ -215,6 +216,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
         connected_fraction: Vec::new(),
         truncation: None,
         distortion: None,
+        singular: None,
         periods: None,
         tets: None,
     };
@@ -344,15 +346,21 @@ fn distortion(d: &Distortion) -> DistortionReport {
         density: d.density,
         curl: spread(&d.curl),
         turn: d.turn,
-        singular_lines: (d.singular.iter())
-            .map(|l| SingularLineReport { length: l.length, ends: l.ends, turn: l.turn })
-            .collect(),
     }
+}
+
+/// Singular lines; positions to a millionth of a millimetre.
+fn singular(of: &[SingularLine]) -> Vec<SingularLineReport> {
+    let one = |l: &SingularLine| SingularLineReport {
+        points: l.points.iter().map(|p| rounded(*p)).collect(),
+        length: l.length,
+        turn: l.turn,
+    };
+    of.iter().map(one).collect()
 }
 
 /// The cells round holes; positions to a millionth of a millimetre.
 fn periods(of: &[Period]) -> Vec<PeriodReport> {
-    let rounded = |v: [f64; 3]| v.map(|v| (v * 1e6).round() / 1e6 + 0.0);
     let one = |p: &Period| PeriodReport {
         at: rounded(p.at),
         along: rounded(p.along),
@@ -360,4 +368,8 @@ fn periods(of: &[Period]) -> Vec<PeriodReport> {
         asked: rounded(p.asked),
     };
     of.iter().map(one).collect()
+}
+
+fn rounded(v: [f64; 3]) -> [f64; 3] {
+    v.map(|v| (v * 1e6).round() / 1e6 + 0.0)
 }

@@ -233,16 +233,23 @@ impl Phase {
         self.solution.continued(u, from, p)
     }
 
-    /// Deviation of the map from the target at points (mm) within the box. The target is evaluated at the points,
-    /// with the signs and axes of the nodes about them.
+    /// The gradients Kᵢ that are asked for (rows, turns per mm) at points (mm) within the box. The target is evaluated at the points, with
+    /// the signs and axes of the nodes about them.
     ///
     /// # Errors
     /// Numbers that are not finite, vectors without a direction.
+    pub fn asked(&self, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+        let (grid, frames) = (self.solution.grid(), self.combed()?);
+        targets(&self.wanted, self.stress_range, grid, &frames, self.lengths.as_deref(), points)
+    }
+
+    /// Deviation of the map from what is asked for at points (mm) within the box.
+    ///
+    /// # Errors
+    /// Those of `asked`.
     pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
         let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
-        let (grid, frames) = (self.solution.grid(), self.combed()?);
-        let targets = targets(&self.wanted, self.stress_range, grid, &frames, self.lengths.as_deref(), points)?;
-        Ok(jacobians.iter().zip(&targets).map(|(j, k)| distortion::compare(j, k)).collect())
+        Ok(jacobians.iter().zip(&self.asked(points)?).map(|(j, k)| distortion::compare(j, k)).collect())
     }
 
     /// The frames at the nodes, made again where points need them for their signs and axes.

@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 
 use super::phase_grid::Grid;
+use super::pierced_faces::{Pierced, length, matched, polylines};
 use geometry::math::{Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
-use geometry::union_find;
 
 /// What counts as the same axes.
 pub(super) enum Alike {
@@ -19,21 +19,26 @@ pub(super) enum Alike {
 }
 
 /// A line round which the axes do not come back to themselves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SingularLine {
-    /// Its length within the region, mm, to about a tenth.
+    /// Points along it from end to end, mm: the middles of the grid's faces that it pierces. A closed line repeats its first point.
+    pub points: Vec<Vec3>,
+    /// Its length within the region, mm, to about a tenth: that of the polyline.
     pub length: f64,
-    /// Its ends, mm; the same point where it is closed.
-    pub ends: [Vec3; 2],
     /// By what the axes are turned once round it, degrees.
     pub turn: f64,
 }
 
 impl SingularLine {
+    /// Its ends, mm; the same point where it is closed.
+    pub fn ends(&self) -> [Vec3; 2] {
+        [self.points.first(), self.points.last()].map(|p| p.copied().unwrap_or_default())
+    }
+
     /// Where it is, as the longest of `count` lines.
     pub(crate) fn words(&self, count: usize) -> String {
         let at = |[x, y, z]: Vec3| format!("({x:.1}, {y:.1}, {z:.1})");
-        let [a, b] = self.ends;
+        let [a, b] = self.ends();
         let place = if a == b {
             format!("a ring through {} mm", at(a))
         } else {
@@ -44,13 +49,6 @@ impl SingularLine {
             _ => format!("{count} lines, of which the longest is {place}"),
         }
     }
-}
-
-/// A face that a line pierces: its first node, the axis along which it is pierced, the turn once round it.
-struct Pierced {
-    node: usize,
-    axis: usize,
-    turn: f64,
 }
 
 /// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid.
@@ -85,68 +83,41 @@ pub(super) fn singular_lines(
         })
     });
     let faces: Vec<Pierced> = faces.collect();
-    lines(grid, &faces, least)
+    let line = |(points, turn): (Vec<Vec3>, f64)| SingularLine { length: length(&points), points, turn };
+    let mut found: Vec<SingularLine> = polylines(grid, &faces).into_iter().map(line).collect();
+    found.retain(|l| l.points.len() > 1 && l.length >= least);
+    longest_first(&mut found);
+    apart(found, 2.0 * norm(grid.step))
 }
 
-/// Pierced faces that are joined through cells of the grid, as lines.
-fn lines(grid: &Grid, faces: &[Pierced], least: f64) -> Vec<SingularLine> {
-    let middle = |f: &Pierced| grid.face_middle(f.node, f.axis);
-    let cells = |(i, f): (usize, &Pierced)| grid.cells_of_face(f.node, f.axis).map(|c| c.map(|c| (c, i)));
-    let mut of_cells: Vec<(usize, usize)> = faces.iter().enumerate().flat_map(cells).flatten().collect();
-    of_cells.sort_unstable();
-    let cells: Vec<&[(usize, usize)]> = of_cells.chunk_by(|a, b| a.0 == b.0).collect();
-    let mut root = union_find::singles(faces.len());
-    for pair in cells.iter().flat_map(|c| c.windows(2)) {
-        union_find::unite(&mut root, pair[0].1 as u32, pair[1].1 as u32);
-    }
-    let (line, count) = union_find::labels(&mut root);
-    // Through a cell a line goes from the middle of a face to that of another.
-    let (mut length, mut uses) = (vec![0.0; count], vec![0; faces.len()]);
-    for cell in cells.iter().filter(|c| c.len() > 1) {
-        let points: Vec<Vec3> = cell.iter().map(|(_, i)| middle(&faces[*i])).collect();
-        let sum = points.iter().fold([0.0; 3], |s, p| add(s, *p));
-        let centre = scale(sum, 1.0 / points.len() as f64);
-        length[line[cell[0].1] as usize] += points.iter().map(|p| norm(sub(*p, centre))).sum::<f64>();
-        cell.iter().for_each(|(_, i)| uses[*i] += 1);
-    }
-    let mut members = vec![Vec::new(); count];
-    line.iter().enumerate().for_each(|(i, l)| members[*l as usize].push(i));
-    let of = |(members, length): (&Vec<usize>, f64)| {
-        let point = |i: usize| middle(&faces[i]);
-        let open = || members.iter().copied().filter(|i| uses[*i] < 2);
-        let from = point(open().next().unwrap_or(members[0]));
-        let far = |i: &usize| norm(sub(point(*i), from));
-        let end = open().max_by(|a, b| far(a).total_cmp(&far(b)));
-        SingularLine { length, ends: [from, end.map_or(from, point)], turn: faces[members[0]].turn }
-    };
-    let mut found: Vec<SingularLine> = members.iter().zip(length).map(of).collect();
-    found.retain(|l| l.length >= least);
-    found.sort_by(|a, b| b.length.total_cmp(&a.length));
-    apart(found, 2.0 * norm(grid.step))
+fn longest_first(lines: &mut [SingularLine]) {
+    lines.sort_by(|a, b| b.length.total_cmp(&a.length));
 }
 
 /// Lines with those that run within a distance of them made one, at their mean place: a whole turn of axes that are alike after a
 /// quarter is four quarters, some steps of the grid apart.
 fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
-    let mut kept: Vec<(SingularLine, Vec3)> = Vec::new();
-    let close = |a: Vec3, b: Vec3| norm(sub(a, b)) < near;
+    // Each with its points as they were found: means wander.
+    let mut kept: Vec<(SingularLine, Vec<Vec3>)> = Vec::new();
+    let close = |a: &[Vec3], b: &[Vec3]| [0, a.len() - 1].iter().all(|i| norm(sub(a[*i], b[*i])) < near);
     for line in lines {
-        let [a, b] = line.ends;
-        // As it was found: means wander.
-        let beside = |(k, from): &&mut (SingularLine, Vec3)| {
-            let to = add(*from, sub(k.ends[1], k.ends[0]));
-            (close(a, *from) && close(b, to)) || (close(b, *from) && close(a, to))
+        let beside = |(i, (_, points)): (usize, &(SingularLine, Vec<Vec3>))| {
+            let other = matched(points, &line.points);
+            close(points, &other).then_some((i, other))
         };
-        let Some((k, from)) = kept.iter_mut().find(beside) else {
-            kept.push((line, a));
+        let Some((i, other)) = kept.iter().enumerate().find_map(beside) else {
+            kept.push((line.clone(), line.points));
             continue;
         };
-        let [a, b] = if close(a, *from) { [a, b] } else { [b, a] };
+        let k = &mut kept[i].0;
         let share = line.turn / (k.turn + line.turn);
-        k.ends = [(k.ends[0], a), (k.ends[1], b)].map(|(k, l)| add(k, scale(sub(l, k), share)));
+        k.points.iter_mut().zip(&other).for_each(|(p, q)| *p = add(*p, scale(sub(*q, *p), share)));
+        k.length = length(&k.points);
         k.turn += line.turn;
     }
-    kept.into_iter().map(|k| k.0).collect()
+    let mut made: Vec<SingularLine> = kept.into_iter().map(|k| k.0).collect();
+    longest_first(&mut made);
+    made
 }
 
 impl Alike {
@@ -259,7 +230,7 @@ mod tests {
 
     /// A line along y that ends where the part does, one step about.
     fn is_at(line: &SingularLine, turn: f64) {
-        let [a, b] = line.ends;
+        let [a, b] = line.ends();
         for p in [a, b] {
             assert!((p[0] - 0.7).abs() <= 0.5 && (p[2] - 3.3).abs() <= 0.5, "{line:?}");
         }
@@ -322,7 +293,8 @@ mod tests {
         let ring = |p: Vec3| (p[0] - 0.52).hypot(p[1] - 0.47) > 0.9;
         let lines = found(&Alike::Line, frame, ring);
         assert_eq!(lines.len(), 1, "{lines:?}");
-        assert_eq!(lines[0].ends[0], lines[0].ends[1]);
+        let [a, b] = lines[0].ends();
+        assert_eq!(a, b);
         // A chain of the middles of faces is up to a tenth longer than a circle.
         let round = core::f64::consts::TAU * 2.6;
         assert!(lines[0].length > 0.95 * round && lines[0].length < 1.12 * round, "{lines:?} of {round}");

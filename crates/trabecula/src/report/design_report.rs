@@ -62,6 +62,10 @@ pub struct LatticeReport {
     /// Deviation of a solved map from the orientation and wavelength asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionReport>,
+    /// Lines round which the axes that a solved map is asked for do not come back to themselves, at least half a wavelength long, the
+    /// longest first. None without a solved map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub singular: Option<Vec<SingularLineReport>>,
     /// Cells round the holes of the region; None where the phases of a solved map have one value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub periods: Option<Vec<PeriodReport>>,
@@ -145,17 +149,16 @@ pub struct DistortionReport {
     pub curl: MapSpread,
     /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
-    /// Lines round which the wanted axes do not come back to themselves, at least half a wavelength long, the longest first.
-    pub singular_lines: Vec<SingularLineReport>,
 }
 
 /// A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SingularLineReport {
+    /// Points along it from end to end, mm, to a step of the map's grid; the first comes again at the end where it is closed. Lines
+    /// that meet are lines of their own.
+    pub points: Vec<[f64; 3]>,
     /// Its length within the region, mm, to about a tenth.
     pub length: f64,
-    /// Its ends, mm, to a step of the map's grid; the same point where it is closed.
-    pub ends: [[f64; 3]; 2],
     /// By what the axes are turned once round it, degrees.
     pub turn: f64,
 }
