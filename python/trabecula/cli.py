@@ -11,6 +11,7 @@ from collections.abc import Callable
 from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, STDIN, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
 from .islands import ISLANDS
 from .parts import check_parts
+from .shown import SHOWN
 from .terminal import fail, interrupts_leave, interrupts_raise, listen, outcome, settle, warn
 
 __all__ = ["main"]
@@ -26,8 +27,6 @@ examples:
 exit status: 0 done, 1 the design or a file is wrong, 2 wrong usage.
 Set TRABECULA_DEBUG=1 for the traceback of an internal error.
 """
-#: Deviations of a solved map: names on the scale of a picture.
-SHOWN = {"angle": "angle off, degrees", "spacing": "spacing off, ratio", "density": "cells for each one wanted"}
 UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
 
 
@@ -305,7 +304,12 @@ COMMANDS = {
         option("--size", type=size, default=(1600, 1200), metavar="WxH", help="pixels (default: 1600x1200)"),
         option("--azimuth", type=ANGLE, default=30.0, metavar="DEG", help="camera about +z (default: 30)"),
         option("--elevation", type=ANGLE, default=25.0, metavar="DEG", help="camera above xy (default: 25)"),
-        option("--show", choices=SHOWN, help="colour by the deviation of a solved map from the one asked for"),
+        option(
+            "--show",
+            choices=SHOWN,
+            help="of a solved map: angle, spacing or density off, the axes asked for, lines along them, its singular lines; "
+            "of a blend: which lattice is where",
+        ),
         *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),
 }

@@ -13,7 +13,6 @@ from functools import cache
 from . import _core, cell
 from . import beams as unit_cells
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
-from .cli import SHOWN
 from .design import Design, load, parsed
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
@@ -21,6 +20,7 @@ from .formats import DESIGNS, MESH_READS, STDIN, is_design, kind_of
 from .machine import fits
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
+from .shown import look, towards
 from .solid import Solid
 from .starter import starter
 from .terminal import Progress, figure, say, settle, warn, warned
@@ -410,22 +410,20 @@ def tets(args) -> None:
 def render(args) -> None:
     """``trabecula render``."""
     check_place(args.output)
-    view = args.size, args.azimuth, args.elevation
     if args.show is None:
-        made = surface(args)
-        settle()
-        made.render(args.output, *view)
+        made, shown = surface(args), {}
     elif not is_design(args.file):
-        raise Refused(f"{args.file} is a mesh; --show is for a design with a solved map (map.phase)")
+        raise Refused(f"{args.file} is a mesh; --show is for a design with a solved map (map.phase) or a blend")
     else:
         solid = build(args.file)
-        made = meshed(solid, args)
         try:
-            found = solid.map_error(made.vertices)
+            seen = look(solid, args.show)
         except ValueError as error:
             raise Refused(f"{args.file}: {error}") from None
-        settle()
-        made.render(args.output, *view, found[args.show], SHOWN[args.show])
+        made = meshed(solid, args)
+        shown = seen(made, towards(args.azimuth, args.elevation))
+    settle()
+    made.render(args.output, args.size, args.azimuth, args.elevation, **shown)
     say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels")
 
 

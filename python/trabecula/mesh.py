@@ -16,7 +16,7 @@ from .transforms import Transformed, determinant
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
     from typing import Any
 
     import numpy as np
@@ -385,26 +385,33 @@ class Mesh(Picture, Transformed):
         color: ArrayLike | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
+        shares: Mapping[str, ArrayLike] | None = None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
+        width: float | None = None,
     ) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
         ``color`` is a number for each vertex, shown on a scale that says ``label`` and goes over ``span``, or from the least
-        to the greatest.
+        to the greatest. ``shares`` are instead numbers from 0 to 1 for each vertex by a name: each name has a colour, shares
+        mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they are ``width`` mm wide (1/100 of the diagonal
+        unless given) and are seen through the surface, which is pale unless it has colours. ``label`` is what colours say, or
+        else lines.
         """
-        width, height = (whole("size", v, 1, 16384) for v in size)
+        pixels = tuple(whole("size", v, 1, 16384) for v in size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
         if not all(map(math.isfinite, angles)):
             raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
-        return self._core.png(width, height, *angles, self._tint(color, label, span))
+        if color is not None and shares is not None:
+            raise ValueError("give color or shares, not both")
+        tint = None if color is None else self._tint(color, label, span)
+        mixed = None if shares is None else self._shares(shares, label)
+        drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
+        return self._core.png(*pixels, *angles, tint, mixed, drawn)
 
-    def _tint(self, color: ArrayLike | None, label: str, span: tuple[float, float] | None) -> tuple | None:
-        if color is None:
-            return None
+    def _tint(self, color: ArrayLike, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
 
-        values = np.asarray(color, dtype=np.float64)
-        if values.shape != (self.counts[0],):
-            raise ValueError(f"color must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
+        values = self._at_vertices("color", color)
         if span is None:
             finite = values[np.isfinite(values)]
             span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
@@ -412,6 +419,35 @@ class Mesh(Picture, Transformed):
         if not -math.inf < low <= high < math.inf:
             raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
         return label, values.tolist(), (low, high if high > low else low + 1.0)
+
+    def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
+        import numpy as np
+
+        if not shares:
+            raise ValueError("shares has no names; give numbers for each vertex by at least one")
+        values = np.stack([self._at_vertices(f"shares[{name!r}]", of) for name, of in shares.items()], axis=1)
+        return label, list(shares), values.ravel().tolist()
+
+    def _at_vertices(self, what: str, given: ArrayLike) -> NDArray[np.float64]:
+        import numpy as np
+
+        values = np.asarray(given, dtype=np.float64)
+        if values.shape != (self.counts[0],):
+            raise ValueError(f"{what} must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
+        return values
+
+    def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> tuple:
+        import numpy as np
+
+        found = []
+        for kind, (name, some) in enumerate(lines.items()):
+            for line in some:
+                points = np.asarray(line, dtype=np.float64)
+                if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+                    raise ValueError(f"lines[{name!r}] must be arrays (n, 3) of finite numbers, found shape {points.shape}")
+                found.append((kind, points.tolist()))
+        wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
+        return label, list(lines), found, wide / 2
 
     def render(
         self,
@@ -422,11 +458,14 @@ class Mesh(Picture, Transformed):
         color: ArrayLike | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
+        shares: Mapping[str, ArrayLike] | None = None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
+        width: float | None = None,
     ) -> None:
         """Writes a picture to a .png file; see ``png``."""
         extension(path, ("png",))
         with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png(size, azimuth, elevation, color, label, span))
+            out.write(self.png(size, azimuth, elevation, color, label, span, shares, lines, width))
 
     def _picture(self) -> Mesh:
         return self

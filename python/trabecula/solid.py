@@ -16,9 +16,10 @@ from .formats import MESH_WRITES
 from .given import positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits, rounded_up
-from .mesh import TITLE, Mesh, Picture
+from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
+from .seen import Seen
 from .thickness import Thickness
 from .transition import Transitions
 from .voxels import Voxels
@@ -55,7 +56,7 @@ SPOOLED = 24
 SMOOTHED = 200
 
 
-class Solid(Picture):
+class Solid(Seen):
     """A region and the lattice in it. Made by ``Design.build``.
 
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
@@ -161,25 +162,6 @@ class Solid(Picture):
             raise ValueError(f"points must have shape (n, 3), found {given.shape}")
         flat = np.ascontiguousarray(given.reshape(-1, 3))
         return self._core.field(flat).reshape(given.shape[:-1])
-
-    def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
-        """Deviation of a solved map (``map.phase``) from the one asked for, at points (n, 3) in mm; arrays (n,).
-
-        ``angle``: between a grating and the wanted one, the worst of three, degrees; ``spacing``: the ratio of their spacings
-        or its inverse, the worst of three; ``density``: det J over the one asked for, cells for each cell wanted. ``lattice``
-        names the lattice; by default the first one with such a map. A ValueError where there is none.
-        """
-        import numpy as np
-
-        if lattice is None:
-            solved = (name for name, it in self.report().lattices.items() if it.distortion)
-            lattice = next(solved, None)
-            if lattice is None:
-                raise ValueError("no lattice has a map that was solved for; only map.phase can be off what was asked for")
-        given = np.asarray(points, dtype=np.float64)
-        if given.ndim != 2 or given.shape[-1] != 3:
-            raise ValueError(f"points must have shape (n, 3), found {given.shape}")
-        return self._core.map_error(lattice, np.ascontiguousarray(given))
 
     def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
         """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell``. Without a request

@@ -6,17 +6,23 @@ use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
 mod font;
+mod legend;
+mod lines;
 mod occlusion;
 mod paper;
 mod png;
 mod raster;
 mod shade;
+mod shares;
 mod tint;
 
+pub use lines::Lines;
+use lines::Tubes;
 use paper::Paper;
 pub use png::png;
-use raster::{BAND, Projected};
-use shade::Shader;
+use raster::{BAND, Projected, Raster};
+use shade::{Finish, Shader};
+pub use shares::{Colours, Shares};
 pub use tint::Tint;
 
 /// How to draw.
@@ -28,6 +34,15 @@ pub struct View {
     pub azimuth: f64,
     /// Elevation above the XY plane, degrees.
     pub elevation: f64,
+}
+
+/// What a picture shows besides the form of a surface; a legend says what is what.
+#[derive(Clone, Debug, Default)]
+pub struct Look {
+    /// The colours of the surface.
+    pub colours: Option<Colours>,
+    /// Lines, seen through the surface too. A surface without colours is pale then.
+    pub lines: Option<Lines>,
 }
 
 /// The largest picture, in pixels.
@@ -107,14 +122,14 @@ impl Camera {
 /// Draws the surface; returns RGB rows from the top.
 ///
 /// Perspective with a narrow lens, fitted to the bounds, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
-/// boundary are flat and cool; with a tint, both have its colours. The picture is the same for any number of threads. A side of 0 pixels gives no
-/// rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
-pub fn render(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>) -> Vec<u8> {
-    render_in_bands(surface, view, tint, SAMPLES)
+/// boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
+/// gives no rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
+pub fn render(surface: &SurfaceMesh, view: &View, look: &Look) -> Vec<u8> {
+    render_in_bands(surface, view, look, SAMPLES)
 }
 
 /// Draws about `samples` samples at once.
-fn render_in_bands(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>, samples: usize) -> Vec<u8> {
+fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usize) -> Vec<u8> {
     let [w, h] = view.size;
     let pixels = w.saturating_mul(h);
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
@@ -122,25 +137,58 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>, samp
     }
     let bounds = surface.mesh.bounds();
     let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
-    let mut rgb = vec![0u8; 3 * pixels];
+    let mut paper = Paper { size: [w, h], rgb: vec![0u8; 3 * pixels] };
+    let legend = legend::rows(look, &paper);
     if drawn {
         let size = [w * OVER, h * OVER];
-        let camera = Camera::new(&bounds, &surface.mesh.vertices, view, size);
-        let projected = Projected::of(surface, &camera, size);
-        let shader = Shader::new(surface, &camera, size, tint);
+        let room = [size[0], size[1] - legend::height(&legend, &paper) * OVER];
+        let camera = Camera::new(&bounds, &surface.mesh.vertices, view, room);
+        let finish = match (&look.colours, &look.lines) {
+            (Some(colours), _) => Finish::Coloured(colours),
+            (None, Some(_)) => Finish::Pale,
+            (None, None) => Finish::Plain,
+        };
+        let body = Layer::new(surface, &camera, size, finish);
+        let tubes = look.lines.as_ref().map(Tubes::of);
+        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t)));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
-        for (i, part) in rgb.chunks_mut(rows / OVER * w * 3).enumerate() {
-            let raster = projected.draw(surface, i * rows / BAND, part.len() / (3 * w) * OVER);
-            resolve(&shader.shade(&raster), view.size, i * rows / OVER, part);
+        for (i, part) in paper.rgb.chunks_mut(rows / OVER * w * 3).enumerate() {
+            let (first, count) = (i * rows / BAND, part.len() / (3 * w) * OVER);
+            let (raster, mut picture) = body.draw(first, count);
+            if let Some((over, drawn)) = lines.as_ref().map(|l| l.draw(first, count)) {
+                lines::overlay(&mut picture, &raster, &drawn, &over);
+            }
+            resolve(&picture, view.size, i * rows / OVER, part);
         }
     } else {
-        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, &mut rgb);
+        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, &mut paper.rgb);
     }
-    let Some(tint) = tint else { return rgb };
-    let mut paper = Paper { size: [w, h], rgb };
-    tint.legend(&mut paper);
+    if !legend.is_empty() {
+        legend::draw(&legend, &mut paper);
+    }
     paper.rgb
+}
+
+/// A surface in a picture.
+struct Layer<'a> {
+    surface: &'a SurfaceMesh,
+    projected: Projected,
+    shader: Shader<'a>,
+}
+
+impl<'a> Layer<'a> {
+    fn new(surface: &'a SurfaceMesh, camera: &'a Camera, size: [usize; 2], finish: Finish<'a>) -> Layer<'a> {
+        let projected = Projected::of(surface, camera, size);
+        Layer { surface, projected, shader: Shader::new(surface, camera, size, finish) }
+    }
+
+    /// What samples see, and their colours, for `rows` rows from a band on.
+    fn draw(&self, band: usize, rows: usize) -> (Raster, Vec<[f32; 4]>) {
+        let raster = self.projected.draw(self.surface, band, rows);
+        let picture = self.shader.shade(&raster);
+        (raster, picture)
+    }
 }
 
 /// Averages the samples of each pixel over the background and encodes them as sRGB, for the rows from `first` on.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
-use geometry::render::{Tint, View, png, render};
+use geometry::render::{Colours, Lines, Look, Shares, Tint, View, png, render};
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
@@ -33,6 +33,9 @@ pub struct Mesh {
     split: bool,
     design: String,
 }
+
+/// Lines of a picture: a caption, names, the number of the name and the points (mm) of each line, half their width (mm).
+type NamedLines = (String, Vec<String>, Vec<(usize, Vec<[f64; 3]>)>, f64);
 
 /// A row of the table of mesh formats.
 #[pyclass(frozen, get_all)]
@@ -318,8 +321,10 @@ impl Mesh {
         Ok(written?)
     }
 
-    /// A picture as PNG bytes; with a number at each vertex to be seen as a colour, between the two ends of a scale.
-    #[pyo3(signature = (width, height, azimuth, elevation, tint=None))]
+    /// A picture as PNG bytes: with a number at each vertex to be seen as a colour, between the two ends of a scale, or with shares of
+    /// named parts at each vertex; with named lines.
+    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn png<'py>(
         &self,
         py: Python<'py>,
@@ -328,12 +333,17 @@ impl Mesh {
         azimuth: f64,
         elevation: f64,
         tint: Option<(String, Vec<f64>, [f64; 2])>,
+        shares: Option<(String, Vec<String>, Vec<f64>)>,
+        lines: Option<NamedLines>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let size = [width, height];
-        let tint = tint.map(|(title, values, span)| Tint { title, values, span });
+        let scale = tint.map(|(title, values, span)| Colours::Scale(Tint { title, values, span }));
+        let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
+        let lines = lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius });
+        let look = Look { colours: scale.or(parts), lines };
         let bytes = run(py, None, None, |_| {
             let view = View { size, azimuth, elevation };
-            png(&render(&self.surface, &view, tint.as_ref()), size)
+            png(&render(&self.surface, &view, &look), size)
         })?;
         Ok(PyBytes::new(py, &bytes))
     }

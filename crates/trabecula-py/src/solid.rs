@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use geometry::progress::Stopped;
 use geometry::repair::Repaired;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use trabecula::analysis;
 use trabecula::design::Built;
 use trabecula::extract::{self, SpaceMade};
-use trabecula::map::Misfit;
+use trabecula::map::{Misfit, Phase};
 use trabecula::report::{
     DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
 };
@@ -41,7 +41,17 @@ impl Solid {
     pub fn new(built: Built, design: String) -> Self {
         Solid { built, design }
     }
+
+    /// The solved map of a lattice.
+    fn solved(&self, lattice: &str) -> PyResult<&Phase> {
+        let found = self.built.lattices.iter().find(|(name, _)| name == lattice);
+        let missing = || PyValueError::new_err(format!("lattice.{lattice} has no map that was solved for"));
+        found.and_then(|(_, l)| l.map.solved()).ok_or_else(missing)
+    }
 }
+
+/// Names, and a column of numbers (n, names) for each.
+type NamedColumns<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
 
 /// Name, centres (n, 3), radii (n,), ends (m, 2).
 type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
@@ -198,11 +208,7 @@ impl Solid {
         lattice: &str,
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let found = self.built.lattices.iter().find(|(name, _)| name == lattice);
-        let Some(map) = found.and_then(|(_, l)| l.map.solved()) else {
-            let message = format!("lattice.{lattice} has no map that was solved for");
-            return Err(PyValueError::new_err(message));
-        };
+        let map = self.solved(lattice)?;
         let points = arrays::points(&points)?;
         let found = run(py, None, None, |_| map.misfits(&points))?.map_err(error::fault)?;
         let array = |of: &dyn Fn(&Misfit) -> f64| {
@@ -216,6 +222,33 @@ impl Solid {
         d.set_item("spacing", array(&either))?;
         d.set_item("density", array(&|m| m.density))?;
         Ok(d)
+    }
+
+    /// The gradients (n, 3, 3) that the solved map of a lattice was asked for at points (n, 3), turns per mm.
+    fn map_asked<'py>(
+        &self,
+        py: Python<'py>,
+        lattice: &str,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let map = self.solved(lattice)?;
+        let points = arrays::points(&points)?;
+        let found = run(py, None, None, |_| map.asked(&points))?.map_err(error::fault)?;
+        let flat: Vec<f64> = found.iter().flatten().flatten().copied().collect();
+        flat.into_pyarray(py).reshape([found.len(), 3, 3])
+    }
+
+    /// The names of the lattices of a blend and their shares (n, names) at points (n, 3); None without a blend.
+    fn shares<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Option<NamedColumns<'py>>> {
+        let points = arrays::points(&points)?;
+        let Some(blended) = &self.built.blend else { return Ok(None) };
+        let n = blended.names.len();
+        let shares = run(py, None, None, |_| {
+            let mut shares = vec![0.0; n * points.len()];
+            blended.blend.weights().values(&points, &mut shares);
+            shares
+        })?;
+        Ok(Some((blended.names.clone(), shares.into_pyarray(py).reshape([points.len(), n])?)))
     }
 
     /// The grid spacing of a mesh without a request, where that of the report makes too many triangles: what is used and what the

@@ -6,11 +6,9 @@ use super::font;
 pub(super) type Colour = [u8; 3];
 /// The colour of writing.
 pub(super) const INK: Colour = [40, 40, 44];
-/// Pixels of a dot of a letter.
-const DOT: usize = 2;
-/// Pixels of a letter's height, and from one letter to the next.
-pub(super) const LETTER: usize = font::HIGH * DOT;
-pub(super) const PITCH: usize = (font::WIDE + 1) * DOT;
+
+/// Dots between letters.
+const GAP: usize = 1;
 
 /// RGB rows from the top.
 pub(super) struct Paper {
@@ -19,6 +17,21 @@ pub(super) struct Paper {
 }
 
 impl Paper {
+    /// Pixels of a dot of a letter: writing grows with the paper.
+    fn dot(&self) -> usize {
+        (self.size[0].min(self.size[1]) / 300).max(2)
+    }
+
+    /// Pixels of a letter's height, above the line that it stands on.
+    pub fn letter(&self) -> usize {
+        font::HIGH * self.dot()
+    }
+
+    /// Pixels across of a line of writing.
+    pub fn wide(&self, text: &str) -> usize {
+        text.chars().map(font::columns).map(|[first, end]| end - first + GAP).sum::<usize>() * self.dot()
+    }
+
     /// Fills a rectangle from one corner to another, clipped to the paper.
     pub fn fill(&mut self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2], colour: Colour) {
         let [w, h] = self.size;
@@ -31,16 +44,30 @@ impl Paper {
 
     /// Writes a line; `anchor` is the share of its width that lies left of x.
     pub fn write(&mut self, text: &str, x: usize, y: usize, anchor: f64, colour: Colour) {
-        let back = (text.chars().count() * PITCH) as f64 * anchor;
-        let mut x = x.saturating_sub(back as usize);
+        let dot = self.dot();
+        let mut x = x.saturating_sub((self.wide(text) as f64 * anchor) as usize);
         for letter in text.chars() {
-            for (j, row) in font::rows(letter).into_iter().enumerate() {
-                for i in (0..font::WIDE).filter(|i| row >> (font::WIDE - 1 - i) & 1 == 1) {
-                    let from = [x + i * DOT, y + j * DOT];
-                    self.fill(from, from.map(|c| c + DOT), colour);
+            let (strokes, [first, end]) = (font::strokes(letter), font::columns(letter));
+            for j in (0..font::DEEP * dot).filter(|_| !strokes.is_empty()) {
+                for i in 0..(end - first) * dot {
+                    let at = [first * dot + i, j].map(|c| (c as f32 + 0.5) / dot as f32);
+                    let off = strokes.iter().fold(f32::INFINITY, |m, s| m.min(font::distance(at, s)));
+                    // Strokes are a dot wide, with edges of a pixel.
+                    self.blend([x + i, y + j], colour, (0.5 - off) * dot as f32 + 0.5);
                 }
             }
-            x += PITCH;
+            x += (end - first + GAP) * dot;
+        }
+    }
+
+    /// Mixes a colour into a pixel, by the share of it that is covered.
+    fn blend(&mut self, [x, y]: [usize; 2], colour: Colour, cover: f32) {
+        let [w, h] = self.size;
+        if x < w && y < h && cover > 0.0 {
+            let pixel = &mut self.rgb[3 * (y * w + x)..][..3];
+            for (p, c) in pixel.iter_mut().zip(colour) {
+                *p = (f32::from(*p) + cover.min(1.0) * (f32::from(c) - f32::from(*p))).round() as u8;
+            }
         }
     }
 }
@@ -53,4 +80,41 @@ pub(super) fn short(v: f64) -> String {
     let digits = (2 - v.abs().log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{v:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+#[cfg(test)]
+impl Paper {
+    pub fn blank(size: [usize; 2]) -> Paper {
+        Paper { size, rgb: vec![255; 3 * size[0] * size[1]] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Letters keep to their width, differ from each other, and grow with the paper.
+    #[test]
+    fn letters_are_seen_and_differ() {
+        let letters: Vec<char> = ('0'..='9').chain('a'..='z').chain('A'..='Z').chain("._-%,:()/+=°".chars()).collect();
+        for size in [[60, 60], [900, 1200]] {
+            let drawn = |letter: char| {
+                let mut paper = Paper::blank(size);
+                paper.write(&letter.to_string(), 20, 20, 0.0, INK);
+                let dark = |i: usize| paper.rgb[3 * i] < 250;
+                let [right, below] = [20 + paper.wide(&letter.to_string()), 20 + font::DEEP * paper.dot()];
+                assert!(
+                    (0..size[0] * size[1])
+                        .filter(|i| dark(*i))
+                        .all(|i| { (20..right).contains(&(i % size[0])) && (20..below).contains(&(i / size[0])) })
+                );
+                assert!((0..size[0] * size[1]).any(|i| paper.rgb[3 * i] == INK[0]), "{letter}");
+                paper.rgb
+            };
+            let all: Vec<Vec<u8>> = letters.iter().map(|l| drawn(*l)).collect();
+            for (i, one) in all.iter().enumerate() {
+                assert!(!all[..i].contains(one), "{}", letters[i]);
+            }
+        }
+    }
 }

@@ -4,15 +4,31 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use super::lines::Tubes;
 use super::occlusion::Occlusion;
 use super::raster::{NONE, Projected, Raster, weights};
-use super::{Camera, Tint, View};
+use super::{Camera, Colours, View};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
 /// Colours in linear light.
 const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];
 const CUT: [f32; 3] = [0.27, 0.38, 0.52];
+/// Of lattice and of cuts where there are lines.
+const PALE: [[f32; 3]; 2] = [[0.80, 0.79, 0.77], [0.66, 0.68, 0.70]];
+
+/// What a surface is made of.
+#[derive(Clone, Copy)]
+pub(super) enum Finish<'a> {
+    /// The lattice warm, cuts cool.
+    Plain,
+    /// Both nearly white.
+    Pale,
+    /// In given colours.
+    Coloured(&'a Colours),
+    /// Lines, which throw no shadows.
+    Lines(&'a Tubes),
+}
 
 /// Background of the picture at a place from the left and from the top, 0 to 1.
 pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
@@ -25,12 +41,11 @@ pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
 pub(super) struct Shader<'a> {
     surface: &'a SurfaceMesh,
     camera: &'a Camera,
-    tint: Option<&'a Tint>,
+    finish: Finish<'a>,
     normals: Normals,
     /// The direction to the key light.
     key: Vec3,
-    shadows: Shadows,
-    occlusion: Occlusion,
+    shade: Option<(Shadows, Occlusion)>,
 }
 
 impl<'a> Shader<'a> {
@@ -39,18 +54,14 @@ impl<'a> Shader<'a> {
         surface: &'a SurfaceMesh,
         camera: &'a Camera,
         size: [usize; 2],
-        tint: Option<&'a Tint>,
+        finish: Finish<'a>,
     ) -> Shader<'a> {
         let key = towards(camera, -0.55, 0.75, 0.60);
-        Shader {
-            surface,
-            camera,
-            tint,
-            normals: Normals::of(surface),
-            key,
-            shadows: Shadows::cast(surface, key),
-            occlusion: Occlusion::of(surface, camera, size),
-        }
+        let shade = match finish {
+            Finish::Lines(_) => None,
+            _ => Some((Shadows::cast(surface, key), Occlusion::of(surface, camera, size))),
+        };
+        Shader { surface, camera, finish, normals: Normals::of(surface), key, shade }
     }
 
     /// Premultiplied colour and cover of each sample.
@@ -84,16 +95,18 @@ impl<'a> Shader<'a> {
         if dot(flat, eye) < 0.0 {
             n = scale(n, -1.0);
         }
-        let colour = match self.tint {
-            Some(tint) => {
-                let value = |i: usize| tint.values.get(t[i]).copied().unwrap_or(f64::NAN);
-                tint.colour((0..3).map(|i| k[i] * value(i)).sum())
-            }
-            None if cut => CUT,
-            None => LATTICE,
+        let colour = match self.finish {
+            Finish::Coloured(colours) => colours.at(t, k),
+            Finish::Lines(tubes) => tubes.colour(t[0]),
+            Finish::Pale => PALE[usize::from(cut)],
+            Finish::Plain if cut => CUT,
+            Finish::Plain => LATTICE,
         };
-        let sun = self.shadows.light(p, flat);
-        lit([n, eye, self.key], sun, camera, colour, self.occlusion.open(x, y, near), cut)
+        let (sun, open) = match &self.shade {
+            Some((shadows, occlusion)) => (shadows.light(p, flat), occlusion.open(x, y, near)),
+            None => (1.0, 1.0),
+        };
+        lit([n, eye, self.key], sun, camera, colour, open, cut)
     }
 }
 

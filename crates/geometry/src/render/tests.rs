@@ -61,15 +61,15 @@ fn gyroid(cells: f64) -> impl Fn(Vec3) -> f64 {
     }
 }
 
-const VIEW: View = View { size: [160, 120], azimuth: 35.0, elevation: 25.0 };
+const VIEW: View = View { size: [200, 150], azimuth: 35.0, elevation: 25.0 };
 
 #[test]
 fn nothing_gives_the_background() {
-    let rgb = render(&SurfaceMesh::default(), &VIEW, None);
-    assert_eq!(rgb.len(), 160 * 120 * 3);
+    let rgb = render(&SurfaceMesh::default(), &VIEW, &Look::default());
+    assert_eq!(rgb.len(), 200 * 150 * 3);
     assert!(rgb.iter().all(|v| *v > 200));
-    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, None).is_empty());
-    assert!(render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, None).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, &Look::default()).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, &Look::default()).is_empty());
 }
 
 #[test]
@@ -79,16 +79,17 @@ fn one_triangle_fills_what_it_should() {
     // Seen along −x it is half of a square that fills 92 % of the height.
     let s = SurfaceMesh { mesh, cut: vec![false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200] };
-    let (with, without) = (render(&s, &view, None), render(&SurfaceMesh::default(), &view, None));
+    let (with, without) =
+        (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
     let pixels = with.chunks(3).zip(without.chunks(3)).filter(|(a, b)| a != b).count() as f64;
     let want = 0.5 * (0.92f64 * 200.0).powi(2);
     assert!((pixels / want - 1.0).abs() < 0.02, "{pixels} {want}");
     // Every side sees something, even the back of an open mesh, a point, and a number that is none.
     for azimuth in [90.0, 180.0, f64::NAN] {
-        assert_eq!(render(&s, &View { azimuth, ..view }, None).len(), 200 * 200 * 3);
+        assert_eq!(render(&s, &View { azimuth, ..view }, &Look::default()).len(), 200 * 200 * 3);
     }
     let point = SurfaceMesh { mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0, 0, 0]] }, cut: vec![] };
-    assert_eq!(render(&point, &view, None), without);
+    assert_eq!(render(&point, &view, &Look::default()), without);
 }
 
 #[test]
@@ -101,8 +102,8 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
     let s = SurfaceMesh { mesh, cut: vec![true, true, false, false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60] };
     let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
-    let front = middle(render(&s, &view, None));
-    let back = middle(render(&s, &View { azimuth: 180.0, ..view }, None));
+    let front = middle(render(&s, &view, &Look::default()));
+    let back = middle(render(&s, &View { azimuth: 180.0, ..view }, &Look::default()));
     assert!(front[2] > front[0], "the cut is bluish: {front:?}");
     assert!(back[0] > back[2], "the lattice is warm: {back:?}");
 }
@@ -110,9 +111,9 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
 #[test]
 fn bands_do_not_show() {
     let s = contour(24, gyroid(2.0));
-    let one = render(&s, &VIEW, None);
-    assert_eq!(render_in_bands(&s, &VIEW, None, 1), one);
-    assert_eq!(render_in_bands(&s, &VIEW, None, 2 * BAND * VIEW.size[0] * OVER), one);
+    let one = render(&s, &VIEW, &Look::default());
+    assert_eq!(render_in_bands(&s, &VIEW, &Look::default(), 1), one);
+    assert_eq!(render_in_bands(&s, &VIEW, &Look::default(), 2 * BAND * VIEW.size[0] * OVER), one);
 }
 
 /// An inclined edge runs through pixels that have part of both sides, in large pictures as in small ones.
@@ -123,7 +124,8 @@ fn edges_are_smooth_at_any_size() {
     let s = SurfaceMesh { mesh, cut: vec![true] };
     for size in [[200, 150], [2400, 1800]] {
         let view = View { azimuth: 0.0, elevation: 0.0, size };
-        let (with, without) = (render(&s, &view, None), render(&SurfaceMesh::default(), &view, None));
+        let (with, without) =
+            (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
         let level = |y: usize, x: usize| i32::from(with[3 * (y * size[0] + x)]);
         // In each row, the pixels between the background and the first that is like its right neighbour.
         let blended = |y: usize| {
@@ -144,7 +146,104 @@ fn the_number_of_threads_does_not_show() {
     let (Ok(one), Ok(many)) = (one, many) else {
         return;
     };
-    assert_eq!(one.install(|| render(&s, &VIEW, None)), many.install(|| render(&s, &VIEW, None)));
+    assert_eq!(
+        one.install(|| render(&s, &VIEW, &Look::default())),
+        many.install(|| render(&s, &VIEW, &Look::default()))
+    );
+}
+
+/// A block from [0, 0, 0] to [3, 2, 2], cut all over.
+fn block() -> SurfaceMesh {
+    let corner = |i: usize| [0, 1, 2].map(|a| [3.0, 2.0, 2.0][a] * ((i >> a) & 1) as f64);
+    let quads: [[u32; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    let cut = vec![true; triangles.len()];
+    SurfaceMesh { mesh: Mesh { vertices: (0..8).map(corner).collect(), triangles }, cut }
+}
+
+fn pixel(rgb: &[u8], [x, y]: [f64; 2]) -> [i32; 3] {
+    let at = 3 * (y as usize * VIEW.size[0] + x as usize);
+    [0, 1, 2].map(|k| i32::from(rgb[at + k]))
+}
+
+/// A line changes the picture along its projection and nowhere else, in its colour; it is stronger before the surface than behind it.
+#[test]
+fn lines_are_where_they_are_projected() {
+    let s = block();
+    let camera = Camera::new(&s.mesh.bounds(), &s.mesh.vertices, &VIEW, VIEW.size);
+    let place = |p: Vec3| camera.project(p);
+    let look = |lines: Vec<(usize, Vec<Vec3>)>| Look {
+        lines: Some(Lines { lines, names: Vec::new(), caption: String::new(), radius: 0.06 }),
+        ..Look::default()
+    };
+    let bare = render(&s, &VIEW, &look(Vec::new()));
+    let inside = vec![[0.4, 0.5, 0.6], [1.6, 1.5, 0.7], [2.6, 0.6, 1.5]];
+    // Towards the eye from the block.
+    let before: Vec<Vec3> = inside.iter().map(|p| add(*p, scale(camera.axes[2], 4.0))).collect();
+    let mut red = Vec::new();
+    for line in [&inside, &before] {
+        let drawn = render(&s, &VIEW, &look(vec![(0, line.clone())]));
+        let along: Vec<[f64; 3]> = line
+            .windows(2)
+            .flat_map(|p| (0..=200).map(|i| add(p[0], scale(sub(p[1], p[0]), f64::from(i) / 200.0))))
+            .map(place)
+            .collect();
+        for (i, (a, b)) in drawn.chunks(3).zip(bare.chunks(3)).enumerate().filter(|(_, (a, b))| a != b) {
+            let (x, y) = ((i % VIEW.size[0]) as f64 + 0.5, (i / VIEW.size[0]) as f64 + 0.5);
+            // Within the tube's projection and the pixel's half diagonal.
+            let near = along.iter().any(|p| (p[0] - x).hypot(p[1] - y) < 0.06 * camera.focal * p[2] + 0.75);
+            assert!(near, "{x} {y}: {b:?} became {a:?}");
+        }
+        let middle = place(scale(add(line[0], line[1]), 0.5));
+        let [r, g, b] = pixel(&drawn, [middle[0], middle[1]]);
+        assert!(r > g + 30 && r > b + 30, "{r} {g} {b}");
+        red.push(r - g);
+    }
+    assert!(red[1] > red[0] + 20, "{red:?}");
+}
+
+/// A surface with one part alone has one colour, two parts have theirs where they are, and half of each is between them.
+#[test]
+fn shares_are_mixtures() {
+    let s = block();
+    let shares = |of: &dyn Fn(Vec3) -> f64| {
+        let values = s.mesh.vertices.iter().flat_map(|p| [1.0 - of(*p), of(*p)]).collect();
+        let names = vec!["first".into(), "second".into()];
+        let colours = Some(Colours::Shares(Shares { title: String::new(), names, values }));
+        render(&s, &VIEW, &Look { colours, lines: None })
+    };
+    let empty = render(&SurfaceMesh::default(), &VIEW, &Look::default());
+    let [first, second, half] = [0.0, 1.0, 0.5].map(|share| shares(&|_| share));
+    let both = shares(&|p| f64::from(p[0] > 1.5));
+    // Both names, one below the other.
+    let foot = VIEW.size[1] - 56;
+    let mut seen = [0; 2];
+    for i in (0..foot * VIEW.size[0]).filter(|i| first[3 * i..3 * i + 3] != empty[3 * i..3 * i + 3]) {
+        let of = |rgb: &[u8]| [0, 1, 2].map(|k| i32::from(rgb[3 * i + k]));
+        let ([r, _, b], [s, _, c]) = (of(&first), of(&second));
+        assert!(b >= r && s >= c, "{:?} {:?}", of(&first), of(&second));
+        for k in 0..3 {
+            let ends = [of(&first)[k], of(&second)[k]];
+            assert!(ends[0].min(ends[1]) <= of(&half)[k] && of(&half)[k] <= ends[0].max(ends[1]));
+        }
+        let far = |rgb: &[u8]| of(&both).iter().zip(of(rgb)).map(|(a, b)| (a - b).abs()).sum::<i32>();
+        seen[usize::from(far(&first) > far(&second))] += 1;
+    }
+    assert!(seen.iter().all(|n| *n > 100), "{seen:?}");
+}
+
+/// The part stays clear of the legend.
+#[test]
+fn legends_have_room() {
+    let look = |caption: &str| Look {
+        lines: Some(Lines { names: vec!["One".into()], caption: caption.into(), ..Lines::default() }),
+        ..Look::default()
+    };
+    let (with, without) = (render(&block(), &VIEW, &look("two")), render(&SurfaceMesh::default(), &VIEW, &look("two")));
+    // Two rows of 14 pixels, half as much between and about them.
+    let foot = (VIEW.size[1] - 56) * VIEW.size[0] * 3;
+    assert!(with[foot..] == without[foot..] && with[..foot] != without[..foot]);
+    assert_ne!(render(&block(), &VIEW, &look("three")), with);
 }
 
 #[test]
@@ -156,7 +255,7 @@ fn gallery() {
     {
         let view = View { size: [1200, 900], azimuth: 35.0, elevation: 28.0 };
         let t = std::time::Instant::now();
-        let rgb = render(&s, &view, None);
+        let rgb = render(&s, &view, &Look::default());
         let drawn = t.elapsed();
         let file = png(&rgb, view.size);
         println!(

@@ -1,12 +1,12 @@
 //! A number on the surface as its colour, and the scale that tells which is which.
 
 use super::encode;
-use super::paper::{INK, LETTER, Paper, short};
+use super::paper::{INK, Paper, short};
 
 /// A number at each vertex, to be seen as a colour.
 #[derive(Clone, Debug)]
 pub struct Tint {
-    /// What it is, in small letters.
+    /// What it is.
     pub title: String,
     /// The number at each vertex; grey where it is not finite.
     pub values: Vec<f64>,
@@ -35,29 +35,23 @@ impl Tint {
         })
     }
 
-    /// Draws the scale along the foot of a picture.
-    pub(super) fn legend(&self, paper: &mut Paper) {
-        let [w, h] = paper.size;
-        let wide = w / 3;
-        if wide < 60 || h < 8 * LETTER {
-            return;
-        }
-        let (left, top) = (w / 3, h - 4 * LETTER);
+    /// Draws the scale at a height, the numbers to either side.
+    pub(super) fn scale(&self, paper: &mut Paper, y: usize) {
+        let (w, letter) = (paper.size[0], paper.letter());
+        let (wide, left) = (2 * w / 5, 3 * w / 10);
         for x in 0..wide {
             let share = (x as f64 + 0.5) / wide as f64;
             let value = self.span[0] + share * (self.span[1] - self.span[0]);
             let colour = self.colour(value).map(encode);
-            paper.fill([left + x, top], [left + x + 1, top + LETTER], colour);
+            paper.fill([left + x, y], [left + x + 1, y + letter], colour);
         }
-        let below = top + LETTER + LETTER / 2;
-        paper.write(&short(self.span[0]), left, below, 0.5, INK);
-        paper.write(&short(self.span[1]), left + wide, below, 0.5, INK);
-        paper.write(&self.title, left + wide / 2, below, 0.5, INK);
+        paper.write(&short(self.span[0]), left - letter / 2, y, 1.0, INK);
+        paper.write(&short(self.span[1]), left + wide + letter / 2, y, 0.0, INK);
     }
 }
 
 /// An sRGB byte as linear light.
-fn decode(v: u8) -> f32 {
+pub(super) fn decode(v: u8) -> f32 {
     let s = f32::from(v) / 255.0;
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }

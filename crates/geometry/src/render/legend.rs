@@ -1,0 +1,134 @@
+//! The legend at the foot of a picture: rows of a scale, of names with their colours, of words.
+
+use super::paper::{Colour, INK, Paper};
+use super::{Look, Tint};
+
+/// Colours of areas and of lines by number, in sRGB: those of Okabe and Ito (2008), which all eyes tell apart. Complementary ones come first
+/// for areas, whose mixtures then are grey; red, green and blue for lines.
+pub(super) const AREAS: [Colour; 7] =
+    [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0], [240, 228, 66]];
+pub(super) const LINES: [Colour; 7] =
+    [[213, 40, 0], [0, 158, 115], [0, 90, 190], [230, 159, 0], [170, 60, 150], [86, 180, 233], [90, 60, 40]];
+
+/// The colour of a number; those beyond the last come again, lighter each time.
+pub(super) fn colour(of: &[Colour], i: usize) -> Colour {
+    let fade = 1.0 - 0.6f64.powi((i / of.len()) as i32);
+    of[i % of.len()].map(|c| (f64::from(c) + fade * (255.0 - f64::from(c))) as u8)
+}
+
+/// A row of a legend.
+pub(super) enum Row<'a> {
+    /// A scale with the numbers at its ends.
+    Scale(&'a Tint),
+    /// Names, each with a patch of its colour before it.
+    Names(Vec<(&'a str, Colour)>),
+    /// Words.
+    Words(&'a str),
+}
+
+/// A row of a letter's height and the gap below it, in half letters.
+const ROW: usize = 3;
+
+/// The rows for a picture, from the top; none where it is too small for them.
+pub(super) fn rows<'a>(look: &'a Look, paper: &Paper) -> Vec<Row<'a>> {
+    let mut found = Vec::new();
+    if paper.size[0] < 180 || paper.size[1] < 8 * paper.letter() {
+        return found;
+    }
+    if let Some(colours) = &look.colours {
+        colours.legend(paper, &mut found);
+    }
+    if let Some(lines) = &look.lines {
+        found.extend(names(lines.names.iter().map(String::as_str), &LINES, paper));
+        found.extend(words(&lines.caption));
+    }
+    if height(&found, paper) > paper.size[1] / 2 {
+        found.clear();
+    }
+    found
+}
+
+/// Words, if there are some.
+pub(super) fn words(text: &str) -> Option<Row<'_>> {
+    (!text.is_empty()).then_some(Row::Words(text))
+}
+
+/// Names in as many rows as they need.
+pub(super) fn names<'a>(names: impl Iterator<Item = &'a str>, palette: &[Colour], paper: &Paper) -> Vec<Row<'a>> {
+    let mut made: Vec<Vec<(&str, Colour)>> = Vec::new();
+    for (i, name) in names.enumerate() {
+        let entry = (name, colour(palette, i));
+        match made.last_mut() {
+            Some(row) if wide(row, paper) + entry_wide(name, paper) < paper.size[0] * 9 / 10 => row.push(entry),
+            _ => made.push(vec![entry]),
+        }
+    }
+    made.into_iter().map(Row::Names).collect()
+}
+
+/// Pixels across of a name with its patch and the gap behind it.
+fn entry_wide(name: &str, paper: &Paper) -> usize {
+    paper.wide(name) + 5 * paper.letter() / 2
+}
+
+fn wide(row: &[(&str, Colour)], paper: &Paper) -> usize {
+    row.iter().map(|(name, _)| entry_wide(name, paper)).sum()
+}
+
+/// Pixels of the foot of a picture that the rows take.
+pub(super) fn height(rows: &[Row], paper: &Paper) -> usize {
+    if rows.is_empty() { 0 } else { (rows.len() * ROW + 2) * paper.letter() / 2 }
+}
+
+/// Draws the rows.
+pub(super) fn draw(rows: &[Row], paper: &mut Paper) {
+    let [w, h] = paper.size;
+    let letter = paper.letter();
+    let mut y = h.saturating_sub(height(rows, paper)) + letter / 2;
+    for row in rows {
+        match row {
+            Row::Words(text) => paper.write(text, w / 2, y, 0.5, INK),
+            Row::Scale(tint) => tint.scale(paper, y),
+            Row::Names(entries) => {
+                let mut x = (w + letter).saturating_sub(wide(entries, paper)) / 2;
+                for (name, colour) in entries {
+                    paper.fill([x, y], [x + letter, y + letter], *colour);
+                    paper.write(name, x + 3 * letter / 2, y, 0.0, INK);
+                    x += entry_wide(name, paper);
+                }
+            }
+        }
+        y += ROW * letter / 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_differ_however_many_there_are() {
+        for of in [AREAS, LINES] {
+            let all: Vec<Colour> = (0..4 * of.len()).map(|i| colour(&of, i)).collect();
+            assert_eq!(all[..of.len()], of);
+            let same = all.iter().enumerate().find(|(i, c)| all[..*i].contains(c));
+            assert!(same.is_none(), "{same:?}");
+        }
+    }
+
+    /// Names wrap within the paper, each with its patch.
+    #[test]
+    fn names_stay_on_the_paper() {
+        let mut paper = Paper::blank([400, 300]);
+        let many: Vec<String> = (0..9).map(|i| format!("lattice number {i}")).collect();
+        let rows = names(many.iter().map(String::as_str), &AREAS, &paper);
+        assert!(rows.len() > 2);
+        draw(&rows, &mut paper);
+        for i in 0..many.len() {
+            let patch = paper.rgb.chunks(3).filter(|p| *p == colour(&AREAS, i)).count();
+            assert_eq!(patch, paper.letter().pow(2), "{i}");
+        }
+        let border = (0..300).flat_map(|y| [3 * 400 * y, 3 * (400 * y + 399)]);
+        assert!(border.into_iter().all(|at| paper.rgb[at..at + 3] == [255; 3]));
+    }
+}

@@ -1,0 +1,98 @@
+"""What a solid is by the point, solved maps and blends, and pictures of that."""
+
+from __future__ import annotations
+
+import os
+
+from .mesh import Mesh, Picture
+from .shown import look, towards
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from . import _core
+    from .reports import DesignReport
+
+__all__ = ["Seen"]
+
+
+class Seen(Picture):
+    """Solids that say what they are at points, and show it."""
+
+    _core: _core.Solid
+
+    def report(self) -> DesignReport:
+        raise NotImplementedError
+
+    def mesh(self, edge: float | None = None, per_cell: float | None = None, threads: int | None = None) -> Mesh:
+        raise NotImplementedError
+
+    def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
+        """Deviation of a solved map (``map.phase``) from the one asked for, at points (n, 3) in mm; arrays (n,).
+
+        ``angle``: between a grating and the wanted one, the worst of three, degrees; ``spacing``: the ratio of their spacings
+        or its inverse, the worst of three; ``density``: det J over the one asked for, cells for each cell wanted. ``lattice``
+        names the lattice; by default the first one with such a map. A ValueError where there is none.
+        """
+        return self._core.map_error(self._solved(lattice), _points(points))
+
+    def map_asked(self, points: ArrayLike, lattice: str | None = None) -> NDArray[np.float64]:
+        """The gradients Kᵢ that a solved map (``map.phase``) is asked for, at points (n, 3) in mm; an array (n, 3, 3).
+
+        Row i is the direction along which cells follow each other on their axis i, as long as there are cells on a mm;
+        directions without a sign, such as principal ones, have that of the grid's nodes about them. ``lattice`` as for
+        ``map_error``.
+        """
+        return self._core.map_asked(self._solved(lattice), _points(points))
+
+    def shares(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """The share of each lattice of a blend at points (n, 3) in mm, 0 to 1, together 1; an array (n,) by each name.
+
+        A ValueError without a blend.
+        """
+        found = self._core.shares(_points(points))
+        if found is None:
+            raise ValueError("the design has no blend: one lattice is everywhere")
+        return dict(zip(found[0], found[1].T, strict=True))
+
+    def render(
+        self,
+        path: str | os.PathLike[str],
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        show: str | None = None,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        threads: int | None = None,
+    ) -> None:
+        """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file; the camera as for ``Mesh.png``.
+
+        ``show`` is what it shows beside the form. Of a solved map (``map.phase``): ``angle``, ``spacing``, ``density``, the
+        deviation from the one asked for, see ``map_error``; ``axes``, the directions asked for, at places on the region's
+        surface; ``trajectories``, lines along them on that surface; ``singularities``, the lines round which they do not come
+        back to themselves. Of a blend: ``lattice``, which lattice is where. A ValueError where the design has none.
+        """
+        seen = None if show is None else look(self, show)
+        made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
+        made.render(path, size, azimuth, elevation, **(seen(made, towards(azimuth, elevation)) if seen else {}))
+
+    def _solved(self, lattice: str | None) -> str:
+        """The lattice of that name, or else the first whose map was solved for."""
+        if lattice is not None:
+            return lattice
+        for name, it in self.report().lattices.items():
+            if it.distortion:
+                return name
+        raise ValueError("no lattice has a map that was solved for; only map.phase is")
+
+
+def _points(points: ArrayLike) -> NDArray[np.float64]:
+    import numpy as np
+
+    given = np.asarray(points, dtype=np.float64)
+    if given.ndim != 2 or given.shape[-1] != 3:
+        raise ValueError(f"points must have shape (n, 3), found {given.shape}")
+    return np.ascontiguousarray(given)

@@ -1,0 +1,157 @@
+"""What pictures of a solid show besides form: deviations, axes and singular lines of a solved map, lattices of a blend."""
+
+from __future__ import annotations
+
+import math
+
+from .trajectories import trajectories
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    from .mesh import Mesh
+    from .solid import Solid
+
+    #: Of a mesh of the solid and the direction to the eye: the arguments of ``Mesh.png`` that show it.
+    Look = Callable[[Mesh, tuple[float, float, float]], dict[str, Any]]
+
+__all__ = ["SHOWN", "look", "towards"]
+
+#: Places of axes, and trajectories, along the diagonal of the part.
+PLACES, LINES = 24, 30
+#: Length and width of the bars of axes, in distances between places; widths of trajectories and singular lines, in diagonals.
+LONG, THICK, THIN, STRONG = 0.78, 0.1, 0.005, 0.013
+
+
+def _error(key: str, label: str) -> Callable[[Solid], Look]:
+    def prepared(solid: Solid) -> Look:
+        name = solid._solved(None)
+        return lambda mesh, _: {"color": solid.map_error(mesh.vertices, name)[key], "label": label}
+
+    return prepared
+
+
+def _lattices(solid: Solid) -> Look:
+    solid.shares([solid.bounds[0]])
+    return lambda mesh, _: {"shares": solid.shares(mesh.vertices), "label": "which lattice is where"}
+
+
+def _singularities(solid: Solid) -> Look:
+    solid._solved(None)
+    found = [line for it in solid.report().lattices.values() for line in it.singular or []]
+    turns = sorted({line.turn for line in found})
+    lines = {f"axes turned by {turn:.0f}°": [_eased(it.points) for it in found if it.turn == turn] for turn in turns}
+    total = sum(line.length for line in found)
+    word = "line" if len(found) == 1 else "lines"
+    caption = f"{len(found)} singular {word}, {total:.1f} mm" if found else "no singular lines"
+    return lambda *_: {"lines": lines, "label": caption, "width": STRONG * _diagonal(solid)}
+
+
+def _axes(solid: Solid) -> Look:
+    import numpy as np
+
+    name = solid._solved(None)
+
+    def drawn(_: Mesh, eye: tuple[float, float, float]) -> dict[str, Any]:
+        step = _diagonal(solid) / PLACES
+        places = _seen(solid, eye, step)
+        asked = solid.map_asked(places, name) if len(places) else np.zeros((0, 3, 3))
+        half = 0.5 * LONG * step * asked / np.linalg.norm(asked, axis=2, keepdims=True)
+        bars = {"xyz"[i]: [np.stack([p - h, p + h]) for p, h in zip(places, half[:, i], strict=True)] for i in range(3)}
+        return {"lines": bars, "label": "axes asked for", "width": THICK * step}
+
+    return drawn
+
+
+def _trajectories(solid: Solid) -> Look:
+    import numpy as np
+
+    name, region = solid._solved(None), solid._core.region
+
+    def axes(points: NDArray) -> NDArray:
+        # Steps and differences may reach a little beyond the bounds, where there is no map.
+        asked = solid.map_asked(np.clip(points, *solid.bounds), name)
+        return asked / np.linalg.norm(asked, axis=2, keepdims=True)
+
+    def drawn(_: Mesh, eye: tuple[float, float, float]) -> dict[str, Any]:
+        step = _diagonal(solid) / LINES
+        found = trajectories(_seen(solid, eye, 0.5 * step), step, axes, region.distance, eye)
+        lines = dict(zip("xyz", found, strict=True))
+        return {"lines": lines, "label": "trajectories of the axes asked for", "width": THIN * _diagonal(solid)}
+
+    return drawn
+
+
+#: What can be shown: of a solid (a ValueError where it has none) the look of its meshes.
+SHOWN: dict[str, Callable[[Solid], Look]] = {
+    "angle": _error("angle", "angle off, degrees"),
+    "spacing": _error("spacing", "spacing off, ratio"),
+    "density": _error("density", "cells for each one asked for"),
+    "axes": _axes,
+    "trajectories": _trajectories,
+    "singularities": _singularities,
+    "lattice": _lattices,
+}
+
+
+def look(solid: Solid, show: str) -> Look:
+    """The look of meshes of a solid that shows ``show``; a ValueError where the solid has none, or there is no such thing."""
+    if show not in SHOWN:
+        raise ValueError(f'show is "{show}"; it must be one of {", ".join(SHOWN)}')
+    return SHOWN[show](solid)
+
+
+def towards(azimuth: float, elevation: float) -> tuple[float, float, float]:
+    """The direction to the eye of a picture, a unit vector."""
+    az, el = math.radians(azimuth), math.radians(max(-90.0, min(elevation, 90.0)))
+    return math.cos(az) * math.cos(el), math.sin(az) * math.cos(el), math.sin(el)
+
+
+def _diagonal(solid: Solid) -> float:
+    return math.dist(*solid.bounds)
+
+
+def _seen(solid: Solid, eye: tuple[float, float, float], step: float) -> NDArray:
+    """Places on the region's surface that the eye sees, ``step`` (mm) apart in the picture, by sphere tracing."""
+    import numpy as np
+
+    low, high = np.asarray(solid.bounds)
+    out = np.asarray(eye)
+    right = np.cross([0.0, 0.0, 1.0], out) if abs(out[2]) < 1 - 1e-9 else np.array([0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(out, right)
+    reach = 0.5 * _diagonal(solid)
+    count = math.ceil(2 * reach / step)
+    ticks = (np.arange(count) + 0.5 - count / 2) * step
+    across, above = (v.ravel() for v in np.meshgrid(ticks, ticks))
+    rays = (low + high) / 2 + reach * out + across[:, None] * right + above[:, None] * up
+    passed, close = np.zeros(len(rays)), 1e-4 * reach
+    running = np.arange(len(rays))
+    # The distance never exceeds the true one: no step passes the surface.
+    for _ in range(400):
+        if not len(running):
+            break
+        distance = solid._core.region.distance(rays[running] - passed[running, None] * out)
+        passed[running] += np.maximum(distance, 0.0)
+        running = running[(distance > close) & (passed[running] < 2 * reach)]
+    places = rays - passed[:, None] * out
+    inside = np.all((places >= low - close) & (places <= high + close), axis=1) & (passed < 2 * reach)
+    return np.clip(places[inside], low, high)
+
+
+def _eased(points: list[list[float]]) -> NDArray:
+    """A line through faces of a grid without the grid's stairs: the mean of neighbours, some times; ends stay."""
+    import numpy as np
+
+    line = np.asarray(points)
+    closed = len(line) > 2 and np.array_equal(line[0], line[-1])
+    for _ in range(6):
+        ends = (line[-2:-1], line[1:2]) if closed else (line[:1], line[-1:])
+        around = np.concatenate([ends[0], line, ends[1]])
+        eased = 0.25 * around[:-2] + 0.5 * around[1:-1] + 0.25 * around[2:]
+        line = eased if closed else np.concatenate([line[:1], eased[1:-1], line[-1:]])
+    return line

@@ -1,0 +1,220 @@
+"""What pictures show beside the form: axes and singular lines of solved maps, the lattices of a blend."""
+
+import zlib
+
+import numpy as np
+import pytest
+import trabecula as lt
+from trabecula.shown import SHOWN, look, towards
+from trabecula.trajectories import trajectories
+
+EYE = (30, 40)
+
+
+def solid(map=None, region=None, **more):
+    core = lt.Lattice(cell="gyroid", part="sheet", map=map or lt.map.affine(wavelength=4), level=lt.level.fraction(0.3))
+    region = region or lt.region.box(min=[0, 0, 0], max=[12, 10, 8])
+    return lt.Design(region=region, lattice={"core": core, **more.pop("lattice", {})}, **more).build()
+
+
+def half_disclination():
+    """The stress x, -x, y of a half disclination at (5.3, 4.6), along z."""
+    stress = [lt.grade.formula(f) for f in ("x - 5.3", "5.3 - x", "-20", "0", "0", "y - 4.6")]
+    with pytest.warns(lt.DesignWarning):
+        return solid(lt.map.phase(wavelength=3, stress=stress, folds=True))
+
+
+def blended():
+    rim = lt.Lattice(cell="primitive", part="upper", map=lt.map.affine(wavelength=4), level=lt.level.fraction(0.3))
+    ramp = lt.grade.formula("(x - 3)/6")
+    return solid(lattice={"rim": rim}, blend=lt.blend.between("core", "rim", ramp))
+
+
+def pixels(png):
+    """The colours (rows, columns, 3) of a PNG of 8 bits, RGB."""
+    at, packed = 8, b""
+    while at < len(png):
+        size, kind = int.from_bytes(png[at : at + 4], "big"), png[at + 4 : at + 8]
+        if kind == b"IHDR":
+            wide, high = (int.from_bytes(png[at + 8 + i : at + 12 + i], "big") for i in (0, 4))
+        packed += png[at + 8 : at + 8 + size] if kind == b"IDAT" else b""
+        at += 12 + size
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(high, 1 + 3 * wide)
+    made = np.zeros((high + 1, wide + 1, 3), int)
+    for y, (kind, *row) in enumerate(rows.tolist(), 1):
+        given = np.reshape(row, (wide, 3))
+        for x in range(1, wide + 1):
+            left, above, corner = made[y, x - 1], made[y - 1, x], made[y - 1, x - 1]
+            guess = left + above - corner
+            off = np.abs([guess - left, guess - above, guess - corner])
+            nearest = np.where((off[0] <= off[1]) & (off[0] <= off[2]), left, np.where(off[1] <= off[2], above, corner))
+            base = (0, left, above, (left + above) // 2, nearest)[kind]
+            made[y, x] = (given[x - 1] + base) % 256
+    return made[1:, 1:]
+
+
+def shown(solid, name, per_cell=8, angles=EYE):
+    """The arguments that show a thing, and the mesh."""
+    mesh = solid.mesh(per_cell=per_cell, islands="keep")
+    return look(solid, name)(mesh, towards(*angles)), mesh
+
+
+def test_a_singular_line_is_drawn_where_it_is(tmp_path):
+    part = half_disclination()
+    (line,) = part.report().lattices["core"].singular
+    assert line.turn == 180 and line.length == pytest.approx(8, abs=1e-9)
+    given, mesh = shown(part, "singularities")
+    assert list(given["lines"]) == ["axes turned by 180°"] and given["label"] == "1 singular line, 8.0 mm"
+    (drawn,) = given["lines"]["axes turned by 180°"]
+    # To a step of the map's grid, a quarter of the wavelength.
+    assert np.abs(drawn[:, :2] - [5.3, 4.6]).max() < 0.75
+    assert sorted(drawn[[0, -1], 2]) == pytest.approx([0, 8])
+
+    # The picture differs from one without it, red against pale, in one place: where a line of our own at that place is.
+    draw = {"size": (240, 200), "azimuth": EYE[0], "elevation": EYE[1]}
+    bare = pixels(mesh.png(**draw, lines={}))[:140]
+    seen = pixels(mesh.png(**draw, **given | {"label": ""} | {"lines": {"": given["lines"]["axes turned by 180°"]}}))
+    bare_there = pixels(mesh.png(**draw, lines={"": [[[5.3, 4.6, 0], [5.3, 4.6, 8]]]}, width=given["width"]))
+    red = [(p[:140, :, 0] - p[:140, :, 1] > 40) for p in (seen, bare_there)]
+    assert red[0].sum() > 30 and not (bare[:, :, 0] - bare[:, :, 1] > 40).any()
+    # Within that step, a few pixels.
+    middles = [np.argwhere(r).mean(axis=0) for r in red]
+    assert np.abs(middles[0] - middles[1]).max() < 0.75 * 240 / 12
+
+    part.render(tmp_path / "seen.png", (120, 90), show="singularities", per_cell=8)
+    assert (tmp_path / "seen.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_a_singular_line_the_picture_says_so():
+    straight = solid(lt.map.phase(wavelength=3, rotate_z=30))
+    assert straight.report().lattices["core"].singular == []
+    given, _ = shown(straight, "singularities")
+    assert given["lines"] == {} and given["label"] == "no singular lines"
+    assert solid().report().lattices["core"].singular is None
+
+
+@pytest.mark.parametrize("angles", [EYE, (0, 90), (200, -35)])
+def test_axes_are_those_asked_for_on_the_side_that_is_seen(angles):
+    ball = lt.region.sphere(center=[1, 2, 3], radius=6)
+    part = solid(lt.map.phase(wavelength=[3, 4, 5], rotate_z=30), ball)
+    given, _ = shown(part, "axes", angles=angles)
+    bars = {name: np.array(of) for name, of in given["lines"].items()}
+    assert list(bars) == ["x", "y", "z"]
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    for name, axis in zip("xyz", ([c, s, 0], [-s, c, 0], [0, 0, 1]), strict=True):
+        way = bars[name][:, 1] - bars[name][:, 0]
+        length = np.linalg.norm(way, axis=1)
+        assert np.allclose(length, length[0]) and np.allclose(way / length[:, None], axis)
+    places = bars["x"].mean(axis=1)
+    out = (places - [1, 2, 3]) / 6
+    eye = np.array(towards(*angles))
+    # On the ball, to the tolerance of sphere tracing, and turned to the eye.
+    assert np.allclose(np.linalg.norm(out, axis=1), 1, atol=1e-3) and (out @ eye > -1e-3).all()
+    # A regular grid in the picture: it fills a disc of this area.
+    across = places - np.outer(places @ eye, eye)
+    near = np.linalg.norm(across[:, None] - across[None], axis=2) + 1e9 * np.eye(len(places))
+    step = near.min()
+    assert np.allclose(near.min(axis=1), step, rtol=1e-2)
+    assert len(places) * step**2 == pytest.approx(np.pi * 36, rel=0.1)
+
+
+def test_trajectories_of_hoops_and_spokes_are_circles_and_rays():
+    """On a ring, axes whose signs and order are arbitrary: hoops, spokes, the normal."""
+    rng = np.random.default_rng(3)
+
+    def axes(points):
+        angle = np.arctan2(points[:, 1], points[:, 0])
+        c, s, zero = np.cos(angle), np.sin(angle), np.zeros(len(angle))
+        rows = np.stack([np.stack(r, axis=1) for r in ((-s, c, zero), (c, s, zero), (zero, zero, zero + 1))], axis=1)
+        # In order where lines begin, so that they are of two kinds.
+        swap = (rng.random(len(points)) < 0.5) & (points[:, 0] % 0.5 != 0.25)
+        rows[swap] = rows[swap][:, [1, 0, 2]]
+        return rows * rng.choice([-1.0, 1.0], (len(points), 3, 1))
+
+    def distance(points):
+        off = np.stack([np.hypot(points[:, 0], points[:, 1]) - 10, 2 - np.hypot(points[:, 0], points[:, 1]), points[:, 2]])
+        return off.max(axis=0)
+
+    x, y = (v.ravel() for v in np.meshgrid(*[np.arange(-9.75, 10, 0.5)] * 2))
+    places = np.stack([x, y, 0 * x], axis=1)[(np.hypot(x, y) < 9.9) & (np.hypot(x, y) > 2.1)]
+    lines = [line for some in trajectories(places, 1.0, axes, distance, [0, 0, 1]) for line in some]
+    hoops, spokes = 0, []
+    for line in lines:
+        assert np.abs(line[:, 2]).max() < 1e-9
+        radius, angle = np.hypot(line[:, 0], line[:, 1]), np.unwrap(np.arctan2(line[:, 1], line[:, 0]))
+        if np.ptp(angle) > 1e-6:
+            # Midpoint steps h = 1/4 at a radius r of 2 or more: r (h/r)^4 / 8 off in each, r/h steps a radian.
+            assert np.ptp(radius) < 2 * np.pi * 8 * (1 / 8) ** 4 / 8 * 2
+            hoops += 1
+        else:
+            spokes.append(np.ptp(radius))
+    assert hoops > 10 and len(spokes) > 10
+    # The longest rays go from edge to edge, to a step.
+    assert max(spokes) > 8 - 2 * 0.25
+    # Lines of a kind do not come nearer than half a distance: neighbouring cells of that size are free.
+    for kind in trajectories(places, 1.0, lambda p: np.broadcast_to(np.eye(3), (len(p), 3, 3)), distance, [0, 0, 1]):
+        for i, one in enumerate(kind):
+            for other in kind[:i]:
+                assert np.linalg.norm(one[:, None] - other[None], axis=2).min() > 0.5
+    assert trajectories(places, 1.0, axes, distance, [0, 0, -1]) == [[], [], []]
+
+
+def test_trajectories_lie_on_the_surface_that_is_seen():
+    ball = lt.region.sphere(center=[1, 2, 3], radius=6)
+    part = solid(lt.map.phase(wavelength=[3, 4, 5], rotate_z=30), ball)
+    given, _ = shown(part, "trajectories")
+    assert list(given["lines"]) == ["x", "y", "z"] and all(len(some) > 5 for some in given["lines"].values())
+    for line in (line for some in given["lines"].values() for line in some):
+        out = (line - [1, 2, 3]) / 6
+        assert np.allclose(np.linalg.norm(out, axis=1), 1, atol=1e-3) and (out @ towards(*EYE) > -0.05).all()
+
+
+def test_directions_asked_for_are_rows_of_the_target():
+    part = solid(lt.map.phase(wavelength=[3, 4, 5], rotate_z=lt.grade.formula("3*x")))
+    points = np.random.default_rng(5).uniform(1, 7, (50, 3))
+    asked = part.map_asked(points)
+    angle = np.radians(3 * points[:, 0])
+    zero = np.zeros(50)
+    rows = [[np.cos(angle), np.sin(angle), zero], [-np.sin(angle), np.cos(angle), zero], [zero, zero, zero + 1]]
+    for i, (row, edge) in enumerate(zip(rows, (3, 4, 5), strict=True)):
+        assert np.allclose(asked[:, i], np.stack(row, axis=1) / edge, atol=1e-12)
+
+
+def test_lattices_of_a_blend_have_their_colours():
+    part = blended()
+    given, mesh = shown(part, "lattice")
+    ramp = np.clip((mesh.vertices[:, 0] - 3) / 6, 0, 1)
+    assert list(given["shares"]) == ["core", "rim"]
+    # Shares up to a millionth become 0.
+    assert np.allclose(given["shares"]["rim"], ramp, atol=1e-5)
+    assert np.allclose(sum(given["shares"].values()), 1)
+    # Seen along -y, x runs from left to right: blue on one side, orange on the other, and in between neither.
+    picture = pixels(mesh.png((240, 200), azimuth=270, elevation=0, **given))[:140]
+    blue, orange = picture[:, :, 2] - picture[:, :, 0] > 60, picture[:, :, 0] - picture[:, :, 2] > 60
+    columns = [np.flatnonzero(c.any(axis=0)) for c in (blue, orange)]
+    assert blue.sum() > 500 and orange.sum() > 500 and columns[0].max() < columns[1].min()
+    # One lattice alone is of one colour.
+    alone = {"core": np.ones(len(ramp)), "rim": np.zeros(len(ramp))}
+    picture = pixels(mesh.png((240, 200), shares=alone))[:140]
+    assert not (picture[:, :, 0] - picture[:, :, 2] > 10).any()
+
+
+def test_what_there_is_not_is_refused():
+    plain = solid()
+    for name in SHOWN:
+        with pytest.raises(ValueError, match="no blend" if name == "lattice" else "solved for"):
+            look(plain, name)
+    with pytest.raises(ValueError, match="one of angle, spacing, density, axes, trajectories, singularities, lattice"):
+        look(plain, "stress")
+    mesh = plain.mesh(edge=1)
+    n = len(mesh.vertices)
+    for given, error in (
+        ({"color": np.zeros(n), "shares": {"a": np.zeros(n)}}, "not both"),
+        ({"shares": {}}, "no names"),
+        ({"shares": {"a": [1.0]}}, "one for each vertex"),
+        ({"lines": {"a": [[0, 0, 1]]}}, r"lines\['a'\] must be arrays"),
+        ({"lines": {"a": [[[0, 0, np.nan]]]}}, "finite"),
+        ({"lines": {"a": []}, "width": 0}, "width"),
+    ):
+        with pytest.raises(ValueError, match=error):
+            mesh.png((60, 50), **given)
