@@ -10,7 +10,8 @@
 //! - plane slices as loops of conic arcs with their area ([`Slice`]);
 //! - volume, area, centroid and inertia to a relative error of 1e-10 ([`MassProperties`]);
 //! - the boundary of every hub as faces, conic arcs and vertices, and as exact rational Bézier patches;
-//! - watertight triangle meshes to a chord error, without a grid ([`Tessellation`]).
+//! - watertight triangle meshes to a chord error, without a grid ([`Tessellation`]);
+//! - STEP files of the exact boundary ([`write_step`]).
 //!
 //! Graphs come from a catalogue of unit cells ([`graph::catalogue`]) repeated in space, from tables
 //! ([`graph::nodes`], [`graph::struts`]), or from a [`Wireframe`] with radii assigned by [`graph::with_radii`]; wireframes
@@ -47,11 +48,13 @@
 pub mod graph;
 pub mod pattern;
 pub mod quador;
+mod step;
 
 pub use graph::{Beam, Graph, Hub, Profile, Wireframe};
 pub use pattern::{Pattern, PatternField};
 pub use quador::slice::{Plane, Slice};
 pub use quador::{Fillet, MassProperties, Pencil, Quadors, Tessellation};
+pub use step::{StepSummary, write_step};
 
 use geometry::math::Vec3;
 

@@ -33,6 +33,7 @@ mod bezier;
 mod block_fill;
 mod boundary_form;
 mod box_index;
+pub(crate) mod brep;
 mod closest;
 mod collisions;
 pub mod complex;
@@ -53,6 +54,7 @@ mod rational_patch;
 mod rays;
 pub mod slice;
 mod smooth_union;
+mod stereographic;
 mod tessellation;
 
 pub use bezier::Bezier;

@@ -1,6 +1,6 @@
 //! Conic arcs as rational quadratic Bézier curves, and the area between arc and chord.
 
-use geometry::math::{Vec3, add, cross, dot, scale, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::conic::Conic;
 use super::hub_quadric::Quadric;
@@ -149,6 +149,17 @@ impl Path {
         match self {
             Path::Curved(c) => c.at(fraction * c.end),
             Path::Straight { from, along, end, .. } => add(*from, scale(*along, fraction * end)),
+        }
+    }
+
+    /// The parameter of a point; `None` if it is not on the path's line beyond the start.
+    pub(super) fn parameter(&self, x: Vec3) -> Option<f64> {
+        match self {
+            Path::Curved(c) => Some(c.angle_of(x)),
+            Path::Straight { from, along, .. } => {
+                let (t, off) = (dot(sub(x, *from), *along), norm(cross(sub(x, *from), *along)));
+                (t > 0.0 && off < 1e-6 * t).then_some(t)
+            }
         }
     }
 

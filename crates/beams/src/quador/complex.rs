@@ -14,8 +14,10 @@ use super::gauss::gauss;
 use super::hub::{AffineFunction, Hub};
 use super::hub_quadric::Quadric;
 
+mod coincident_arcs;
 mod seam_tracing;
 
+pub(super) use coincident_arcs::CoincidentArc;
 use seam_tracing::SeamTracer;
 pub(super) use seam_tracing::perturbation;
 
@@ -79,7 +81,7 @@ pub struct Complex {
 }
 
 /// Length below which an arc is collapsed to a point, in hub radii: far above the perturbation, far below any feature.
-pub(super) const COLLAPSE_LENGTH: f64 = 1e-7;
+const COLLAPSE_LENGTH: f64 = 1e-7;
 
 const NONE: u32 = u32::MAX;
 

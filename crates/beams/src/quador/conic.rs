@@ -1,6 +1,6 @@
 //! Conics: plane sections of quadrics, parametrised by an angle.
 
-use geometry::math::{Vec3, add, dot, scale};
+use geometry::math::{Vec3, add, dot, scale, sub};
 
 use super::hub_quadric::Quadric;
 
@@ -64,6 +64,12 @@ impl Conic {
         let slope =
             add(scale(self.e[0], f * (c * c - s * s) - g * s * c), scale(self.e[1], 2.0 * f * s * c - g * s * s));
         (at, slope)
+    }
+
+    /// The angle of the line from v to a point of the plane, in [0, π).
+    pub(crate) fn angle_of(&self, x: Vec3) -> f64 {
+        let by = sub(x, self.v);
+        angle(dot(by, self.e[1]), dot(by, self.e[0]))
     }
 
     /// The angles in (0, π), in order, at which an affine function of the plane vanishes, given its value at v and its

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::complex::{Arc, COLLAPSE_LENGTH, Complex};
+use super::complex::{Arc, CoincidentArc, Complex};
 use super::hub::Hub;
 use ear_clipping::strip;
 
@@ -25,16 +25,6 @@ enum EdgeCurve {
     Arc(u32, f64, f64),
     /// An end circle, which is not subdivided.
     Rim,
-}
-
-/// An arc that coincides with an earlier one.
-#[derive(Clone, Copy, Debug)]
-struct CoincidentArc {
-    of: u32,
-    /// Whether both have the same orientation.
-    same: bool,
-    /// The face of zero width between them.
-    face: usize,
 }
 
 /// A triangulation of the surface of a hub.
@@ -120,7 +110,7 @@ impl<'a> Facets<'a> {
             }
             first += n;
         }
-        let coincident_arcs = out.coincident_arcs();
+        let coincident_arcs = complex.coincident_arcs(hub.radius);
         let polylines = out.polylines(turns, &coincident_arcs);
         for (number, face) in complex.faces.iter().enumerate() {
             if coincident_arcs.iter().flatten().any(|t| t.face == number) {
@@ -189,48 +179,6 @@ impl<'a> Facets<'a> {
         for k in 0..3 {
             self.left_of.insert([t[k], t[(k + 1) % 3]], number);
         }
-    }
-
-    /// For each arc an earlier one that coincides with it, if any: both bound a face of zero width, such as the fillet
-    /// between equal collinear cylinders on the side without other beams.
-    fn coincident_arcs(&self) -> Vec<Option<CoincidentArc>> {
-        let arcs = &self.complex.arcs;
-        let mut coincident_arcs = vec![None; arcs.len()];
-        for (number, face) in self.complex.faces.iter().enumerate() {
-            let walked = face.loops.concat();
-            let (&[(a, there), (b, back)], None) = (&walked[..], face.end_circle) else {
-                continue;
-            };
-            let (earlier, later) = (a.min(b), a.max(b));
-            let point_on = |arc: u32, t: f64| {
-                let conic = &arcs[arc as usize].conic;
-                conic.at(t * conic.end)
-            };
-            // Traversed there and back: if both have the same orientation, one is traversed backwards.
-            let same = there != back;
-            let near = |p: Vec3, q: Vec3| norm(sub(p, q)) < COLLAPSE_LENGTH * self.hub.radius;
-            let closed = face.loops.len() == 2;
-            let coincident = [0.0, 0.25, 0.5].into_iter().all(|t| {
-                let both = [earlier, later].map(|arc| [t, 1.0 - t].map(|t| point_on(arc, t)));
-                let [[p, q], [r, s]] = both;
-                if closed {
-                    // Closed arcs may start anywhere: they coincide if they have the same centre and plane.
-                    let center = |arc: u32| add(point_on(arc, 0.0), point_on(arc, 0.5));
-                    let plane = &arcs[earlier as usize].plane;
-                    let off = (dot(plane.a, r) + plane.b).abs() / norm(plane.a);
-                    near(scale(center(earlier), 0.5), scale(center(later), 0.5))
-                        && off < COLLAPSE_LENGTH * self.hub.radius
-                } else if same {
-                    near(p, r) && near(q, s)
-                } else {
-                    near(p, s) && near(q, r)
-                }
-            });
-            if a != b && coincident {
-                coincident_arcs[later as usize] = Some(CoincidentArc { of: earlier, same, face: number });
-            }
-        }
-        coincident_arcs
     }
 
     /// The vertices along each arc, both ends included.

@@ -1,20 +1,19 @@
 //! Faces in exact rational form: biquadratic Bézier patches, trimmed by conics in space and in the parameter plane.
 //!
-//! A quadric is parametrised by projection from one of its own points, the pole A: the line from A through a point B of
-//! a plane meets the quadric again in X = Q(B, B) A − 2 Q(A, B) B, with Q the bilinear form in homogeneous coordinates.
-//! With B linear in (s, t) this has degree two, so a biquadratic Bézier patch represents it exactly; for a sphere it is
-//! stereographic projection. The inverse is a central projection, which maps conics to conics: a rational quadratic
-//! curve in space stays one in (s, t). The pole lies off the face. The annular faces of half-beams are cut in three or
+//! A quadric is parametrised by projection from one of its own points ([`Stereographic`]). The inverse is a central
+//! projection, which maps conics to conics: a rational quadratic curve in space stays one in (s, t). The pole lies off
+//! the face. The annular faces of half-beams are cut in three or
 //! more by meridian planes, in conics, and end at the end circle.
 
 use core::f64::consts::TAU;
 
-use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, apply, cross, dot, norm, scale, sub, unit};
 
 use super::bezier::{Bezier, Path, curves, section_tangent};
 use super::complex::{Complex, Face};
 use super::hub::{HalfBeam, Hub};
 use super::hub_quadric::Quadric;
+use super::stereographic::{Stereographic, opposite_poles};
 
 /// A trimming curve of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,31 +47,19 @@ pub struct Patch {
 type BoundaryCurve = (Bezier<3>, Option<u32>);
 
 impl Patch {
+    /// The parametrisation.
+    fn chart(&self) -> Stereographic {
+        Stereographic { quadric: self.quadric, pole: self.pole, origin: self.origin, axes: self.axes }
+    }
+
     /// The point at (s, t).
-    pub fn at(&self, [s, t]: [f64; 2]) -> Vec3 {
-        let b = add(self.origin, add(scale(self.axes[0], s), scale(self.axes[1], t)));
-        let (bb, ab) = (self.quadric.at(b), 2.0 * self.polar());
-        scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab))
-    }
-
-    /// Q(A, B), constant on the plane.
-    fn polar(&self) -> f64 {
-        let (q, a) = (&self.quadric, self.pole);
-        dot(self.origin, q.half_gradient(a)) + dot(q.b, a) + q.c
-    }
-
-    /// (s, t) of a point, and its weight in the projection.
-    fn project(&self, x: Vec3) -> ([f64; 2], f64) {
-        let n = self.quadric.half_gradient(self.pole);
-        let (direction, far) = (sub(x, self.pole), dot(sub(self.origin, self.pole), n));
-        let weight = dot(direction, n) / far;
-        let b = sub(add(self.pole, scale(direction, 1.0 / weight)), self.origin);
-        ([dot(b, self.axes[0]), dot(b, self.axes[1])], weight)
+    pub fn at(&self, at: [f64; 2]) -> Vec3 {
+        self.chart().at(at)
     }
 
     /// (s, t) of a point of the quadric.
     pub fn parameters(&self, x: Vec3) -> [f64; 2] {
-        self.project(x).0
+        self.chart().project(x).0
     }
 
     /// Ranges [min, max] of s and of t, over the control points of the trimming curves.
@@ -88,28 +75,7 @@ impl Patch {
     /// Control points and weights of the biquadratic Bézier patch over its range, s first. Weights are those of the
     /// formula: at a corner of the range outside the face a weight may be negative.
     pub fn control_net(&self) -> ([[Vec3; 3]; 3], [[f64; 3]; 3]) {
-        let (q, [u, v]) = (&self.quadric, self.axes);
-        let h = q.half_gradient(self.origin);
-        let ab = 2.0 * self.polar();
-        let [s, t] = self.range();
-        // Polar forms of 1, s, s² at the parameter pairs of the control points.
-        let blossom = |[a, b]: [f64; 2]| [[1.0, a, a * a], [1.0, (a + b) / 2.0, a * b], [1.0, b, b * b]];
-        let (ss, tt) = (blossom(s), blossom(t));
-        let mut net = ([[[0.0; 3]; 3]; 3], [[0.0; 3]; 3]);
-        for i in 0..3 {
-            for j in 0..3 {
-                let (s, t) = (ss[i], tt[j]);
-                let bb = q.at(self.origin)
-                    + 2.0 * (s[1] * dot(h, u) + t[1] * dot(h, v))
-                    + s[2] * q.form(u, u)
-                    + 2.0 * s[1] * t[1] * q.form(u, v)
-                    + t[2] * q.form(v, v);
-                let b = add(self.origin, add(scale(u, s[1]), scale(v, t[1])));
-                net.1[i][j] = bb - ab;
-                net.0[i][j] = scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab));
-            }
-        }
-        net
+        self.chart().net(self.range())
     }
 
     /// The patch with a given pole; `None` if a boundary curve meets the pole's tangent plane, where (s, t) are
@@ -121,14 +87,13 @@ impl Patch {
         origin: Vec3,
         boundary: &[Vec<BoundaryCurve>],
     ) -> Option<Patch> {
-        let n = quadric.half_gradient(pole);
-        let u = unit(cross(n, if n[0].abs() < 0.6 * norm(n) { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
-        let mut patch = Patch { face, quadric, pole, origin, axes: [u, cross(unit(n), u)], trims: Vec::new() };
+        let chart = Stereographic::new(quadric, pole, origin);
+        let mut patch = Patch { face, quadric, pole, origin, axes: chart.axes, trims: Vec::new() };
         for boundary_loop in boundary {
             let mut loops = Vec::new();
             let mut todo: Vec<(BoundaryCurve, u32)> = boundary_loop.iter().rev().map(|s| (*s, 6)).collect();
             while let Some(((space, arc), depth)) = todo.pop() {
-                let project = space.points.map(|p| patch.project(p));
+                let project = space.points.map(|p| chart.project(p));
                 let [k, l, m] = [project[0].1, space.weight * project[1].1, project[2].1];
                 if k.is_nan() || k < 1e-3 || m < 1e-3 {
                     return None;
@@ -150,24 +115,7 @@ impl Patch {
 
     /// The patch of a simply connected piece of a face, with a pole across the hub or near there.
     fn with_opposite_pole(face: u32, quadric: Quadric, origin: Vec3, boundary: &[Vec<BoundaryCurve>]) -> Option<Patch> {
-        let normal = unit(quadric.half_gradient(origin));
-        let u = unit(cross(normal, if normal[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
-        let v = cross(normal, u);
-        // Through the centre of the quadric, through the hub's centre, and along the normal.
-        let middle = scale(apply(&inverse(&quadric.m), quadric.b), -1.0);
-        let normal = scale(normal, -1.0);
-        let inward = [sub(middle, origin), unit(scale(origin, -1.0)), normal];
-        let tilts = (0..8).flat_map(|k| {
-            let (sin, cos) = (TAU * f64::from(k) / 8.0).sin_cos();
-            [0.3, 0.8, 2.0].map(|by| add(normal, scale(add(scale(u, cos), scale(v, sin)), by)))
-        });
-        inward.into_iter().chain(tilts).find_map(|direction| {
-            // The origin is one root; this is the other.
-            let t = -2.0 * dot(quadric.half_gradient(origin), direction) / quadric.form(direction, direction);
-            let pole = add(origin, scale(direction, t));
-            let far = t.is_finite() && norm(pole) < 1e6 * norm(origin);
-            far.then(|| Patch::with_pole(face, quadric, pole, origin, boundary))?
-        })
+        opposite_poles(&quadric, origin).find_map(|pole| Patch::with_pole(face, quadric, pole, origin, boundary))
     }
 }
 
