@@ -8,7 +8,19 @@ import os
 import sys
 from collections.abc import Callable
 
-from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, STDIN, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
+from .formats import (
+    DESIGNS,
+    MESH_READS,
+    MESH_WRITES,
+    MESHES,
+    STDIN,
+    STEP_WRITES,
+    TET_READS,
+    TET_WRITES,
+    VOXEL_WRITES,
+    dotted,
+    kind_of,
+)
 from .islands import ISLANDS
 from .parts import check_parts
 from .shown import SHOWN
@@ -164,8 +176,9 @@ COMMANDS = {
     ),
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
-        f"The name of OUT decides the format: {WRITTEN}. The mesh is written while it is made, in bounded\n"
-        "memory, unless the design has a skin, whose closed voids are looked for.\n"
+        f"The name of OUT decides the format: {WRITTEN}; or .step, the exact surface of uncut beams\n"
+        "alone, for CAD systems. A mesh is written while it is made, in bounded memory, unless the design has a skin, whose\n"
+        "closed voids are looked for.\n"
         "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. With\n"
         "--smooth it is held in memory too, and the smallest angle of 19 in 20 triangles is then 15 degrees or more; all\n"
         "guarantees, sharp edges, flat faces and the volume are kept. --open leaves out the faces on the region's boundary:\n"
@@ -175,8 +188,9 @@ COMMANDS = {
         "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01\n"
         "  trabecula mesh part.toml -o part.stl --smooth\n"
         "  trabecula mesh exchanger.toml -o exchanger.3mf --parts wall,lower,upper\n"
-        "  trabecula mesh beams.toml -o beams.stl --chord 0.01",
-        *(DESIGN, output(MESH_WRITES, "the mesh to write")),
+        "  trabecula mesh beams.toml -o beams.stl --chord 0.01\n"
+        "  trabecula mesh beams.toml -o beams.step",
+        *(DESIGN, output((*MESH_WRITES, *STEP_WRITES), "the file to write")),
         spacing(
             "--edge",
             option(

@@ -16,7 +16,7 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .design import Design, load, parsed
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
-from .formats import DESIGNS, MESH_READS, STDIN, is_design, kind_of
+from .formats import DESIGNS, MESH_READS, STDIN, STEP_WRITES, is_design, kind_of
 from .machine import fits
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -85,6 +85,8 @@ def check(args) -> None:
 
 def mesh(args) -> None:
     """``trabecula mesh``."""
+    if kind_of(args.output) in STEP_WRITES:
+        return mesh_step(args)
     if args.parts:
         return mesh_parts(args)
     check_place(args.output)
@@ -114,6 +116,28 @@ def mesh(args) -> None:
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
         f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
         f"{made['seconds']:.2f} s"
+    )
+
+
+def mesh_step(args) -> None:
+    """``trabecula mesh -o OUT.step``."""
+    names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "tolerance", "triangles")
+    given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
+    given += [f"--islands {args.islands}"] if args.islands in ("drop", "error") else []
+    if given:
+        raise Refused(f"{given[0]} does not go with a STEP file: it has the exact surface, and no triangles; leave it out")
+    check_place(args.output)
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    settle()
+    made = solid.save_step(args.output).to_dict()
+    made |= {"bytes": os.path.getsize(args.output), "seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    say(
+        f"{args.output}: {made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, "
+        f"{counted(made['solids'], 'solid')}; exact, {made['seconds']:.2f} s"
     )
 
 

@@ -38,6 +38,7 @@ __all__ = [
     "SingularLineReport",
     "SmoothReport",
     "SpecificSurface",
+    "StepReport",
     "SurfaceReport",
     "TetMeshReport",
     "TetQualityReport",
@@ -657,6 +658,21 @@ class SpecificSurface(Report):
     """All area over the solid's volume."""
     lattice_of_region: float | None
     """The lattice's area, without cut faces, over the region's volume."""
+
+
+class StepReport(Report):
+    """What a STEP file contains."""
+
+    edges: int
+    """Number of edges."""
+    faces: int
+    """Number of faces."""
+    solids: int
+    """Number of solids: connected components."""
+    vertices: int
+    """Number of vertices."""
+    volume: float
+    """Enclosed volume, mm³, to 1e-10."""
 
 
 class SurfaceReport(Report):

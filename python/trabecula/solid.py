@@ -12,7 +12,7 @@ from functools import cached_property
 from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
-from .formats import MESH_WRITES
+from .formats import MESH_WRITES, STEP_WRITES
 from .given import positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits, rounded_up
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         MeshReport,
         QualityReport,
         RepairReport,
+        StepReport,
         SurfaceReport,
     )
 
@@ -476,6 +477,19 @@ class Solid(Seen):
         the end, whatever that is.
         """
         return self._save(path, edge, per_cell, threads, progress, islands, chord)
+
+    def save_step(self, path: str | os.PathLike[str]) -> StepReport:
+        """Writes the exact surface of beams alone to a STEP file (.step or .stp; AP214, mm) for CAD systems, and gives its
+        figures.
+
+        Cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as rational B-splines:
+        nothing is approximated. Each connected component is a solid. A ValueError for whatever else a design has: lattices, a
+        skin, a region that cuts the beams, beams that run into each other without a node.
+        """
+        extension(path, STEP_WRITES)
+        name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
+        with whole_file(path) as temporary:
+            return self._core.write_step(temporary, name)
 
     def _save(
         self,

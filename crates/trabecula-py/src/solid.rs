@@ -364,6 +364,16 @@ impl Solid {
         report(py, "SurfaceReport", &SurfaceReport::from(&made.map_err(error::stopped)?))
     }
 
+    /// Writes the exact surface of beams alone to a STEP file at `path`, under the name of a product; gives its
+    /// `reports.StepReport`.
+    fn write_step<'py>(&self, py: Python<'py>, path: PathBuf, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let made = run(py, None, None, |_| {
+            let mut out = BufWriter::new(file::anew(&path).map_err(Stopped::Io)?);
+            self.built.write_step(name, &mut out)
+        })?;
+        report(py, "StepReport", &made.map_err(error::stopped)?)
+    }
+
     /// The surface of beams alone, from their patches, within `chord` (mm) of them; and how far it is from them, mm.
     #[pyo3(signature = (chord, threads=None, progress=None))]
     fn mesh_beams(

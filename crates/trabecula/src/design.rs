@@ -25,6 +25,7 @@ mod tests;
 mod volume_error;
 mod warn;
 
+use std::io;
 use std::sync::{Arc, OnceLock};
 
 use serde_json::Value as Json;
@@ -36,12 +37,14 @@ use crate::extract::GridSurface;
 use crate::kind::{At, Kind};
 use crate::lattice::Lattice;
 use crate::region::Region;
-use crate::report::{DesignReport, TransitionReport};
+use crate::report::{DesignReport, StepReport, TransitionReport};
 use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
 use crate::truss::Beams;
+use beams::{StepSummary, write_step};
 use geometry::fault::Fault;
+use geometry::progress::Stopped;
 use geometry::repair::Repaired;
 
 pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
@@ -281,6 +284,17 @@ impl Built {
     /// What else the design contains: lattices, a blend, a skin or kept zones, a region that cuts the beams.
     pub fn beam_surface(&self) -> Result<BeamSurface, Fault> {
         Ok(BeamSurface(build_beams::alone(self)?))
+    }
+
+    /// Writes the exact surface of beams alone as a STEP file (AP214, mm), under the name of a product.
+    ///
+    /// # Errors
+    /// What else the design contains, as for `beam_surface`; beams without a boundary in closed form; failures of the output.
+    pub fn write_step(&self, name: &str, out: &mut dyn io::Write) -> Result<StepReport, Stopped> {
+        let quadors = build_beams::exact(self).map_err(Stopped::Refused)?;
+        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, name, out)?;
+        let volume = quadors.volume().map_err(Stopped::Refused)?;
+        Ok(StepReport { solids, faces, edges, vertices, volume })
     }
 
     /// The chord error (mm) at which `beam_surface` makes a surface unless another resolution is asked for: a fiftieth of the radius

@@ -10,7 +10,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-pub use beams_report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, TrimmedReport};
+pub use beams_report::{
+    BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
+};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     PeriodReport, RbfReport, RegionReport, SingularLineReport, TransitionReport,
@@ -60,6 +62,7 @@ struct Reports {
     repair: RepairReport,
     estimate: EstimateReport,
     tets: TetMeshReport,
+    step: StepReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

@@ -122,14 +122,27 @@ fn whole(quadors: &Quadors, region: &dyn Field) -> bool {
     })
 }
 
-/// The beams that a design is made of, if of nothing else.
+/// The beams that a design is made of, if of nothing else, for a mesh to a chord error.
 pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
-    let refuse = |why: &str| {
+    lone_beams(built, |why| {
         let message = format!(
             "a mesh to a chord error is made of the beams' own patches, and {why}; give the spacing of a grid (edge) instead"
         );
-        Err(Fault::new("chord", message))
-    };
+        Fault::new("chord", message)
+    })
+}
+
+/// The beams that a design is made of, if of nothing else, for a STEP file.
+pub(super) fn exact(built: &Built) -> Result<Arc<Quadors>, Fault> {
+    lone_beams(built, |why| {
+        let message =
+            format!("a STEP file has the exact surface of beams alone, and {why}; write a mesh (3mf, stl) instead");
+        Fault::new("", message)
+    })
+}
+
+fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quadors>, Fault> {
+    let refuse = |why: &str| Err(fault(why));
     let [(_, beams)] = &built.beams[..] else {
         return refuse("this design is not one graph of beams");
     };

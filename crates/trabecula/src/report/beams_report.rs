@@ -134,3 +134,18 @@ pub struct TrimmedReport {
     /// Struts shortened to the surface.
     pub snapped: usize,
 }
+
+/// What a STEP file contains.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct StepReport {
+    /// Number of solids: connected components.
+    pub solids: usize,
+    /// Number of faces.
+    pub faces: usize,
+    /// Number of edges.
+    pub edges: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Enclosed volume, mm³, to 1e-10.
+    pub volume: f64,
+}

@@ -1,0 +1,121 @@
+"""STEP files of beams: what they have, what is refused, and what a CAD kernel makes of them where one can be imported."""
+
+import json
+import re
+import warnings
+
+import pytest
+import trabecula as lt
+
+ROOM = lt.region.box(size=[60, 60, 60])
+#: A ring of three beams with tapered radii, and one apart.
+NODES = [[0, 0, 0], [10, 0, 0], [4, 9, 2], [20, 0, 0], [20, 8, 0]]
+STRUTS = [[0, 1], [1, 2], [2, 0], [3, 4]]
+
+
+def solid(**more):
+    """Beams alone, uncut."""
+    beams = lt.Beams(**({"nodes": NODES, "struts": STRUTS, "radius": 0.8, "fillet": {"radius": 0.4}} | more))
+    return lt.Design(region=ROOM, beams=beams).build()
+
+
+def entities(path):
+    """The entities of a STEP file by number."""
+    return {int(n): text for n, text in re.findall(r"^#(\d+)=(.*);$", path.read_text("ascii"), re.M)}
+
+
+def count(found, name):
+    """How many entities have this name."""
+    return sum(text.startswith(name + "(") for text in found.values())
+
+
+def test_a_file_has_what_the_report_says(tmp_path):
+    path = tmp_path / "ring's.step"
+    made = solid().save_step(path)
+    found = entities(path)
+    assert made.solids == count(found, "MANIFOLD_SOLID_BREP") == 2
+    names = {"faces": "ADVANCED_FACE", "edges": "EDGE_CURVE", "vertices": "VERTEX_POINT"}
+    assert {key: count(found, name) for key, name in names.items()} == {key: made[key] for key in names}
+    assert count(found, "CYLINDRICAL_SURFACE") > 0 and "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))" in found.values()
+    # A ring has one hole, a rod none: V - E + F is 0 and 2.
+    assert made.vertices - made.edges + made.faces == 2
+    assert made.volume == pytest.approx(solid().quadors().volume(), rel=1e-12)
+    assert any(text.startswith("PRODUCT('ring''s'") for text in found.values())
+    assert path.read_bytes() == (solid().save_step(path), path.read_bytes())[1]
+
+
+@pytest.mark.parametrize(
+    ("design", "why"),
+    [
+        (
+            lambda: lt.Design(region=ROOM, lattice=lt.Lattice("gyroid", "sheet", lt.map.affine(20), lt.level.fraction(0.3))),
+            "this design is not one graph of beams",
+        ),
+        (
+            lambda: lt.Design(region=lt.region.box(size=[10, 60, 60]), beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8)),
+            "the region cuts some",
+        ),
+        (
+            lambda: lt.Design(region=ROOM, beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8), skin={"thickness": 1.0}),
+            "a skin or a kept zone",
+        ),
+    ],
+)
+def test_what_a_file_cannot_have_is_refused(design, why, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        built = design().build()
+    with pytest.raises(ValueError, match=f"a STEP file has the exact surface of beams alone, and .*{why}.*write a mesh"):
+        built.save_step(tmp_path / "no.step")
+    with pytest.raises(ValueError, match=r"must end in \.step, \.stp; found \.stl"):
+        built.save_step(tmp_path / "no.stl")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_files(tmp_path, capsys):
+    from trabecula.cli import main
+
+    design, path = tmp_path / "ring.toml", tmp_path / "ring.STP"
+    beams = lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8, fillet="auto")
+    design.write_text(lt.Design(region=ROOM, beams=beams).to_toml())
+    assert main(["mesh", str(design), "-o", str(path), "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["solids"] == 2 and made["bytes"] == path.stat().st_size and len(made["warnings"]) == 1
+    assert main(["mesh", str(design), "-o", str(path)]) == 0
+    assert "faces" in capsys.readouterr().err
+    for option in (["--edge", "0.1"], ["--smooth"], ["--islands", "drop"], ["--parts", "wall"]):
+        assert main(["mesh", str(design), "-o", str(path), *option]) == 1
+        assert f"{' '.join(option[: 1 + (option[0] == '--islands')])} does not go with a STEP file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fillet", [None, "auto"])
+@pytest.mark.parametrize("cell", ["bcc", "octet", "kelvin"])
+def test_a_cad_kernel_reads_closed_solids(cell, fillet, tmp_path):
+    """Open CASCADE finds a valid solid without free edges, of the exact volume, whose faces are where they should be."""
+    pytest.importorskip("OCP.STEPControl")
+    from step_judge import step_solid
+
+    beams = lt.Beams(cell=cell, map=lt.map.affine(wavelength=10), radius=0.7, **({"fillet": fillet} if fillet else {}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        inner = lt.Design(region=lt.region.box(min=[-1, -1, -1], max=[11, 11, 11]), beams=beams).build()
+    built = whole(inner, fillet)
+    path = tmp_path / "cell.step"
+    made = built.save_step(path)
+    found = step_solid(path)
+    assert found["valid"] and found["free_edges"] == 0
+    assert (found["solids"], found["faces"]) == (made.solids, made.faces)
+    # Quadrature of the kernel to 1e-9, and its surfaces to rounding.
+    assert found["volume"] == pytest.approx(made.volume, rel=1e-9)
+    assert len(found["points"]) > 0.9 * made.faces
+    assert abs(built.quadors().closest(found["points"])["distance"]).max() < 1e-12
+
+
+def whole(built, fillet):
+    """The beams of a design as a graph of their own, which no region cuts."""
+    graph = built.beams["core"]
+    radius = float(graph["radii"].min())
+    nodes = graph["centers"].tolist()
+    more = {"fillet": fillet} if fillet else {}
+    beams = lt.Beams(nodes=nodes, struts=graph["struts"].tolist(), radius=radius, **more)
+    return lt.Design(region=lt.region.box(min=[-20, -20, -20], max=[30, 30, 30]), beams=beams).build()
