@@ -27,7 +27,7 @@ pub(super) fn one_of_types(schema: &Node, defs: &Defs) -> Node {
             let table: Node = Value::Table(table).into();
             let Some(Value::List(choices)) = table.get("anyOf").map(|n| &n.value) else { return table };
             // Of a definition the keys stand here; those within them are references again.
-            let choices: Vec<Node> = choices.iter().map(|choice| resolved(choice, defs)).collect();
+            let choices = joined(choices.iter().map(|choice| resolved(choice, defs)).collect());
             let all: Vec<&str> = choices.iter().flat_map(types).collect();
             let differ = all.iter().enumerate().all(|(i, t)| !all[..i].contains(t))
                 && choices.iter().all(|c| !types(c).is_empty());
@@ -42,6 +42,34 @@ pub(super) fn one_of_types(schema: &Node, defs: &Defs) -> Node {
         }
         _ => schema.clone(),
     }
+}
+
+/// The same choices, with tables of one key of several as one of them.
+fn joined(choices: Vec<Node>) -> Vec<Node> {
+    let mut out: Vec<Node> = Vec::new();
+    for choice in choices {
+        let other = out.iter_mut().find(|o| keys_of_one(o).is_some());
+        match (other, keys_of_one(&choice)) {
+            (Some(other), Some(more)) if types(&choice) == ["object"] => {
+                let keys = keys_of_one(other).unwrap_or_default().into_iter().chain(more);
+                let one = || Node::from(Value::Whole(1));
+                let properties = Value::Table(keys.map(|(key, node)| (key, None, node)).collect()).into();
+                let tables = other.entries().filter(|e| e.0 != "required").map(|(k, n)| (k.to_string(), None, n.clone()));
+                let table: Node = Value::Table(tables.collect()).into();
+                *other = table.with("properties", properties).with("minProperties", one()).with("maxProperties", one());
+            }
+            _ => out.push(choice),
+        }
+    }
+    out
+}
+
+/// The keys of a table that has exactly one of them; `None` of any other.
+fn keys_of_one(schema: &Node) -> Option<Vec<(String, Node)>> {
+    let properties: Vec<(String, Node)> =
+        schema.get("properties")?.entries().map(|(key, node)| (key.to_string(), node.clone())).collect();
+    let required = schema.get("required").is_some() && properties.len() == 1;
+    (types(schema).contains(&"object") && (required || schema.get("maxProperties").is_some())).then_some(properties)
 }
 
 /// A schema whose condition, if it has one, holds for tables alone.
