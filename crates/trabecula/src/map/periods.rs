@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::edge_squares::{gradient, slopes};
+use super::frame::in_mm;
 use super::integral::Problem;
 use super::phase_grid::Grid;
 use super::region_holes::Hole;
@@ -32,6 +33,20 @@ pub struct Period {
     pub cells: [i64; 3],
     /// What least squares ask for.
     pub asked: Vec3,
+}
+
+/// What was tried to keep a map from folding: cells round holes.
+pub(super) fn tried(periods: &[Period]) -> String {
+    let one = |p: &Period| {
+        let [a, b, c] = p.asked.map(|v| format!("{:.2}", v + 0.0));
+        format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", in_mm(p.at))
+    };
+    let some: Vec<String> = periods.iter().take(3).map(one).collect();
+    match periods.len() - some.len() {
+        _ if some.is_empty() => String::new(),
+        0 => format!(", whatever whole numbers of cells go round {}", some.join(" and ")),
+        rest => format!(", whatever whole numbers of cells go round {} and {rest} more", some.join(", ")),
+    }
 }
 
 /// The angles about the holes of a region, and their single-valued parts.

@@ -13,7 +13,7 @@ use super::fixed_faces::fixed;
 use super::frame::{self, Orientation, cube, in_mm};
 use super::integral::{Integral, Problem, Weights};
 use super::pace;
-use super::periods::{Angles, Period};
+use super::periods::{Angles, Period, tried};
 use super::phase_grid::Grid;
 use super::phase_target::{Laid, Target, wavelengths};
 use super::region_holes::{MOST, Sought};
@@ -591,20 +591,6 @@ fn folded(p: Vec3, remedy: &str, tried: &str) -> Fault {
         in_mm(p)
     );
     Fault::new("", message)
-}
-
-/// What was tried to keep a map from folding: cells round holes.
-fn tried(periods: &[Period]) -> String {
-    let one = |p: &Period| {
-        let [a, b, c] = p.asked.map(|v| format!("{:.2}", v + 0.0));
-        format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", in_mm(p.at))
-    };
-    let some: Vec<String> = periods.iter().take(3).map(one).collect();
-    match periods.len() - some.len() {
-        _ if some.is_empty() => String::new(),
-        0 => format!(", whatever whole numbers of cells go round {}", some.join(" and ")),
-        rest => format!(", whatever whole numbers of cells go round {} and {rest} more", some.join(", ")),
-    }
 }
 
 #[cfg(test)]
