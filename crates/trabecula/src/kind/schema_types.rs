@@ -54,7 +54,8 @@ fn joined(choices: Vec<Node>) -> Vec<Node> {
                 let keys = keys_of_one(other).unwrap_or_default().into_iter().chain(more);
                 let one = || Node::from(Value::Whole(1));
                 let properties = Value::Table(keys.map(|(key, node)| (key, None, node)).collect()).into();
-                let tables = other.entries().filter(|e| e.0 != "required").map(|(k, n)| (k.to_string(), None, n.clone()));
+                let tables =
+                    other.entries().filter(|e| e.0 != "required").map(|(k, n)| (k.to_string(), None, n.clone()));
                 let table: Node = Value::Table(tables.collect()).into();
                 *other = table.with("properties", properties).with("minProperties", one()).with("maxProperties", one());
             }

@@ -45,6 +45,9 @@ const MISSED: [f64; 2] = [0.25, 0.5];
 /// region has of them.
 const SHARP: f64 = 0.5;
 
+/// Nodes beyond the bounds of a part whose cells are held within a range of stretches.
+const PADDING: usize = 2;
+
 /// The target of a map.
 #[derive(Clone)]
 pub struct Wanted {
@@ -144,7 +147,12 @@ impl Phase {
     /// grid that is too coarse or too large; a map that folds.
     pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
         let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
-        let laid = Laid::over(bounds, chosen.grid, wanted, settings.region)?;
+        // A part mostly touches its bounds: there cells are held within a range only if the grid has some on both sides.
+        let grid = match (wanted.stretch, settings.region) {
+            (Some(_), Some(_)) => chosen.grid.padded(PADDING),
+            _ => chosen.grid,
+        };
+        let laid = Laid::over(bounds, grid, wanted, settings.region)?;
         checkpoint();
         let target = Target::new(&laid, wanted, None)?;
         checkpoint();

@@ -17,6 +17,12 @@ impl Grid {
         Grid { origin: b.min, step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape }
     }
 
+    /// The same with more nodes on each side.
+    pub fn padded(&self, by: usize) -> Grid {
+        let origin = core::array::from_fn(|a| self.origin[a] - by as f64 * self.step[a]);
+        Grid { origin, step: self.step, shape: self.shape.map(|n| n + 2 * by) }
+    }
+
     pub fn len(&self) -> usize {
         self.shape.iter().product()
     }

@@ -24,6 +24,8 @@ pub(super) struct Laid {
     pub bounds: Aabb,
     pub grid: Grid,
     pub nodes: Vec<Vec3>,
+    /// The points of the bounds nearest to nodes, where nodes are beyond them: what is asked for is known there.
+    clamped: Option<Vec<Vec3>>,
     /// The signed distance of each node from the region, mm.
     pub depth: Vec<f64>,
     /// Whether nodes are in the region.
@@ -37,7 +39,10 @@ pub(super) struct Laid {
 impl Laid {
     pub fn over(bounds: &Aabb, grid: Grid, wanted: &Wanted, region: Option<&dyn Field>) -> Result<Laid, Fault> {
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let given = wavelengths(&wanted.wavelength, &nodes)?;
+        let clamp = |p: &Vec3| core::array::from_fn(|a| p[a].clamp(bounds.min[a], bounds.max[a]));
+        let beyond = grid.origin.iter().zip(bounds.min).any(|(o, b)| *o < b);
+        let clamped: Option<Vec<Vec3>> = beyond.then(|| nodes.iter().map(clamp).collect());
+        let given = wavelengths(&wanted.wavelength, clamped.as_ref().unwrap_or(&nodes))?;
         checkpoint();
         let mut depth = vec![f64::NEG_INFINITY; grid.len()];
         if let Some(region) = region {
@@ -46,7 +51,12 @@ impl Laid {
         let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
         let reach = 1e-9 * norm(bounds.size());
         let inside = depth.iter().map(|d| *d <= reach).collect();
-        Ok(Laid { bounds: *bounds, grid, nodes, depth, inside, surface, given })
+        Ok(Laid { bounds: *bounds, grid, nodes, clamped, depth, inside, surface, given })
+    }
+
+    /// Where nodes are asked what is wanted.
+    fn asked_at(&self) -> &[Vec3] {
+        self.clamped.as_ref().unwrap_or(&self.nodes)
     }
 
     /// The root of the weight of a node; it falls off by e outside the region over some steps of the grid.
@@ -73,7 +83,7 @@ impl Laid {
     fn closeness(&self, weight: Option<&Grade>, steps: f64) -> Result<Option<Vec<f64>>, Fault> {
         let mut roots = vec![1.0; self.grid.len()];
         if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
-            weight.values(&self.nodes, &mut roots);
+            weight.values(self.asked_at(), &mut roots);
             let most = roots.iter().copied().fold(0.0, f64::max);
             let wrong = (roots.iter().zip(&self.nodes)).find(|(w, _)| !(**w >= 0.0 && w.is_finite()));
             if let Some((w, p)) = wrong {
@@ -115,12 +125,17 @@ impl Target {
     pub fn new(laid: &Laid, wanted: &Wanted, outside: Option<&[f64]>) -> Result<Target, Fault> {
         let weight: Vec<f64> = (0..laid.grid.len()).map(|n| laid.nearness(FALL, n).powi(2)).collect();
         let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
-        let Frames { at_nodes: frames, trust, range } =
-            wanted.orientation.frames(&laid.grid, &laid.nodes, smoothing.as_ref(), laid.surface.as_ref(), outside)?;
+        let Frames { at_nodes: frames, trust, range } = wanted.orientation.frames(
+            &laid.grid,
+            laid.asked_at(),
+            smoothing.as_ref(),
+            laid.surface.as_ref(),
+            outside,
+        )?;
         checkpoint();
         let lengths = match wanted.by_principal {
             true => {
-                let of = wanted.orientation.principal(&laid.nodes)?;
+                let of = wanted.orientation.principal(laid.asked_at())?;
                 Some(along_axes(&laid.grid, &of, range, &laid.given, &frames, smoothing.as_ref()))
             }
             false => None,

@@ -29,7 +29,8 @@ fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
     })
 }
 
-const BOX: Aabb = Aabb { min: [0.0; 3], max: [24.0, 24.0, 12.0] };
+/// Those of the rod, which touches them.
+const BOX: Aabb = Aabb { min: [1.0, 1.0, 0.0], max: [23.0, 23.0, 12.0] };
 
 fn rod() -> Cylinder {
     Cylinder::new([12.0, 12.0, 0.0], [0.0, 0.0, 1.0], 11.0, 12.0).expect("rod")
