@@ -48,7 +48,7 @@ def spartan(
 
 @named
 def phase(
-    wavelength: float | dict | Sequence[float | dict] | dict | None = None,
+    wavelength: float | dict | Sequence[float | dict] | None = None,
     rotate: Sequence[float | dict] | None = None,
     *,
     weight: float | dict | None = None,
@@ -57,6 +57,7 @@ def phase(
     align: Literal["surface"] | None = None,
     align_depth: float | None = None,
     stretch: Sequence[float] | None = None,
+    fix: Sequence[dict] | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: Literal["region", "box"] | None = None,
@@ -73,7 +74,7 @@ def phase(
 
     wavelength: Cell edge, one number or three, along the cell's axes or, { principal = [a, b, c] }, the principal
         directions of the stress; each may vary. Left out where the level has a fraction and a thickness or a pore, from
-        which it follows wherever they vary; three numbers are ratios then. [mm, optional]
+        which it follows wherever they vary; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. Each may vary. [degrees, optional]
     weight: Weight of the cell's shape here, compared with other positions (0 or more): where no map can follow
         everything, the error goes where this is small. [optional]
@@ -88,6 +89,8 @@ def phase(
     stretch: The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say.
         The map is the one nearest to the target that keeps to it; an error where none is found. Any unless given.
         [optional]
+    fix: Regions: on the parts of the surface in each of them the phase along the normal is a whole number, so that the
+        lattice ends there with whole cells, as many as fit best, and parts that meet there fit. [default []]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     step: Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given. [mm, above
         0, optional]
@@ -110,6 +113,7 @@ def phase(
         align=align,
         align_depth=align_depth,
         stretch=stretch,
+        fix=fix,
         offset=offset,
         step=step,
         domain=domain,
