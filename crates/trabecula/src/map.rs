@@ -9,6 +9,7 @@ mod fixed_faces;
 mod frame;
 mod integral;
 mod inverse;
+mod judged;
 mod load_cases;
 mod multigrid;
 mod pace;

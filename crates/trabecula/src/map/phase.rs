@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
-use super::frame::{self, Orientation, cube, in_mm};
+use super::frame::{Orientation, cube, in_mm};
 use super::integral::{Integral, Problem, Weights};
+use super::judged::{Judged, fold_at_node, fold_between, targets};
 use super::pace;
 use super::periods::{Angles, Period, tried};
-use super::phase_grid::Grid;
-use super::phase_target::{Laid, Target, wavelengths};
+use super::phase_target::{Laid, Target};
 use super::region_holes::{MOST, Sought};
 use super::singular_lines::{Alike, singular_lines};
 use super::solution::Solution;
@@ -28,14 +28,9 @@ use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::region::Region;
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, spectral_norm};
 use geometry::progress::checkpoint;
-use geometry::random::low_discrepancy;
 
-/// Most nodes at which a solution is compared with the target.
-const COMPARED: usize = 60_000;
-/// And most points between nodes.
-const BETWEEN: usize = 30_000;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
 /// The error |∇Φ − K|² of phases of one value, relative to |K|², above which cells round holes are considered though none fold, and the
@@ -346,62 +341,11 @@ impl Mapping for Phase {
     }
 }
 
-/// Where a solution is compared with its target: nodes in the region, and points in the region, one in a cell of the grid.
-fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<usize>, Vec<Vec3>) {
-    let within = inside.iter().filter(|i| **i).count().max(1) as f64;
-    let some = |most: usize| {
-        let keep = most as f64 / within;
-        (0..grid.len()).filter(move |n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
-    };
-    let far: usize = grid.strides().iter().sum();
-    let cell = |n: &usize| (0..3).all(|a| grid.index(*n)[a] + 1 < grid.shape[a]) && (inside[*n] || inside[n + far]);
-    let off = |n: usize| -> Vec3 {
-        let s = low_discrepancy(n + 1);
-        core::array::from_fn(|a| grid.node(n)[a] + s[a] * grid.step[a])
-    };
-    let mut between: Vec<Vec3> = some(BETWEEN).filter(cell).map(off).collect();
-    if let Some(region) = region {
-        let mut depth = vec![0.0; between.len()];
-        region.values(&between, &mut depth);
-        let mut depth = depth.into_iter();
-        between.retain(|_| depth.next().is_some_and(|d| d <= 0.0));
-    }
-    (some(COMPARED).filter(|n| inside[*n]).collect(), between)
-}
-
 /// The mean of lengths at the nodes in a region; those of the first node if none is.
 fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
     let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
     if count == 0 { of[0] } else { scale(sum, 1.0 / f64::from(count)) }
-}
-
-/// The target gradients at points; `lengths` are the wavelengths at the nodes, where they are not those that are given; `frames` are those of the nodes, from which points have their signs and axes, or, if they are
-/// smoothed, their frames.
-fn targets(
-    wanted: &Wanted,
-    range: f64,
-    grid: &Grid,
-    frames: &[Mat3],
-    lengths: Option<&[Vec3]>,
-    points: &[Vec3],
-) -> Result<Vec<Mat3>, Fault> {
-    let smooth = wanted.averaged().is_some();
-    let like: Vec<Mat3> = match smooth || wanted.orientation.is_combed() {
-        true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
-        false => Vec::new(),
-    };
-    let frames = if smooth { like } else { wanted.orientation.frames_near(points, &like, range)? };
-    let between = |p: &Vec3, of: &[Vec3]| grid.around(*p).iter().fold([0.0; 3], |m, (n, s)| add(m, scale(of[*n], *s)));
-    let wavelength = match lengths {
-        Some(of) => points.par_iter().map(|p| between(p, of)).collect(),
-        None => wavelengths(&wanted.wavelength, points)?,
-    };
-    let each = frames.iter().zip(&wavelength).map(|(f, w)| {
-        let k = transpose(f);
-        [0, 1, 2].map(|i| scale(k[i], 1.0 / w[i]))
-    });
-    Ok(each.collect())
 }
 
 /// What may keep a map from folding.
@@ -468,66 +412,6 @@ impl Found {
     }
 }
 
-/// How a solution compares with its target.
-struct Judged {
-    distortion: Distortion,
-    /// Jacobians where they were compared.
-    jacobians: Vec<Mat3>,
-    /// |∇Φ − K|² over |K|², all three in the mean over points between nodes.
-    missed: f64,
-    /// Where det J is not positive.
-    fold: Option<Vec3>,
-}
-
-impl Judged {
-    fn of(
-        laid: &Laid,
-        wanted: &Wanted,
-        region: Option<&dyn Field>,
-        target: &Target,
-        solution: &Solution,
-    ) -> Result<Judged, Fault> {
-        let (Laid { grid, nodes, inside, .. }, wavelength) = (laid, target.wavelength(laid));
-        let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
-        // The density at every node; the other measures, which cost more, at some tens of thousands.
-        let density: Vec<f64> = within
-            .par_iter()
-            .map(|&n| {
-                let cells = determinant(&solution.jacobian(nodes[n]));
-                cells * wavelength[n].iter().product::<f64>()
-            })
-            .collect();
-        checkpoint();
-        let (compared, between) = compared(grid, inside, region);
-        let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
-        let jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
-        let off_nodes = targets(wanted, target.range, grid, &target.frames, target.lengths.as_deref(), &between)?;
-        let k = &target.k;
-        let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
-        let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
-        let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
-        let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(grid, k, n)).collect();
-        let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
-        let turn = distortion::turning(grid, &target.frames, inside, longest);
-        let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
-        let least = (0..density.len()).min_by(order);
-        let most = (0..density.len()).max_by(order);
-        let mut distortion = Distortion {
-            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
-            least_at: least.map_or(laid.bounds.center(), |n| nodes[within[n]]),
-            ..Distortion::of(&found, compared.len(), &curl, turn)
-        };
-        distortion.widen(&found, &positions);
-        let squares = |m: &Mat3| m.as_flattened().iter().map(|v| v * v).sum::<f64>();
-        let even = || jacobians.iter().zip(&asked).skip(compared.len());
-        let off: f64 = even().map(|(j, k)| squares(&core::array::from_fn(|i| sub(j[i], k[i])))).sum();
-        let missed = off / even().map(|(_, k)| squares(k)).sum::<f64>().max(f64::MIN_POSITIVE);
-        let worst = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
-        let fold = worst.or_else(|| fold_between(solution, inside));
-        Ok(Judged { distortion, jacobians, missed, fold })
-    }
-}
-
 /// The map whose phases close round all holes, if the region has some: of the best whole numbers of cells the first that does not fold, or
 /// if all do and where they may, the best. Also what was tried, in words.
 fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Result<(Option<Found>, String), Fault> {
@@ -572,24 +456,6 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
     }
     let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
     Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words))
-}
-
-/// A node in the region where det J is not positive.
-fn fold_at_node(solution: &Solution, laid: &Laid) -> Option<Vec3> {
-    let nodes = laid.nodes.par_iter().zip(&laid.inside).filter(|(_, inside)| **inside);
-    nodes.map(|(p, _)| *p).find_first(|p| determinant(&solution.jacobian(*p)) <= 0.0)
-}
-
-/// The middle of a cell of the grid in the region where det J is not positive.
-fn fold_between(solution: &Solution, inside: &[bool]) -> Option<Vec3> {
-    let grid = solution.grid();
-    let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
-    let far: usize = strides.iter().sum();
-    (0..grid.len())
-        .into_par_iter()
-        .filter(|&n| (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far])
-        .map(|n| add(grid.node(n), half))
-        .find_first(|p| determinant(&solution.jacobian(*p)) <= 0.0)
 }
 
 /// A map that folds at a place.

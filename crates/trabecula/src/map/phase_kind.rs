@@ -44,7 +44,7 @@ pub struct PhaseKind {
     #[kind(unit = "mm", above = 0.0)]
     align_depth: Option<f64>,
     /// The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say. The map is the
-    /// one nearest to the target that keeps to it; an error where none is found. Any unless given.
+    /// one nearest to the target that keeps to it; a warning where none is found. Any unless given.
     stretch: Option<[f64; 2]>,
     /// Regions: on the parts of the surface in each of them the phase along the normal is a whole number, so that the lattice ends there
     /// with whole cells, as many as fit best, and parts that meet there fit.

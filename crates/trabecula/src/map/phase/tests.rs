@@ -1,8 +1,10 @@
+use super::super::judged::compared;
+use super::super::phase_grid::Grid;
 use super::super::poisson::Poisson;
 use super::*;
 use crate::grade::{Formula, Linear};
 use crate::map::Affine;
-use geometry::math::rotation;
+use geometry::math::{rotation, sub};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
