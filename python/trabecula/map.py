@@ -87,7 +87,7 @@ def phase(
         in what is asked for there; without an orientation, what continues the surface's. [optional]
     align_depth: How deep that reaches below the surface; two wavelengths unless given. [mm, above 0, optional]
     stretch: The least and the greatest length of a cell, along any direction, over the one asked for: [0.67, 1.5], say.
-        The map is the one nearest to the target that keeps to it; an error where none is found. Any unless given.
+        The map is the one nearest to the target that keeps to it; a warning where none is found. Any unless given.
         [optional]
     fix: Regions: on the parts of the surface in each of them the phase along the normal is a whole number, so that the
         lattice ends there with whole cells, as many as fit best, and parts that meet there fit. [default []]
