@@ -7,6 +7,7 @@ mod distortion;
 mod edge_squares;
 mod fixed_faces;
 mod frame;
+mod grid_cells;
 mod integral;
 mod inverse;
 mod judged;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::phase_grid::Grid;
 use super::singular_lines::SingularLine;
-use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
+use geometry::math::{Aabb, Mat3, Vec3, cross, determinant, dot, norm, product, spectral_norm, transpose};
 
 /// A number over the region: its mean, its 95th percentile, its greatest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -99,23 +99,24 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
     }
     let relative = product(j, &back);
     let density = determinant(&relative);
-    let greatest = spectral_norm(&relative);
-    // |det| is the product of all three stretches; the least is one over that of the inverse.
-    let cofactors = [
-        geometry::math::cross(relative[1], relative[2]),
-        geometry::math::cross(relative[2], relative[0]),
-        geometry::math::cross(relative[0], relative[1]),
-    ];
-    let least = density.abs() / spectral_norm(&cofactors);
+    let stretch = stretch(&relative);
     let shear = [(0, 1), (0, 2), (1, 2)].map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs()).into_iter().fold(0.0, f64::max);
     Misfit {
         angle: core::array::from_fn(|i| angle(j[i], k[i])),
         spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
         shear,
-        anisotropy: if least > 0.0 { greatest / least } else { f64::INFINITY },
-        stretch: [1.0 / greatest, (1.0 / least).min(f64::MAX)],
+        anisotropy: if density == 0.0 { f64::INFINITY } else { stretch[1] / stretch[0] },
+        stretch,
         density,
     }
+}
+
+/// The least and the greatest length of a cell over the one asked for, of J K⁻¹: one over its singular values.
+pub(super) fn stretch(relative: &Mat3) -> [f64; 2] {
+    let [a, b, c] = relative;
+    // |det| is the product of all three; the least is one over the greatest of the inverse.
+    let cofactors = [cross(*b, *c), cross(*c, *a), cross(*a, *b)];
+    [1.0 / spectral_norm(relative), (spectral_norm(&cofactors) / determinant(relative).abs()).min(f64::MAX)]
 }
 
 impl Distortion {

@@ -12,7 +12,7 @@ use super::spline::Spline;
 use crate::field::Field;
 use crate::region::Region;
 use geometry::fault::{Fault, number};
-use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
+use geometry::math::{Vec3, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 use geometry::union_find::{labels, singles, unite};
 
@@ -153,8 +153,7 @@ fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Re
 
 /// The point of the surface nearest to one.
 fn foot(p: Vec3, distance: f64, gradient: Vec3) -> Vec3 {
-    let size = norm(gradient);
-    if size > 0.5 { sub(p, scale(gradient, distance / (size * size))) } else { add(p, gradient) }
+    sub(p, scale(gradient, distance / dot(gradient, gradient).max(f64::MIN_POSITIVE)))
 }
 
 /// Nodes by the face that they are next to: adjacent ones with nearly the same normal.

@@ -120,9 +120,15 @@ impl Orientation {
         surface: Option<&Surface>,
         outside: Option<&[f64]>,
     ) -> Result<Frames, Fault> {
-        if let (Some(surface), Some(smoothing)) = (surface, smoothing) {
+        if let (Some(smoothing), true) = (smoothing, surface.is_some() || matches!(self, Orientation::Stress(_))) {
             let (frames, gaps, range) = self.asked(grid, nodes, outside)?;
-            let averages = smoothing.frames(grid, |n| surface.mixed(n, Octahedral::of(&frames[n], &gaps(n))));
+            let averages = smoothing.frames(grid, |n| {
+                let own = Octahedral::of(&frames[n], &gaps(n));
+                match surface {
+                    Some(surface) => surface.mixed(n, own),
+                    None => own,
+                }
+            });
             return Ok(averaged(grid, frames, &averages, range, outside));
         }
         let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
@@ -143,21 +149,14 @@ impl Orientation {
                 let x = x.at_nodes(grid, nodes, "frame.x", smoothing, outside)?;
                 sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing, outside)?, nodes)?)
             }
-            Orientation::Stress(of) => {
-                let found = of.principal(nodes)?;
-                let range = range(&found, outside);
-                if range == 0.0 {
-                    return Err(no_principal());
-                }
+            Orientation::Stress(_) => {
+                let (found, range) = self.ranged(nodes, outside)?;
                 let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
-                let of_part: Vec<Vec3> = found.iter().map(|p| scale(p.gaps(), 1.0 / range)).collect();
-                if let Some(smoothing) = smoothing {
-                    let averages = smoothing.frames(grid, |n| Octahedral::of(&frames[n], &of_part[n]));
-                    return Ok(averaged(grid, frames, &averages, range, outside));
-                }
+                let least = |n: usize| found[n].gaps().into_iter().map(|g| g / range).fold(f64::INFINITY, f64::min);
                 let turns = cube();
-                let least = first_in(outside, |n| of_part[n].into_iter().fold(f64::INFINITY, f64::min));
-                comb(grid, &mut frames, least, |n, f, to| settled(f, &found[n].own_gaps(range), to, &turns));
+                comb(grid, &mut frames, first_in(outside, least), |n, f, to| {
+                    settled(f, &found[n].own_gaps(range), to, &turns)
+                });
                 Ok(Frames { at_nodes: frames, trust: None, range })
             }
         }
@@ -167,11 +166,7 @@ impl Orientation {
     /// range of those in the part; and that range. Where cells are not turned at all, nothing is asked for.
     fn asked(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<Asked, Fault> {
         if let Orientation::Stress(_) = self {
-            let found = self.principal(nodes)?;
-            let range = range(&found, outside);
-            if range == 0.0 {
-                return Err(no_principal());
-            }
+            let (found, range) = self.ranged(nodes, outside)?;
             let frames = found.iter().map(|p| p.frame).collect();
             return Ok((frames, Box::new(move |n| scale(found[n].gaps(), 1.0 / range)), range));
         }
@@ -181,6 +176,13 @@ impl Orientation {
             _ => [1.0; 3],
         };
         Ok((self.frames(grid, nodes, None, None, outside)?.at_nodes, Box::new(move |_| gaps), 0.0))
+    }
+
+    /// The principal directions of a stress, and the range of its values in the part.
+    fn ranged(&self, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Vec<Principal>, f64), Fault> {
+        let found = self.principal(nodes)?;
+        let range = range(&found, outside);
+        if range == 0.0 { Err(no_principal()) } else { Ok((found, range)) }
     }
 
     /// The principal directions of a stress at points; none of other orientations.

@@ -112,16 +112,8 @@ mod tests {
         let still = Grade::Constant(0.0);
         let wave = Grade::Constant(3.0);
         let wanted = Wanted {
-            wavelength: [wave.clone(), wave.clone(), wave],
-            orientation: Orientation::Angles([still.clone(), still, turn]),
             offset: [0.2, 0.3, -0.1],
-            weight: None,
-            angle_weight: 1.0,
-            smooth: None,
-            by_principal: false,
-            align: None,
-            stretch: None,
-            fix: Vec::new(),
+            ..Wanted::new([wave.clone(), wave.clone(), wave], Orientation::Angles([still.clone(), still, turn]))
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

@@ -70,6 +70,22 @@ pub struct Wanted {
 }
 
 impl Wanted {
+    /// Cells of these edges (mm) along their axes, turned so, and nothing else.
+    pub fn new(wavelength: [Grade; 3], orientation: Orientation) -> Wanted {
+        Wanted {
+            wavelength,
+            by_principal: false,
+            orientation,
+            weight: None,
+            angle_weight: 1.0,
+            smooth: None,
+            align: None,
+            stretch: None,
+            fix: Vec::new(),
+            offset: [0.0; 3],
+        }
+    }
+
     /// The length over which frames are averaged, mm, if they are.
     pub(super) fn averaged(&self) -> Option<f64> {
         self.align.map(|a| a.length(self.smooth)).or(self.smooth)

@@ -149,7 +149,8 @@ pub enum GradeOrThree {
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(noun = "cell edges along principal directions")]
 pub struct PrincipalLengths {
-    /// Along the direction of the greatest principal stress (tension is positive), of the middle and of the least. Where two values
+    /// Along the direction of the greatest principal stress (tension is positive; of several load cases by the mean, the root mean
+    /// square), of the middle and of the least. Where two values
     /// are within 10 % they are the same along both.
     #[kind(unit = "mm", above = 0.0)]
     principal: Box<[GradeSpec; 3]>,

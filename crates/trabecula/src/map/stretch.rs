@@ -11,11 +11,11 @@
 
 use rayon::prelude::*;
 
-use super::distortion::Distortion;
+use super::distortion::{Distortion, stretch};
 use super::edge_squares::gradient;
 use super::frame::in_mm;
+use super::grid_cells::GridCells;
 use super::integral::Problem;
-use super::phase_grid::Grid;
 use super::solution::Solution;
 use super::spline::Spline;
 use geometry::fault::{Fault, number};
@@ -117,11 +117,7 @@ impl Stretch {
 /// cells are turned inside out.
 pub(super) fn stretches(j: &Mat3, k: &Mat3) -> Option<[f64; 2]> {
     let f = product(j, &inverse(k));
-    if determinant(&f) <= 0.0 {
-        return None;
-    }
-    let ([least, _, most], _) = eigen(&product(&transpose(&f), &f));
-    Some([1.0 / most.sqrt(), 1.0 / least.max(0.0).sqrt()])
+    (determinant(&f) > 0.0).then(|| stretch(&f))
 }
 
 /// A unit vector at right angles to one.
@@ -137,7 +133,7 @@ fn any_normal(v: Vec3) -> Vec3 {
 pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: Solution) -> Solution {
     let grid = *solution.grid();
     let mut values = solution.spline.at_nodes();
-    let cells = Cells::new(&grid);
+    let cells = GridCells::new(grid);
     let middles: Vec<Vec3> = (0..cells.len()).map(|c| cells.middle(c)).collect();
     let mut wound = vec![[[0.0; 3]; 3]; middles.len()];
     solution.winding.add_jacobians(&middles, &mut wound);
@@ -182,70 +178,4 @@ pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, soluti
         }
     }
     Solution { spline: Spline::through(grid, values), winding: solution.winding }
-}
-
-/// The cells of a grid of nodes.
-struct Cells<'a> {
-    grid: &'a Grid,
-    shape: [usize; 3],
-}
-
-impl<'a> Cells<'a> {
-    fn new(grid: &'a Grid) -> Cells<'a> {
-        Cells { grid, shape: grid.shape.map(|n| n - 1) }
-    }
-
-    fn len(&self) -> usize {
-        self.shape.iter().product()
-    }
-
-    /// The first node of a cell.
-    fn first(&self, c: usize) -> usize {
-        let [nx, ny, _] = self.shape;
-        let [_, y, z] = self.grid.strides();
-        c % nx + c / nx % ny * y + c / nx / ny * z
-    }
-
-    fn corners(&self, c: usize) -> [usize; 8] {
-        let (first, strides) = (self.first(c), self.grid.strides());
-        core::array::from_fn(|n| first + (0..3).map(|a| (n >> a & 1) * strides[a]).sum::<usize>())
-    }
-
-    fn middle(&self, c: usize) -> Vec3 {
-        add(self.grid.node(self.first(c)), scale(self.grid.step, 0.5))
-    }
-
-    fn mean(&self, c: usize, of: impl Fn(usize) -> Mat3) -> Mat3 {
-        let each = self.corners(c).map(of);
-        core::array::from_fn(|i| core::array::from_fn(|j| each.iter().map(|m| m[i][j]).sum::<f64>() / 8.0))
-    }
-
-    /// The gradient in the middle: the mean slopes of the four edges along each axis.
-    fn slope(&self, c: usize, slopes: &[Vec3]) -> Vec3 {
-        let near = self.corners(c);
-        [0, 1, 2].map(|a| (0..8).filter(|i| i >> a & 1 == 0).map(|i| 0.25 * slopes[near[i]][a]).sum())
-    }
-
-    /// For each edge above a node the mean over the cells about it.
-    fn on_edges(&self, of: &[Mat3], row: usize) -> Vec<Vec3> {
-        let grid = self.grid;
-        let edge = |n: usize, a: usize| {
-            let at = grid.index(n);
-            if at[a] == self.shape[a] {
-                return 0.0;
-            }
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            let (mut sum, mut count) = (0.0, 0.0);
-            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                let mut low = at;
-                (low[b], low[c]) = (at[b].wrapping_sub(i), at[c].wrapping_sub(j));
-                if low[b] < self.shape[b] && low[c] < self.shape[c] {
-                    sum += of[(low[2] * self.shape[1] + low[1]) * self.shape[0] + low[0]][row][a];
-                    count += 1.0;
-                }
-            }
-            sum / count
-        };
-        (0..grid.len()).into_par_iter().map(|n| [0, 1, 2].map(|a| edge(n, a))).collect()
-    }
 }

@@ -11,14 +11,14 @@
 
 use rayon::prelude::*;
 
+use super::grid_cells::GridCells;
 use super::phase_grid::Grid;
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
 /// The part of the weight that is no multiple of the identity.
 pub(super) struct Tilt {
     grid: Grid,
-    /// Cells along each axis.
-    cells: [usize; 3],
+    cells: GridCells,
     /// For each cell K̂ and what the part counts.
     of: Vec<(Vec3, f64)>,
     /// Whether the component across K is penalised, or the one along it.
@@ -32,12 +32,12 @@ impl Tilt {
         if ratio == 1.0 {
             return None;
         }
-        let cells = grid.shape.map(|n| n - 1);
+        let cells = GridCells::new(grid);
         let across = ratio > 1.0;
         let more = if across { ratio } else { 1.0 / ratio } - 1.0;
         let mut tilt = Tilt { grid, cells, of: Vec::new(), across };
-        let each = (0..cells.iter().product()).into_par_iter().map(|c| {
-            let near = tilt.corners(c);
+        let each = (0..tilt.cells.len()).into_par_iter().map(|c| {
+            let near = tilt.cells.corners(c);
             let wanted = near.iter().fold([0.0; 3], |m, n| add(m, k[*n]));
             let root = near.iter().map(|n| s[*n]).sum::<f64>() / 8.0;
             let long = norm(wanted);
@@ -46,15 +46,6 @@ impl Tilt {
         });
         tilt.of = each.collect();
         Some(tilt)
-    }
-
-    /// The nodes of a cell, x running fastest.
-    fn corners(&self, c: usize) -> [usize; 8] {
-        let [nx, ny, _] = self.cells;
-        let at = [c % nx, c / nx % ny, c / nx / ny];
-        let strides = self.grid.strides();
-        let first: usize = (0..3).map(|a| at[a] * strides[a]).sum();
-        core::array::from_fn(|n| first + (0..3).map(|a| (n >> a & 1) * strides[a]).sum::<usize>())
     }
 
     /// The part applied to a gradient in a cell.
@@ -73,10 +64,8 @@ impl Tilt {
             for i in 0..8 {
                 // The node is corner i of this cell, if there is one.
                 let low = [0, 1, 2].map(|a| at[a].wrapping_sub(i >> a & 1));
-                if (0..3).any(|a| low[a] >= self.cells[a]) {
-                    continue;
-                }
-                let q = cells[(low[2] * self.cells[1] + low[1]) * self.cells[0] + low[0]];
+                let Some(c) = self.cells.at(low) else { continue };
+                let q = cells[c];
                 for a in 0..3 {
                     let sign = if i >> a & 1 == 1 { 0.25 } else { -0.25 };
                     sum += sign * q[a] / grid.step[a];
@@ -90,7 +79,7 @@ impl Tilt {
     /// The part of the operator: Bᵀ P B Φ.
     pub fn apply(&self, f: &[f64]) -> Vec<f64> {
         let each = (0..self.of.len()).into_par_iter().map(|c| {
-            let near = self.corners(c);
+            let near = self.cells.corners(c);
             let slope = |a: usize| {
                 let sign = |i: usize| if i >> a & 1 == 1 { 0.25 } else { -0.25 };
                 (0..8).map(|i| sign(i) * f[near[i]]).sum::<f64>() / self.grid.step[a]
@@ -100,22 +89,15 @@ impl Tilt {
         self.spread(&each.collect::<Vec<Vec3>>())
     }
 
-    /// The gradient in a cell by the slopes along its edges, each kept at the node below it.
-    fn mean(&self, c: usize, slopes: &[Vec3]) -> Vec3 {
-        let near = self.corners(c);
-        let below = |a: usize| (0..8).filter(move |i| i >> a & 1 == 0);
-        [0, 1, 2].map(|a| 0.25 * below(a).map(|i| slopes[near[i]][a]).sum::<f64>())
-    }
-
     /// The part of the right-hand side: Bᵀ P of slopes along the edges above the nodes.
     pub fn wanted(&self, slopes: &[Vec3]) -> Vec<f64> {
-        let each = (0..self.of.len()).into_par_iter().map(|c| self.weighted(c, self.mean(c, slopes)));
+        let each = (0..self.of.len()).into_par_iter().map(|c| self.weighted(c, self.cells.slope(c, slopes)));
         self.spread(&each.collect::<Vec<Vec3>>())
     }
 
     /// The part of the sum of products of two sets of slopes along the edges above the nodes.
     pub fn product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
-        let one = |c: usize| dot(self.weighted(c, self.mean(c, a)), self.mean(c, b));
+        let one = |c: usize| dot(self.weighted(c, self.cells.slope(c, a)), self.cells.slope(c, b));
         (0..self.of.len()).into_par_iter().map(one).collect::<Vec<f64>>().iter().sum()
     }
 }

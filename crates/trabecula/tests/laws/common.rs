@@ -4,10 +4,11 @@ use std::collections::HashSet;
 use std::io::Cursor;
 use std::sync::Arc;
 
-use geometry::math::Vec3;
+use geometry::math::{Aabb, Mat3, Vec3, dot, norm};
 use geometry::measure::{non_manifold_vertices, self_intersections, size};
 use geometry::mesh::Mesh;
 use geometry::progress::{Silent, Stopped};
+use geometry::random::random;
 use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
@@ -26,6 +27,39 @@ pub fn ball(center: Vec3, radius: f64) -> Region {
 
 pub fn cuboid(min: Vec3, max: Vec3) -> Region {
     Arc::new(Cuboid::new(min, max).expect("box"))
+}
+
+/// Points spread evenly over a box.
+pub fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
+    let b = *b;
+    (1..=n).map(move |i| {
+        let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract());
+        core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a])
+    })
+}
+
+/// Random points in a region.
+pub fn within(region: &Region, count: usize, seed: u64) -> Vec<Vec3> {
+    let (b, mut seed) = (region.bounds(), seed);
+    let mut points = Vec::new();
+    while points.len() < count {
+        let p = [0, 1, 2].map(|a| b.center()[a] + 0.5 * b.size()[a] * random(&mut seed));
+        if region.value(p) < 0.0 {
+            points.push(p);
+        }
+    }
+    points
+}
+
+/// The angle (degrees) between a line and the nearest of the axes of a map with this Jacobian.
+pub fn off_axis(jacobian: &Mat3, along: Vec3) -> f64 {
+    let cosine = jacobian.iter().map(|k| dot(*k, along).abs() / norm(*k)).fold(0.0, f64::max);
+    cosine.min(1.0).acos().to_degrees()
+}
+
+pub fn mean(of: impl Iterator<Item = f64>) -> f64 {
+    let all: Vec<f64> = of.collect();
+    all.iter().sum::<f64>() / all.len() as f64
 }
 
 /// Regions of all kinds, by three numbers about one.

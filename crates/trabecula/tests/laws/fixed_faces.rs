@@ -1,34 +1,24 @@
 //! Phases that are whole numbers on faces of the part.
 
+use crate::common::cuboid;
 use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm};
 use trabecula::grade::Grade;
 use trabecula::map::{Aligned, Mapping, Orientation, Phase, Settings, Wanted};
-use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region};
+use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
 fn wanted(wavelength: f64, rotate: Vec3, fix: Vec<Region>) -> Wanted {
     Wanted {
-        wavelength: [0; 3].map(|_| Grade::Constant(wavelength)),
-        by_principal: false,
-        orientation: Orientation::Angles(rotate.map(Grade::Constant)),
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
-        align: None,
-        stretch: None,
         fix,
         offset: [0.3, 0.2, -0.1],
+        ..Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), Orientation::Angles(rotate.map(Grade::Constant)))
     }
 }
 
 fn solve(region: &Region, wanted: &Wanted) -> Result<Phase, String> {
     let settings = Settings { region: Some(&**region), ..Settings::default() };
     Phase::solve(&region.bounds(), wanted, &settings).map_err(|f| f.to_string())
-}
-
-fn cuboid(min: Vec3, max: Vec3) -> Region {
-    Arc::new(Cuboid::new(min, max).expect("box"))
 }
 
 fn phases(map: &Phase, p: Vec3) -> Vec3 {

@@ -1,6 +1,7 @@
 //! Cells along a stress that a solver might give: noise, parts that carry nothing, signs and orders of no meaning.
 
-use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, scale};
+use crate::common::{mean, off_axis, points};
+use geometry::math::{Aabb, Vec3, determinant, dot, norm, scale};
 use trabecula::grade::{Grade, Samples};
 use trabecula::map::{Axis, Mapping, Orientation, Phase, Settings, Wanted};
 
@@ -23,38 +24,8 @@ fn samples<const N: usize>(b: &Aabb, of: impl Fn(Vec3, &mut dyn FnMut() -> f64) 
 }
 
 fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Phase, String> {
-    let wanted = Wanted {
-        wavelength: [0; 3].map(|_| Grade::Constant(WAVELENGTH)),
-        orientation,
-        weight: None,
-        angle_weight: 1.0,
-        smooth,
-        by_principal: false,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
-        offset: [0.0; 3],
-    };
+    let wanted = Wanted { smooth, ..Wanted::new([0; 3].map(|_| Grade::Constant(WAVELENGTH)), orientation) };
     Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)
-}
-
-fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
-    let b = *b;
-    (1..=n).map(move |i| {
-        let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract());
-        core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a])
-    })
-}
-
-/// The angle (degrees) between a line and the nearest of the lattice's axes.
-fn off_axis(jacobian: &Mat3, along: Vec3) -> f64 {
-    let cosine = jacobian.iter().map(|k| dot(*k, along).abs() / norm(*k)).fold(0.0, f64::max);
-    cosine.min(1.0).acos().to_degrees()
-}
-
-fn mean(angles: impl Iterator<Item = f64>) -> f64 {
-    let all: Vec<f64> = angles.collect();
-    all.iter().sum::<f64>() / all.len() as f64
 }
 
 /// Pure bending about z, with noise of each component at each node: wherever the beam carries a tenth of the greatest stress an axis of

@@ -1,5 +1,6 @@
 //! Solved maps of parts with holes: phases grow round each by a whole number of cells.
 
+use crate::common::within;
 use std::sync::Arc;
 
 use geometry::math::{Aabb, Vec3, add, apply, determinant, norm, sub, unit};
@@ -21,18 +22,7 @@ fn formula(text: &str) -> Grade {
 }
 
 fn wanted(wavelength: f64, orientation: Orientation) -> Wanted {
-    Wanted {
-        wavelength: [0; 3].map(|_| Grade::Constant(wavelength)),
-        orientation,
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
-        by_principal: false,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
-        offset: [0.0; 3],
-    }
+    Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
 }
 
 fn tube(base: Vec3, axis: Vec3, radii: [f64; 2], height: f64) -> Region {
@@ -45,19 +35,6 @@ fn tube(base: Vec3, axis: Vec3, radii: [f64; 2], height: f64) -> Region {
 fn solve(region: &Region, wanted: &Wanted, step: Option<f64>) -> Phase {
     let settings = Settings { region: Some(&**region), step, ..Settings::default() };
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
-}
-
-/// Points in a region.
-fn within(region: &Region, count: usize, seed: u64) -> Vec<Vec3> {
-    let (b, mut seed) = (region.bounds(), seed);
-    let mut points = Vec::new();
-    while points.len() < count {
-        let p = [0, 1, 2].map(|a| b.center()[a] + 0.5 * b.size()[a] * random(&mut seed));
-        if region.value(p) < 0.0 {
-            points.push(p);
-        }
-    }
-    points
 }
 
 /// The directions out from a line and round it, as formulas.

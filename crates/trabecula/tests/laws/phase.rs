@@ -25,16 +25,8 @@ fn cell(name: &str) -> Arc<Cell> {
 
 fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
     let wanted = Wanted {
-        wavelength: wavelength.map(formula),
-        orientation: Orientation::Angles(angles.map(formula)),
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
-        by_principal: false,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
         offset: [0.1, 0.2, 0.3],
+        ..Wanted::new(wavelength.map(formula), Orientation::Angles(angles.map(formula)))
     };
     Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))
 }

@@ -10,16 +10,9 @@ const LENGTHS: Vec3 = [3.0, 4.0, 5.0];
 
 fn solved(stress: [Grade; 6], smooth: Option<f64>) -> Phase {
     let wanted = Wanted {
-        wavelength: LENGTHS.map(Grade::Constant),
         by_principal: true,
-        orientation: Orientation::Stress(stress.into()),
-        weight: None,
-        angle_weight: 1.0,
         smooth,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
-        offset: [0.0; 3],
+        ..Wanted::new(LENGTHS.map(Grade::Constant), Orientation::Stress(stress.into()))
     };
     Phase::solve(&BOX, &wanted, &Settings::default()).unwrap_or_else(|f| panic!("{f}"))
 }

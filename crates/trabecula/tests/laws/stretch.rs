@@ -1,5 +1,6 @@
 //! Bounds on how much cells are stretched hold wherever a map is accepted.
 
+use crate::common::points;
 use geometry::math::{Aabb, Vec3, determinant};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
@@ -8,25 +9,12 @@ use trabecula::region::Cylinder;
 
 fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> Wanted {
     Wanted {
-        wavelength: [0; 3].map(|_| Grade::Constant(3.0)),
-        orientation: Orientation::Angles(rotate.map(|f| Grade::from(Formula::parse(f).expect("formula")))),
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
-        by_principal: false,
-        align: None,
         stretch: range.map(|r| Stretch::new(r).expect("range")),
-        fix: Vec::new(),
-        offset: [0.0; 3],
+        ..Wanted::new(
+            [0; 3].map(|_| Grade::Constant(3.0)),
+            Orientation::Angles(rotate.map(|f| Grade::from(Formula::parse(f).expect("formula")))),
+        )
     }
-}
-
-fn points(b: &Aabb, n: usize) -> impl Iterator<Item = Vec3> {
-    let b = *b;
-    (1..=n).map(move |i| {
-        let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract());
-        core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a])
-    })
 }
 
 /// Those of the rod, which touches them.

@@ -1,25 +1,17 @@
 //! Cells of which an axis is along the normal of the surface.
 
+use crate::common::{cuboid, mean, off_axis, within};
 use std::sync::Arc;
 
-use geometry::math::{Mat3, Vec3, determinant, dot, norm, unit};
-use geometry::random::random;
+use geometry::math::{Vec3, determinant, norm, unit};
 use trabecula::grade::{Formula, Grade};
 use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, Settings, Wanted};
-use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region};
+use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
 fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> Wanted {
     Wanted {
-        wavelength: [0; 3].map(|_| Grade::Constant(wavelength)),
-        by_principal: false,
-        orientation,
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
         align: depth.map(|d| Aligned::new(d).expect("depth")),
-        stretch: None,
-        fix: Vec::new(),
-        offset: [0.0; 3],
+        ..Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
     }
 }
 
@@ -32,40 +24,12 @@ fn solve(region: &Region, wanted: &Wanted) -> Phase {
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
 }
 
-fn cuboid(min: Vec3, max: Vec3) -> Region {
-    Arc::new(Cuboid::new(min, max).expect("box"))
-}
-
-/// Points in a region.
-fn within(region: &Region, count: usize) -> Vec<Vec3> {
-    let (b, mut seed) = (region.bounds(), 3);
-    let mut points = Vec::new();
-    while points.len() < count {
-        let p = [0, 1, 2].map(|a| b.center()[a] + 0.5 * b.size()[a] * random(&mut seed));
-        if region.value(p) < 0.0 {
-            points.push(p);
-        }
-    }
-    points
-}
-
-/// The angle (degrees) between a line and the nearest of the lattice's axes.
-fn off_axis(jacobian: &Mat3, along: Vec3) -> f64 {
-    let cosine = jacobian.iter().map(|k| dot(*k, along).abs() / norm(*k)).fold(0.0, f64::max);
-    cosine.min(1.0).acos().to_degrees()
-}
-
-fn mean(of: impl Iterator<Item = f64>) -> f64 {
-    let all: Vec<f64> = of.collect();
-    all.iter().sum::<f64>() / all.len() as f64
-}
-
 /// In a box all normals are axes of one frame, edges and corners included: the map is affine, to the end of the search for a frame.
 #[test]
 fn cells_in_a_box_are_along_its_edges() {
     let region = cuboid([-3.0, 2.0, 1.0], [11.0, 12.0, 9.0]);
     let map = solve(&region, &wanted(2.0, angles([0.0; 3]), Some(3.0)));
-    for p in within(&region, 500) {
+    for p in within(&region, 500, 3) {
         let j = map.jacobian(p);
         for a in 0..3 {
             let mut e = [0.0; 3];
@@ -94,7 +58,7 @@ fn cells_in_a_curved_panel_follow_it() {
         solve(&region, &wanted(2.0, Orientation::Frame { x: radius, z: up }, None)),
     ]
     .map(|map| {
-        let points = within(&region, 5000);
+        let points = within(&region, 5000, 3);
         assert!(points.iter().all(|p| determinant(&map.jacobian(*p)) > 0.0));
         mean(points.iter().map(|p| off_axis(&map.jacobian(*p), unit([p[0], p[1], 0.0]))))
     });
@@ -108,7 +72,7 @@ fn cells_in_a_curved_panel_follow_it() {
 #[test]
 fn cells_within_are_turned_as_asked() {
     let region = cuboid([0.0; 3], [20.0, 20.0, 6.0]);
-    let points = within(&region, 20_000);
+    let points = within(&region, 20_000, 3);
     let normal = |p: &Vec3| match [0, 1].map(|a| p[a].min(20.0 - p[a]) < 0.4) {
         [true, false] => Some([1.0, 0.0, 0.0]),
         [false, true] => Some([0.0, 1.0, 0.0]),

@@ -18,18 +18,10 @@ fn bounds(min: Vec3, max: Vec3) -> Aabb {
 
 fn about_z(angle: &str, wavelength: Grade) -> Wanted {
     let zero = || Grade::Constant(0.0);
-    Wanted {
-        wavelength: [wavelength.clone(), wavelength.clone(), wavelength],
-        orientation: Orientation::Angles([zero(), zero(), formula(angle)]),
-        weight: None,
-        angle_weight: 1.0,
-        smooth: None,
-        by_principal: false,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
-        offset: [0.0; 3],
-    }
+    Wanted::new(
+        [wavelength.clone(), wavelength.clone(), wavelength],
+        Orientation::Angles([zero(), zero(), formula(angle)]),
+    )
 }
 
 fn at(phase: &Phase, p: Vec3) -> Vec3 {
@@ -46,16 +38,9 @@ fn what_does_not_vary_is_the_affine_map() {
     let wavelength = [4.0, 5.0, 3.0];
     let offset = [0.3, -0.2, 5.0];
     let wanted = Wanted {
-        wavelength: wavelength.map(Grade::Constant),
-        orientation: Orientation::Angles(angles.map(Grade::Constant)),
         weight: Some(formula("1 + x*x")),
-        angle_weight: 1.0,
-        smooth: None,
-        by_principal: false,
-        align: None,
-        stretch: None,
-        fix: Vec::new(),
         offset,
+        ..Wanted::new(wavelength.map(Grade::Constant), Orientation::Angles(angles.map(Grade::Constant)))
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
     let affine = Affine::rigid(wavelength, angles, offset, &[]).expect("map");
