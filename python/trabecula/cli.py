@@ -401,7 +401,7 @@ def serve(argv: list[str] | None) -> int:
         from .machine import fewer_threads
 
         fewer_threads(getattr(args, "threads", None))
-        from . import commands
+        from . import commands, inputs
         from .errors import DesignWarning
 
         interrupts_raise()
@@ -411,7 +411,7 @@ def serve(argv: list[str] | None) -> int:
             warnings.showwarning = lambda found, *rest, **more: warn(
                 getattr(found, "message", str(found)), getattr(found, "path", "")
             )
-            commands.stdin_text.cache_clear()
+            inputs.stdin_text.cache_clear()
             getattr(commands, args.command)(args)
         settle()
         return 0
