@@ -37,15 +37,19 @@ struct Near {
 
 /// A face, and the axis of the cell along its normal.
 struct Face {
+    /// The number of its region among those given.
+    index: usize,
     nodes: Vec<Near>,
     axis: usize,
+    /// The mean phase on it before it is fixed, and the whole number that it gets.
+    mean: f64,
     whole: f64,
 }
 
 /// The solution whose phases, `shift` added, are whole on the parts of the surface of `region` that lie in the regions of `fix`.
 ///
 /// # Errors
-/// A region that holds no part of the surface; cells that do not lie along a normal.
+/// A region that holds no part of the surface; cells that do not lie along a normal; faces too near to each other for a whole cell.
 pub(super) fn fixed(
     problem: &Problem,
     laid: &Laid,
@@ -59,29 +63,21 @@ pub(super) fn fixed(
         faces.extend(faces_in(laid, region, &**of, i)?.into_iter().map(|nodes| face(nodes, laid, &solution, i)));
     }
     let mut faces = faces.into_iter().collect::<Result<Vec<Face>, Fault>>()?;
+    for face in &mut faces {
+        let sum: f64 = face.nodes.iter().map(|n| on_face(n, face.axis, laid, &solution, shift)).sum();
+        face.mean = sum / face.nodes.len() as f64;
+    }
+    (0..3).for_each(|axis| number_faces(&mut faces, axis));
+    check_apart(&faces, laid)?;
     let mut solution = solution;
-    for pass in 0..PASSES {
+    for _ in 0..PASSES {
         checkpoint();
         let mut values = solution.spline.at_nodes();
         for (axis, values) in values.iter_mut().enumerate() {
             let (mut mass, mut off) = (vec![0.0; values.len()], vec![0.0; values.len()]);
-            let own: Vec<(&mut Face, Vec<f64>)> = faces
-                .iter_mut()
-                .filter(|f| f.axis == axis)
-                .map(|f| {
-                    let on_face = f.nodes.iter().map(|n| on_face(n, axis, laid, &solution, shift)).collect();
-                    (f, on_face)
-                })
-                .collect();
-            let mean = |on_face: &[f64]| on_face.iter().sum::<f64>() / on_face.len() as f64;
-            // A phase may be moved by any constant: what counts is how many cells there are between faces, from the largest one on.
-            let first = own.iter().max_by_key(|(f, _)| f.nodes.len()).map_or(0.0, |(_, on_face)| mean(on_face));
-            for (face, on_face) in own {
-                if pass == 0 {
-                    face.whole = first.round() + (mean(&on_face) - first).round();
-                }
-                for (n, phase) in face.nodes.iter().zip(on_face) {
-                    (mass[n.node], off[n.node]) = (PULL, face.whole - phase);
+            for face in faces.iter().filter(|f| f.axis == axis) {
+                for n in &face.nodes {
+                    (mass[n.node], off[n.node]) = (PULL, face.whole - on_face(n, axis, laid, &solution, shift));
                 }
             }
             if mass.iter().any(|m| *m > 0.0) {
@@ -92,6 +88,36 @@ pub(super) fn fixed(
         solution = Solution { spline: Spline::through(laid.grid, values), winding: solution.winding };
     }
     Ok(solution)
+}
+
+/// Gives the faces along an axis their whole numbers. A phase may be moved by any constant: what counts is how many cells there are
+/// between faces, from the largest one on.
+fn number_faces(faces: &mut [Face], axis: usize) {
+    let own = || faces.iter().filter(|f| f.axis == axis);
+    let first = own().max_by_key(|f| f.nodes.len()).map_or(0.0, |f| f.mean);
+    for face in faces.iter_mut().filter(|f| f.axis == axis) {
+        face.whole = first.round() + (face.mean - first).round();
+    }
+}
+
+/// Refuses two sides of a wall between which there is less than half a cell: no whole cell can be there.
+fn check_apart(faces: &[Face], laid: &Laid) -> Result<(), Fault> {
+    for (i, b) in faces.iter().enumerate() {
+        let opposite =
+            |a: &&Face| a.axis == b.axis && a.whole == b.whole && dot(a.nodes[0].normal, b.nodes[0].normal) < -SMOOTH;
+        if let Some(a) = faces[..i].iter().find(opposite) {
+            let message = format!(
+                "only {:.2} cells lie between the face at {} and that of fix[{}] at {}: no whole cell can be there. Use smaller cells, or fix \
+                 one of them only",
+                (b.mean - a.mean).abs(),
+                in_mm(laid.nodes[b.nodes[0].node]),
+                a.index,
+                in_mm(laid.nodes[a.nodes[0].node])
+            );
+            return Err(Fault::new(format!("fix[{}]", b.index), message));
+        }
+    }
+    Ok(())
 }
 
 /// The phase on the face at the foot of a node.
@@ -120,7 +146,7 @@ fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Res
         );
         return Err(Fault::new(format!("fix[{index}]"), message));
     }
-    Ok(Face { nodes, axis, whole: 0.0 })
+    Ok(Face { index, nodes, axis, mean: 0.0, whole: 0.0 })
 }
 
 /// The faces of the surface that lie in a region, by the nodes next to each.

@@ -95,7 +95,8 @@ fn parts_that_meet_fit() {
     assert!(apart < 2e-3, "{at:?}");
 }
 
-/// Cells that are not along the normal, and a region without a face, are refused with their place.
+/// Cells that are not along the normal, a region without a face, and faces of a wall thinner than half a cell are refused with their
+/// place.
 #[test]
 fn what_cannot_be_fixed_is_refused() {
     let slab = cuboid([0.0; 3], [12.0, 12.0, 6.0]);
@@ -105,4 +106,7 @@ fn what_cannot_be_fixed_is_refused() {
     let inside = cuboid([4.0; 3], [5.0; 3]);
     let none = solve(&slab, &wanted(2.0, [0.0; 3], vec![face(), inside])).err().expect("none");
     assert!(none.starts_with("fix[1]") && none.contains("no part of the surface"), "{none}");
+    let opposite = cuboid([11.9, -1.0, -1.0], [12.1, 13.0, 7.0]);
+    let thin = solve(&slab, &wanted(30.0, [0.0; 3], vec![face(), opposite])).err().expect("thin");
+    assert!(thin.starts_with("fix[1]") && thin.contains("0.40 cells") && thin.contains("fix[0]"), "{thin}");
 }
