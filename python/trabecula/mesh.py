@@ -83,12 +83,17 @@ class Mesh(Picture, Transformed):
         self._smoothing: SmoothReport | None = None
 
     @staticmethod
-    def of(vertices: ArrayLike, triangles: ArrayLike) -> Mesh:
+    def of(vertices: ArrayLike | Any, triangles: ArrayLike | None = None) -> Mesh:
         """The mesh of vertices (n, 3), mm, and triangles (m, 3), the indices of their corners, counter-clockwise seen from
-        outside. A ValueError for other shapes, places that are not finite, and indices of no vertex.
+        outside; or, instead of both, of a trimesh.Trimesh, a pyvista.PolyData or a meshio.Mesh, whose lengths are taken as mm.
+        A ValueError for other shapes, places that are not finite, and indices of no vertex.
         """
         import numpy as np
 
+        if triangles is None:
+            from .bridges import parts_of
+
+            vertices, triangles = parts_of(vertices)
         places, corners = np.asarray(vertices, dtype=np.float64), np.asarray(triangles)
         if corners.size and not np.issubdtype(corners.dtype, np.integer):
             raise ValueError(f"expected triangles as whole numbers, found {corners.dtype}")
@@ -109,6 +114,36 @@ class Mesh(Picture, Transformed):
             return Mesh(_core.Mesh.read(data, kind))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
+
+    def to_trimesh(self) -> Any:
+        """The mesh as a ``trimesh.Trimesh``: the same vertices and triangles, not processed, with ``cut`` as an attribute of
+        faces. An ImportError without trimesh.
+        """
+        from .bridges import package
+
+        attributes = {"cut": self.cut.copy()}
+        trimesh = package("trimesh")
+        return trimesh.Trimesh(self.vertices.copy(), self.triangles.copy(), process=False, face_attributes=attributes)
+
+    def to_pyvista(self) -> Any:
+        """The mesh as a ``pyvista.PolyData``, with ``cut`` as data of cells. An ImportError without pyvista."""
+        import numpy as np
+
+        from .bridges import package
+
+        corners = np.insert(self.triangles.astype(np.int64), 0, 3, axis=1)
+        made = package("pyvista").PolyData(self.vertices.copy(), corners.ravel())
+        made.cell_data["cut"] = self.cut.astype(np.uint8)
+        return made
+
+    def to_meshio(self) -> Any:
+        """The mesh as a ``meshio.Mesh`` of triangles, with ``cut`` as data of cells (0 or 1). An ImportError without meshio."""
+        import numpy as np
+
+        from .bridges import package
+
+        cells = [("triangle", self.triangles.astype(np.int64))]
+        return package("meshio").Mesh(self.vertices.copy(), cells, cell_data={"cut": [self.cut.astype(np.uint8)]})
 
     def __copy__(self) -> Mesh:
         return self
