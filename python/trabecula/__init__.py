@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .parts import write_parts
     from .quadors import Quadors, Slice
     from .solid import Solid
+    from .sweeps import objective, sweep
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
@@ -54,10 +55,12 @@ __all__ = [
     "level",
     "load",
     "map",
+    "objective",
     "region",
     "reports",
     "skin",
     "spartan",
+    "sweep",
     "write_parts",
 ]
 
@@ -78,7 +81,9 @@ _HOMES = {
     "Thickness": "thickness",
     "Transitions": "transition",
     "Voxels": "voxels",
+    "objective": "sweeps",
     "spartan": "design",
+    "sweep": "sweeps",
     "write_parts": "parts",
     "iso": "levels",
     "fraction": "levels",

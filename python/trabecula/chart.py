@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
-__all__ = ["Chart", "svg"]
+__all__ = ["Chart", "label", "svg"]
 
 WIDTH, HEIGHT = 720, 380
 #: Room to the left, right and below the axes, and above them for the titles and for each mark.
@@ -58,11 +58,11 @@ def _drawn(chart: Chart) -> Iterator[str]:
     def y(percent: float) -> float:
         return base - (base - top) * percent / rises[-1]
 
-    yield _text(LEFT, 24, chart.title, 'font-size="16" font-weight="bold"')
-    yield _text(LEFT, 44, chart.facts)
+    yield label(LEFT, 24, chart.title, 'font-size="16" font-weight="bold"')
+    yield label(LEFT, 44, chart.facts)
     for v in rises:
         yield f'<path d="M{LEFT} {y(v):.2f}h{width}" stroke="{FAINT}"/>'
-        yield _text(LEFT - 8, y(v) + 4, f"{v:g}", 'text-anchor="end"')
+        yield label(LEFT - 8, y(v) + 4, f"{v:g}", 'text-anchor="end"')
     bars = list(zip(chart.edges, chart.edges[1:], chart.share, strict=False))
     for low, high, share in bars:
         box = f'x="{x(low):.2f}" y="{y(100 * share):.2f}" width="{x(high) - x(low):.2f}" height="{base - y(100 * share):.2f}"'
@@ -73,10 +73,10 @@ def _drawn(chart: Chart) -> Iterator[str]:
     yield f'<path d="M{LEFT} {base}h{width}" stroke="{INK}"/>'
     for v in (v for v in _ticks(end, 8) if v <= end * (1 + 1e-9)):
         yield f'<path d="M{x(v):.2f} {base}v6" stroke="{INK}"/>'
-        yield _text(x(v), base + 21, f"{v:g}", 'text-anchor="middle"')
-    yield _text(LEFT + width / 2, base + 44, chart.across, 'text-anchor="middle"')
+        yield label(x(v), base + 21, f"{v:g}", 'text-anchor="middle"')
+    yield label(LEFT + width / 2, base + 44, chart.across, 'text-anchor="middle"')
     middle = f"{(top + base) / 2:.2f}"
-    yield _text(-float(middle), 22, chart.up, 'text-anchor="middle" transform="rotate(-90)"')
+    yield label(-float(middle), 22, chart.up, 'text-anchor="middle" transform="rotate(-90)"')
     # Each name on a line of its own and over the lines of the others.
     rows = [(ABOVE + LINE * i, name, x(at)) for i, (name, at) in enumerate(marks)]
     for row, _, at in rows:
@@ -85,10 +85,11 @@ def _drawn(chart: Chart) -> Iterator[str]:
         side, anchor = (-1, "end") if at > LEFT + 0.75 * width else (1, "start")
         about = side * 7 * len(name)
         yield f'<path d="M{at + 4 * side:.2f} {row - 12}h{about}v{LINE - 1}h{-about}z" fill="white"/>'
-        yield _text(at + 6 * side, row, name, f'text-anchor="{anchor}" fill="{MARK}"')
+        yield label(at + 6 * side, row, name, f'text-anchor="{anchor}" fill="{MARK}"')
 
 
-def _text(x: float, y: float, words: str, style: str = "") -> str:
+def label(x: float, y: float, words: str, style: str = "") -> str:
+    """Words at a position."""
     return f'<text x="{x:.2f}" y="{y:.2f}"{" " * bool(style)}{style}>{escape(words)}</text>'
 
 

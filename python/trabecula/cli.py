@@ -15,6 +15,7 @@ from .formats import (
     MESHES,
     STDIN,
     STEP_WRITES,
+    SWEEP_WRITES,
     TET_READS,
     TET_WRITES,
     VOXEL_WRITES,
@@ -90,6 +91,14 @@ def parts(text: str) -> list[str]:
         return check_parts([name.strip() for name in text.split(",")])
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def front(text: str) -> tuple[str, str]:
+    """Which of two columns is better where it is small, and which where it is large."""
+    ways = tuple(text.split(","))
+    if len(ways) != 2 or not {*ways} <= {"min", "max"}:
+        raise argparse.ArgumentTypeError(f"expected min or max of X and of Y, such as min,max, found {text!r}")
+    return ways[0], ways[1]
 
 
 def ending(known: tuple[str, ...], stdin: bool = False):
@@ -253,6 +262,51 @@ COMMANDS = {
         option("--unit", choices=UNITS, help="unit of a file's coordinates (default: mm)"),
         option("--split", action="store_true", help="split a file's hexahedra, wedges and pyramids into tetrahedra"),
         *(THREADS, JSON),
+    ),
+    "sweep": (
+        "Build and measure many designs of one: a table with a row for each.",
+        "The design has a table [sweep] of keys that vary, each with a list of values or a range, as in\n"
+        "  [sweep]\n"
+        '  "lattice.core.level.fraction" = [0.2, 0.3, 0.4]\n'
+        '  "lattice.core.map.affine.wavelength" = { from = 3, to = 6, count = 4 }\n'
+        "Rows stand in OUT.rows as they are made. Stopped and started again, it goes on where it was.\n"
+        "A design that cannot be made is a row with its error.\n\n"
+        "examples:\n  trabecula sweep study.toml -o study.csv --jobs 4 --per-cell 24\n"
+        "  trabecula sweep study.toml -o study.parquet --meshes parts/{design}.3mf\n"
+        "  trabecula sweep study.csv --plot fraction area_mm2 wall_mm -o study.svg --front min,max",
+        file(
+            "study",
+            (*DESIGNS, "csv"),
+            "a design with [sweep] (.toml or .json), or - for standard input; or rows (.csv) to plot",
+            "STUDY",
+            True,
+        ),
+        file(
+            "-o --output",
+            (*SWEEP_WRITES, "svg"),
+            "the table to write (.csv or .parquet); of --plot also the drawing (.svg)",
+            "OUT",
+            required=True,
+        ),
+        spacing(),
+        option(
+            "--jobs",
+            type=COUNT,
+            metavar="N",
+            help="processes (default: one a processor); any number gives the same table",
+        ),
+        option("--cluster", metavar="ADDRESS", help="a Dask cluster at this address, or local:N; needs the extra scale"),
+        option("--properties", metavar="NAMES", help="what else is computed of each design, by commas"),
+        option("--n", type=SAMPLES, metavar="N", help="voxels along a cell for these properties"),
+        option("--meshes", metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
+        option("--pictures", metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
+        option("--plot", nargs="+", metavar=("X", "Y"), help="draw column Y against X, a third as colour, to OUT with .svg"),
+        option(
+            "--front", type=front, metavar="BETTER", help="with the Pareto front: min or max of X and of Y, such as min,max"
+        ),
+        option("--new", action="store_true", help="begin anew: rows of an earlier run are not taken up"),
+        option("--yes", action="store_true", help="make more than a million designs"),
+        *(PROGRESS, JSON, NOTICES[0]),
     ),
     "slice": (
         "Slice the beams of a design at a height: loops of conic arcs, exact area, drawing.",

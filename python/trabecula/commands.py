@@ -12,7 +12,7 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
 from .files import check_place, whole_file
 from .formats import DESIGNS, MESH_READS, STDIN, STEP_WRITES, is_design, kind_of
-from .inputs import build, closes, keep_file, keep_inputs, meshed, resolution, same_file, surface
+from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
 from .shown import look, towards
@@ -21,7 +21,7 @@ from .starter import starter
 from .terminal import Progress, figure, say, settle, warn, warned
 from .texts import counted, table, voids
 
-__all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "tets", "voxels"]
+__all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "sweep", "tets", "voxels"]
 
 
 #: The JSON Schema beside a new design.
@@ -368,6 +368,31 @@ def warn_measured(name: str, figures: dict) -> None:
         )
     if figures["volume"] >= 0 and figures["voids"]:
         warn(voids(figures["voids"]))
+
+
+def sweep(args) -> None:
+    """``trabecula sweep``."""
+    from .sweeping import draw, table_of
+
+    drawing = os.path.splitext(args.output)[0] + ".svg" if args.plot else None
+    for name in filter(None, (args.output, drawing)):
+        check_place(name)
+        keep_file(args.study, name)
+    if kind_of(args.study) == "csv":
+        if not args.plot:
+            raise Refused(f"{args.study} is a table already; say with --plot X Y what to draw of it")
+        draw(args.study, args, drawing)
+        return say(f"{drawing}: written")
+    start = time.perf_counter()
+    figures = table_of(design_of(args.study), args)
+    if args.plot:
+        draw(args.output, args, drawing)
+    figures["seconds"] = round(time.perf_counter() - start, 3)
+    if args.json:
+        return put_json(figures)
+    failed = f", {figures['failed']} of them without a solid (see the column error)" if figures["failed"] else ""
+    taken = f"; {figures['resumed']} from an earlier run" if figures["resumed"] else ""
+    say(f"{args.output}: {counted(figures['rows'], 'design')}{failed}{taken}, {figures['seconds']:g} s")
 
 
 def slice(args) -> None:

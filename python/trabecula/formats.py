@@ -8,7 +8,7 @@ from . import _core
 
 __all__ = [
     *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "RESULT_READS", "TET_READS"),
-    *("TET_WRITES", "STDIN", "STEP_WRITES", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
+    *("TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
 ]
 
 DESIGNS = ("toml", "json")
@@ -20,6 +20,8 @@ MESH_READS = tuple(MESHES)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
 #: The exact surface of beams alone, for CAD systems.
 STEP_WRITES = ("step", "stp")
+#: Formats of tables.
+SWEEP_WRITES = ("csv", "parquet")
 VOXEL_WRITES = ("npy", "vti")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}

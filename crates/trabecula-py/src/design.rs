@@ -48,6 +48,13 @@ impl Design {
         self.design.to_json().to_string()
     }
 
+    /// The design with other values at paths, and without a sweep.
+    fn varied(&self, py: Python<'_>, values: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Design> {
+        let values: Vec<_> = values.iter().map(|(path, v)| Ok((path.clone(), node(v, 0)?))).collect::<PyResult<_>>()?;
+        let design = self.design.varied(&values).map_err(|e| error::design(py, &e))?;
+        Ok(Design { design, file: None })
+    }
+
     /// Builds the solid; `folder` is where relative paths start.
     fn build(slf: Py<Self>, py: Python<'_>, folder: PathBuf) -> PyResult<Solid> {
         let own = slf.clone_ref(py);

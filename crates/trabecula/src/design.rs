@@ -20,6 +20,7 @@ mod default_spacing;
 mod design_schema;
 mod joins;
 mod sample;
+mod sweep_kind;
 #[cfg(test)]
 mod tests;
 mod volume_error;
@@ -56,6 +57,7 @@ pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
+pub use sweep_kind::*;
 
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -84,6 +86,9 @@ pub struct Design {
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[kind(default)]
     pub keep: Keeps,
+    /// What varies where many designs are made of this one; of no effect on this one.
+    #[kind(hints("study", "parameters", "vary"))]
+    pub sweep: Option<SweepKind>,
     /// Line of each key in the file it was read from.
     #[kind(skip)]
     pub lines: Lines,
@@ -169,7 +174,43 @@ impl Design {
         let lines = node.lines();
         let design = Design { lines, ..Design::read(&At::root(node))? };
         design.check_names().map_err(|e| design.located(e))?;
+        if let Some(sweep) = &design.sweep {
+            Design::check_sweep(sweep, node).map_err(|e| design.located(e))?;
+        }
         Ok(design)
+    }
+
+    /// The design with other values at paths, such as `lattice.core.level.fraction`, and without a sweep.
+    ///
+    /// # Errors
+    /// Paths that lead nowhere, and whatever is wrong with the design that results.
+    pub fn varied(&self, values: &[(String, Node)]) -> Result<Design, DesignError> {
+        let mut node = Design { sweep: None, ..self.clone() }.write();
+        for (path, value) in values {
+            node.put(path, value.clone()).map_err(|f| DesignError::fault(path, f))?;
+        }
+        Design::from_node(&node)
+    }
+
+    /// Refuses a sweep over what is no key of the design, or with values that it cannot have.
+    fn check_sweep(sweep: &SweepKind, node: &Node) -> Result<(), DesignError> {
+        sweep.valid().map_err(|f| DesignError::fault("sweep", f))?;
+        let mut base = node.clone();
+        if let Value::Table(entries) = &mut base.value {
+            entries.retain(|e| e.0 != "sweep");
+        }
+        for (path, values) in sweep.samples() {
+            for value in values {
+                let mut varied = base.clone();
+                let at = format!("sweep.{path}");
+                varied.put(path, value).map_err(|f| DesignError::fault(&at, f))?;
+                Design::read(&At::root(&varied)).map_err(|e| {
+                    let message = if e.path == path { e.message } else { format!("{}: {}", e.path, e.message) };
+                    DesignError { found: e.found, nearest: e.nearest, ..DesignError::new(&at, message) }
+                })?;
+            }
+        }
+        Ok(())
     }
 
     /// The error with its line, if its path is in the file.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::error::DesignError;
-use geometry::fault::number;
+use geometry::fault::{Fault, number};
 
 /// A value with the line it stands on.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +113,43 @@ impl Node {
             entries.push((key.to_string(), None, node));
         }
         self
+    }
+
+    /// Puts a value at a path, such as `region.box.size[0]`; tables on the way are made where they are missing.
+    ///
+    /// # Errors
+    /// Anything but a table or list on the way; an index past the end of a list.
+    pub(crate) fn put(&mut self, path: &str, value: Node) -> Result<(), Fault> {
+        let mut here = self;
+        for step in path.replace('[', ".[").split('.') {
+            here = here.below(step)?;
+        }
+        *here = value;
+        Ok(())
+    }
+
+    /// What stands under a key, or at an index such as `[0]`; a missing key is made, with an empty table.
+    fn below(&mut self, step: &str) -> Result<&mut Node, Fault> {
+        let index = step.strip_prefix('[').and_then(|s| s.strip_suffix(']')).map(|s| s.parse::<usize>());
+        let refused = |what: &str, this: &Node| {
+            Err(Fault::new("", format!("\"{step}\" needs a {what} above it, found {}", describe(this))))
+        };
+        match (&self.value, &index) {
+            (Value::Table(_), None) | (Value::List(_), Some(Ok(_))) => {}
+            (_, None) => return refused("table", self),
+            _ => return refused("list", self),
+        }
+        match (&mut self.value, index) {
+            (Value::List(items), Some(Ok(i))) if i < items.len() => Ok(&mut items[i]),
+            (Value::Table(entries), _) => {
+                let at = entries.iter().position(|e| e.0 == step).unwrap_or_else(|| {
+                    entries.push((step.to_string(), None, Value::Table(Vec::new()).into()));
+                    entries.len() - 1
+                });
+                Ok(&mut entries[at].2)
+            }
+            _ => Err(Fault::new("", format!("there is no item {step} in the list"))),
+        }
     }
 
     /// Reads TOML.

@@ -1,0 +1,261 @@
+"""Sweeps: many designs of one, as a table with a row for each, that goes on where it was when it was stopped."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import itertools
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from typing import Any
+
+from . import _core
+from .bridges import package
+from .clusters import rows_by_cluster
+from .design import Design, load
+from .errors import Refused
+from .files import check_place, extension, whole_file
+from .formats import MESH_WRITES, SWEEP_WRITES
+from .given import whole
+from .rows import PROPERTIES, UNITS, Job, named
+from .study import Study
+from .workers import rows_by_processes, rows_here
+
+__all__ = ["FEW", "Journal", "columns_of", "objective", "run", "sweep", "write_table"]
+
+#: More designs than these are asked about.
+FEW = 1_000_000
+#: Columns that come last, in this order.
+LAST = ("warnings", "error", "seconds", "sha256", "version")
+
+
+def sweep(
+    study: Design | dict | str | os.PathLike[str],
+    jobs: int = 1,
+    edge: float | None = None,
+    per_cell: float | None = None,
+    properties: Mapping[str, Mapping[str, Any]] | Iterable[str] = (),
+    meshes: str | None = None,
+    pictures: str | None = None,
+    cluster: str | None = None,
+    progress: Callable[[int, int], Any] | None = None,
+) -> dict[str, list]:
+    """A table of all designs of a study, {column: values}, which ``pandas.DataFrame`` and ``polars.DataFrame`` take as it is.
+
+    The study is a design with ``sweep``: {path of a key: list of values, or {"from", "to", "count"}} and ``sampling``,
+    ``count``, ``seed``, ``where``; or the path of its file. A row has the number of the design, the values by path,
+    ``fraction_asked`` (of the cell), ``wall_mm`` and ``pore_mm`` (the least), and as measured at ``edge`` (mm) or
+    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings``, ``error`` (why there is no such
+    design, or None), ``seconds``, ``sha256`` of the design's text, ``version``. ``properties`` names what else is computed,
+    with settings: {"stiffness": {"n": 48}}. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the
+    number. ``jobs`` processes share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in
+    order, and apart from ``seconds`` the same for any number of processes.
+
+    Raises DesignError for a study that is none, ValueError where no design keeps the conditions or none can be made.
+    """
+    job, points = prepared(study, edge, per_cell, properties, meshes, pictures)
+    rows = []
+    with closing(run(job, list(enumerate(points)), jobs, cluster)) as made:
+        for row in made:
+            rows.append(row)
+            if progress:
+                progress(len(rows), len(points))
+    return columns_of(sorted(rows, key=lambda row: row["design"]))
+
+
+def objective(
+    template: Design | dict | str | os.PathLike[str],
+    parameters: Iterable[str],
+    outputs: Iterable[str],
+    edge: float | None = None,
+    per_cell: float | None = None,
+    properties: Mapping[str, Mapping[str, Any]] | Iterable[str] = (),
+) -> Callable[[Mapping[str, Any]], dict[str, float]]:
+    """A function of {path: value} that gives {column: value}, for optimisers: of the design with these values the ``outputs``,
+    names of columns of ``sweep``. It raises ValueError where there is no such design.
+    """
+    paths, wanted = list(parameters), list(outputs)
+    design = design_of(template)
+    job = Job(design, edge, per_cell, properties=settings_of(properties))
+    for path in paths:
+        if not isinstance(path, str):
+            raise TypeError(f"expected paths of keys as text, found {path!r}")
+
+    def of(values: Mapping[str, Any]) -> dict[str, float]:
+        if set(values) != set(paths):
+            raise ValueError(f"expected values of {', '.join(paths)}, found {', '.join(values) or 'none'}")
+        from .rows import row_of
+
+        row = row_of(job, 0, {path: values[path] for path in paths})
+        if row["error"]:
+            raise ValueError(row["error"])
+        unknown = [name for name in wanted if name not in row]
+        if unknown:
+            raise ValueError(f"unknown output {unknown[0]}; there are {', '.join(row)}")
+        return {name: row[name] for name in wanted}
+
+    return of
+
+
+def design_of(given: Design | dict | str | os.PathLike[str]) -> Design:
+    """A design as it is, of plain data, or of a file."""
+    if isinstance(given, Design):
+        return given
+    return Design(**given) if isinstance(given, dict) else load(given)
+
+
+def settings_of(properties: Mapping[str, Mapping[str, Any]] | Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Properties by name, each with its settings. A ValueError for an unknown one."""
+    given = dict(properties) if isinstance(properties, Mapping) else {name: {} for name in properties}
+    for name in given:
+        if name not in PROPERTIES:
+            raise ValueError(f'unknown property "{name}"; there are {", ".join(PROPERTIES) or "none"}')
+    return {name: dict(settings) for name, settings in given.items()}
+
+
+def prepared(
+    study: Design | dict | str | os.PathLike[str],
+    edge: float | None,
+    per_cell: float | None,
+    properties: Mapping[str, Mapping[str, Any]] | Iterable[str],
+    meshes: str | None,
+    pictures: str | None,
+) -> tuple[Job, list[dict[str, Any]]]:
+    """What is to be done, and all points."""
+    given = Study(design_of(study))
+    points = list(given.points())
+    for pattern, word, kinds in ((meshes, "meshes", MESH_WRITES), (pictures, "pictures", ("png",))):
+        if not pattern:
+            continue
+        if len(points) > 1 and named(pattern, 0) == named(pattern, 1):
+            raise ValueError(f"{word}: {pattern} names one file for all designs; write {{design}} where the number goes")
+        extension(pattern, kinds)
+        os.makedirs(os.path.dirname(pattern) or ".", exist_ok=True)
+        check_place(named(pattern, 0))
+    return Job(given.design, edge, per_cell, meshes, pictures, settings_of(properties)), points
+
+
+def run(job: Job, tasks: list[tuple[int, dict[str, Any]]], jobs: int, cluster: str | None = None) -> Iterator[dict[str, Any]]:
+    """The rows of numbered points, as they are done. Raises ValueError if the first ones all fail and none is left."""
+    jobs = min(whole("jobs", jobs, 1, 4096), max(len(tasks), 1))
+    if cluster:
+        return rows_by_cluster(job, tasks, cluster)
+    return rows_by_processes(job, tasks, jobs) if jobs > 1 else rows_here(job, tasks)
+
+
+def columns_of(rows: list[dict[str, Any]]) -> dict[str, list]:
+    """Rows as columns: those of all rows, None where a row has none; bookkeeping last."""
+    names = dict.fromkeys(itertools.chain.from_iterable(rows))
+    order = [*(n for n in names if n not in LAST), *(n for n in LAST if n in names)]
+    return {name: [row.get(name) for row in rows] for name in order}
+
+
+class Journal:
+    """The rows of a sweep so far, in a file of JSON lines beside its output, and what sweep they are of.
+
+    Rows stand there as soon as they are made. What was being written when a process was killed is half a line, and left out.
+    """
+
+    def __init__(self, output: str, job: Job):
+        self.path = f"{output}.rows"
+        self.head = job.to_dict() | {"version": _core.__version__, "inputs": digests(job.design)}
+        for changing in ("folder", "threads"):
+            self.head.pop(changing)
+        self.rows: dict[int, dict[str, Any]] = {}
+
+    def resume(self, new: bool = False) -> int:
+        """Takes up the rows of an earlier run, unless a ``new`` one is wanted; their number.
+
+        Raises Refused if they are of another sweep, with the keys that differ.
+        """
+        if new or not os.path.exists(self.path):
+            return 0
+        with open(self.path, encoding="utf-8") as file:
+            lines = [line for line in file.read().split("\n")[:-1] if line]
+        read = [json.loads(line) for line in lines]
+        if not read:
+            return 0
+        changed = differences(read[0], json.loads(json.dumps(self.head)))
+        if changed:
+            raise Refused(
+                f"{self.path} holds {len(read) - 1} rows of another sweep: changed since are {', '.join(changed[:6])}; "
+                "take that back, or begin anew with --new"
+            )
+        self.rows = {row["design"]: row for row in read[1:]}
+        return len(self.rows)
+
+    @contextmanager
+    def writing(self) -> Iterator[Callable[[dict[str, Any]], None]]:
+        """Gives a function that adds a row."""
+        # Written anew, so that half a line at the end is gone.
+        with whole_file(self.path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
+            for line in (self.head, *self.rows.values()):
+                file.write(json.dumps(line) + "\n")
+        with open(self.path, "a", encoding="utf-8", newline="\n") as file:
+
+            def add(row: dict[str, Any]) -> None:
+                self.rows[row["design"]] = row
+                file.write(json.dumps(row) + "\n")
+                file.flush()
+
+            yield add
+
+    def end(self) -> None:
+        """Takes the file away: its rows stand in the output."""
+        os.remove(self.path)
+
+
+def digests(design: Design) -> dict[str, str]:
+    """The SHA-256 of each file that a design reads."""
+    made = {}
+    for name in design.files():
+        if os.path.isfile(name):
+            with open(name, "rb") as file:
+                made[os.path.basename(name)] = (
+                    hashlib.file_digest(file, "sha256").hexdigest()
+                    if hasattr(hashlib, "file_digest")
+                    else hashlib.sha256(file.read()).hexdigest()
+                )
+    return made
+
+
+def differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """Paths at which two trees of plain data differ."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = sorted({*old, *new})
+        return [d for k in keys for d in differences(old.get(k), new.get(k), f"{path}.{k}" if path else k)]
+    return [] if old == new else [path.removeprefix("design.")]
+
+
+def write_table(path: str, columns: dict[str, list]) -> None:
+    """Writes a table, CSV or (with pyarrow) Parquet, whose columns then carry their units."""
+    kind = extension(path, SWEEP_WRITES)
+    if kind == "csv":
+        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as out:
+            writer = csv.writer(out, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*(map(cell, column) for column in columns.values()), strict=True))
+        return
+    arrow = package("pyarrow")
+    parquet = package("pyarrow.parquet")
+    fields, arrays = [], []
+    for name, column in columns.items():
+        plain = [json.dumps(v) if isinstance(v, list | dict) else v for v in column]
+        kinds = {type(v) for v in plain if v is not None}
+        if len(kinds - {int, float}) and len(kinds) > 1:  # texts and numbers in one column
+            plain = [None if v is None else str(v) for v in plain]
+        array = arrow.array([float(v) for v in plain] if kinds == {int, float} and None not in plain else plain)
+        unit = next((unit for end, unit in UNITS.items() if name == end or name.endswith(f".{end}")), "")
+        fields.append(arrow.field(name, array.type, metadata={"unit": unit} if unit else None))
+        arrays.append(array)
+    with whole_file(path) as temporary:
+        parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), temporary)
+
+
+def cell(value: Any) -> Any:
+    """A value as it stands in a table of text: lists as JSON, nothing for None."""
+    if isinstance(value, list | tuple | dict):
+        return json.dumps(value)
+    return "" if value is None else value

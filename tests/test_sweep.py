@@ -1,0 +1,396 @@
+"""Sweeps: which designs, what is in the table, and that stopping, killing and sharing the work change no row."""
+
+import contextlib
+import csv
+import io
+import itertools
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import pytest
+import trabecula as lt
+from hypothesis import given
+from hypothesis import strategies as st
+from trabecula import cli, workers
+from trabecula.conditions import condition
+from trabecula.rows import Job, row_of
+from trabecula.sampling import DIMENSIONS, latin, sobol
+from trabecula.scatter import front_of
+from trabecula.study import Study
+from trabecula.sweeps import Journal
+
+BASE = """
+schema = 1
+units = "mm"
+region.box.size = [4, 4, 4]
+[lattice.a]
+cell = "gyroid"
+part = "sheet"
+map.affine.wavelength = 4
+level.fraction = 0.3
+"""
+
+
+def written(folder: Path, sweep: str, name: str = "study.toml") -> Path:
+    path = folder / name
+    path.write_text(BASE + "[sweep]\n" + sweep)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def signals():
+    """The command's handlers of signals are taken away again."""
+    handlers = {which: signal.getsignal(which) for which in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for which, handler in handlers.items():
+        signal.signal(which, handler)
+
+
+def command(*words: object) -> subprocess.CompletedProcess:
+    """The command in this process, what it says, and its status."""
+    out, err = io.StringIO(), io.StringIO()
+    with warnings.catch_warnings(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = cli.main([str(word) for word in words])
+    return subprocess.CompletedProcess(words, status, out.getvalue(), err.getvalue())
+
+
+def started(study: Path, out: Path, jobs: int, **more) -> subprocess.Popen:
+    """The command in a process of its own."""
+    words = ("sweep", study, "-o", out, "--jobs", jobs, "--per-cell", 8)
+    return subprocess.Popen([sys.executable, "-m", "trabecula", *map(str, words)], **more)
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with open(path, newline="") as file:
+        return [{k: v for k, v in row.items() if k != "seconds"} for row in csv.DictReader(file)]
+
+
+# --- which designs ----------------------------------------------------------------------------------------------------
+
+
+@given(st.integers(1, 60), st.integers(1, 6), st.integers(0, 2**32 - 1))
+def test_a_latin_hypercube_has_one_value_in_each_part_of_each_coordinate(count: int, dimensions: int, seed: int):
+    points = list(latin(count, dimensions, seed))
+    assert points == list(latin(count, dimensions, seed))
+    for column in zip(*points, strict=True):
+        assert sorted(int(v * count) for v in column) == list(range(count))
+
+
+@given(st.integers(1, 7), st.integers(1, DIMENSIONS), st.integers(0, 2**32 - 1))
+def test_a_sobol_sequence_is_a_net_in_every_coordinate(power: int, dimensions: int, seed: int):
+    points = list(sobol(2**power, dimensions, seed))
+    for column in zip(*points, strict=True):
+        assert sorted(int(v * 2**power) for v in column) == list(range(2**power))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_two_coordinates_of_a_sobol_sequence_are_a_net_too(seed: int):
+    # The first two dimensions are a (0, 2)-sequence: every elementary box of 64 points has one.
+    points = list(sobol(64, 2, seed))
+    for k in range(7):
+        boxes = {(int(x * 2**k), int(y * 2 ** (6 - k))) for x, y in points}
+        assert len(boxes) == 64
+
+
+def test_sobol_equals_scipy():
+    qmc = pytest.importorskip("scipy.stats").qmc
+    theirs = qmc.Sobol(DIMENSIONS, scramble=False, bits=32).random(256)
+    assert [tuple(p) for p in theirs] == list(sobol(256, DIMENSIONS, 0))
+
+
+def test_a_grid_is_every_combination_and_conditions_leave_out(tmp_path: Path):
+    text = """
+    "lattice.a.level.fraction" = [0.2, 0.3]
+    lattice.a.map.affine.wavelength = { from = 3, to = 5, count = 3 }
+    "region.box.size[0]" = [4, 8]
+    where = ["region.box.size[0] > lattice.a.map.affine.wavelength", "region.box.size[1] == 4"]
+    """
+    points = list(Study(lt.load(written(tmp_path, text))).points())
+    paths = ("lattice.a.level.fraction", "lattice.a.map.affine.wavelength", "region.box.size[0]")
+    wanted = [dict(zip(paths, p, strict=True)) for p in itertools.product([0.2, 0.3], [3.0, 4.0, 5.0], [4, 8]) if p[2] > p[1]]
+    assert points == wanted
+
+
+def test_equal_ratios_and_lists_in_random_designs(tmp_path: Path):
+    text = """
+    "lattice.a.map.affine.wavelength" = { from = 1, to = 100, scale = "log" }
+    "lattice.a.cell" = ["gyroid", "diamond"]
+    sampling = "latin"
+    count = 40
+    """
+    points = list(Study(lt.load(written(tmp_path, text))).points())
+    assert len(points) == 40
+    assert sum(p["lattice.a.cell"] == "gyroid" for p in points) == 20
+    assert sum(p["lattice.a.map.affine.wavelength"] < 10 for p in points) == 20  # the middle in ratios
+
+
+def test_random_designs_that_miss_the_conditions_are_replaced(tmp_path: Path):
+    text = '"lattice.a.level.fraction" = { from = 0.1, to = 0.5 }\nsampling = "sobol"\ncount = 30\n'
+    points = list(Study(lt.load(written(tmp_path, text + 'where = ["lattice.a.level.fraction > 0.4"]'))).points())
+    assert len(points) == 30 and all(0.4 < p["lattice.a.level.fraction"] <= 0.5 for p in points)
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "wanted"),
+    [("a.b[0] + 2 * c < 4", {"a.b[0]": 1, "c": 1}, True), ("not a < 1 or max(a, b) ** 2 == 4", {"a": 0, "b": 2}, True)],
+)
+def test_conditions(text: str, values: dict, wanted: bool):
+    assert condition(text)(values) is wanted
+
+
+@pytest.mark.parametrize("text", ["a <", "__import__('os').system('true')", "a.q > 1", "1 / 0 > a", "lambda: 1", "a.upper()"])
+def test_what_is_no_condition_is_refused(text: str):
+    with pytest.raises(ValueError, match=r"condition|names a\.q|has no value"):
+        condition(text)({"a": 1})
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=40))
+def test_nothing_beats_a_design_on_the_pareto_front(points: list[tuple[int, int]]):
+    front = front_of(points, ("min", "max"))
+    assert front
+    for i in front:
+        x, y = points[i]
+        assert not any(a <= x and b >= y and (a, b) != (x, y) for a, b in points)
+    best = {points[i] for i in front}
+    assert all(any(a <= x and b >= y for a, b in best) for x, y in points)
+
+
+# --- the table --------------------------------------------------------------------------------------------------------
+
+
+def test_rows_are_what_the_commands_say_of_each_design(tmp_path: Path):
+    columns = lt.sweep(
+        written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.4]\n"lattice.a.cell" = ["gyroid", "diamond"]'), per_cell=16
+    )
+    assert columns["design"] == [0, 1, 2, 3] and columns["error"] == [None] * 4
+    for i in range(4):
+        design = lt.load(tmp_path / "study.toml").to_dict()
+        design.pop("sweep")
+        design["lattice"]["a"]["cell"] = columns["lattice.a.cell"][i]
+        design["lattice"]["a"]["level"]["fraction"] = columns["lattice.a.level.fraction"][i]
+        solid = lt.Design(**design).build()
+        measured = solid.measure(per_cell=16)
+        found = {name: columns[name][i] for name in ("fraction", "volume_mm3", "area_mm2", "pieces")}
+        assert list(found.values()) == [measured.solid_fraction, measured.volume, measured.area, measured.pieces]
+        assert columns["wall_mm"][i] == solid.report().lattices["a"].thickness
+
+
+def test_a_design_that_cannot_be_made_is_a_row_with_its_reason(tmp_path: Path):
+    columns = lt.sweep(written(tmp_path, '"lattice.a.level.fraction" = [0.3, 1.5]'), per_cell=8)
+    assert columns["error"][0] is None and "fraction is 1.5" in columns["error"][1]
+    assert columns["volume_mm3"][1] is None and columns["volume_mm3"][0] > 0
+
+
+def test_if_no_design_can_be_made_the_reasons_are_said_and_nothing_is_written(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [1.5, 2]')
+    done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8)
+    assert done.returncode == 1 and "none of 2 designs can be made; the first reasons: " in done.stderr
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_any_number_of_processes_gives_the_same_table(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 7 }')
+    tables = []
+    for jobs in (1, 3):
+        out = tmp_path / f"out{jobs}.csv"
+        assert command("sweep", study, "-o", out, "--jobs", jobs, "--per-cell", 8).returncode == 0
+        tables.append(table(out))
+    assert tables[0] == tables[1] and len(tables[0]) == 7
+    assert not list(tmp_path.glob("*.rows"))
+
+
+def test_meshes_and_pictures_are_written_on_request(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3]')
+    names = ("--meshes", tmp_path / "parts" / "{design}.stl", "--pictures", tmp_path / "parts" / "{design}.png")
+    done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8, "--jobs", 1, *names)
+    assert done.returncode == 0, done.stderr
+    assert sorted(p.name for p in (tmp_path / "parts").iterdir()) == ["000000.png", "000000.stl", "000001.png", "000001.stl"]
+    volumes = [float(row["volume_mm3"]) for row in table(tmp_path / "out.csv")]
+    assert [lt.Mesh.read(tmp_path / "parts" / f"00000{i}.stl").volume for i in (0, 1)] == pytest.approx(volumes, rel=1e-6)
+
+
+def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3, 1.5]')
+    for name in ("out.csv", "out.parquet"):
+        done = command("sweep", study, "-o", tmp_path / name, "--per-cell", 8)
+        assert done.returncode == 0, done.stderr
+    read = parquet.read_table(tmp_path / "out.parquet")
+    texts = [row["volume_mm3"] for row in table(tmp_path / "out.csv")]
+    assert [None if t == "" else float(t) for t in texts] == read["volume_mm3"].to_pylist()
+    assert read.schema.field("volume_mm3").metadata == {b"unit": "mm³".encode()}
+
+
+# --- stopped and started again ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_killed_at_random_moments_and_started_again_it_ends_with_the_same_table(tmp_path: Path, jobs: int):
+    study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 24 }')
+    whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
+    assert command("sweep", study, "-o", whole, "--jobs", 2, "--per-cell", 8).returncode == 0
+    moments = random.Random(jobs)
+    for _ in range(3):
+        process = started(study, out, jobs, stderr=subprocess.DEVNULL)
+        time.sleep(0.4 + moments.random())
+        process.send_signal(signal.SIGKILL)
+        if process.wait() == 0:
+            break
+        with open(f"{out}.rows", "a") as file:  # as if it had been killed while it wrote
+            file.write('{"design": 3, "lattice.a.lev')
+    assert command("sweep", study, "-o", out, "--jobs", jobs, "--per-cell", 8).returncode == 0
+    assert table(out) == table(whole)
+    assert not os.path.exists(f"{out}.rows")
+
+
+def test_rows_that_are_there_are_taken_up_unless_the_study_has_changed(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3]')
+    out = tmp_path / "out.csv"
+    words = ("sweep", study, "-o", out, "--per-cell", 8, "--jobs", 1)
+    job = Job(lt.load(study), per_cell=8.0)
+    journal = Journal(str(out), job)
+    with journal.writing() as add:
+        add(row_of(job, 0, {"lattice.a.level.fraction": 0.2}) | {"pieces": 77})
+    study.write_text(study.read_text().replace("wavelength = 4", "wavelength = 5"))
+    done = command(*words)
+    assert (
+        done.returncode == 1 and "changed since are lattice.a.map.affine.wavelength" in done.stderr and "--new" in done.stderr
+    )
+    assert os.path.exists(journal.path) and not out.exists()
+    study.write_text(study.read_text().replace("wavelength = 5", "wavelength = 4"))
+    done = command(*words, "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["resumed"] == 1
+    assert [row["pieces"] for row in table(out)] == ["77", "1"]
+    assert command(*words, "--new").returncode == 0
+    assert [row["pieces"] for row in table(out)] == ["1", "1"]
+
+
+def test_a_worker_that_is_killed_costs_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }')
+    alive = []
+    start = workers._Worker._started
+    monkeypatch.setattr(workers._Worker, "_started", lambda self: alive.append(start(self)) or alive[-1])
+    rows = []
+    for row in workers.rows_by_processes(Job(lt.load(study), per_cell=8.0), enumerate(Study(lt.load(study)).points()), 2):
+        rows.append(row)
+        if len(rows) in (1, 4):
+            alive[-1].kill()
+    assert len(alive) > 2
+    assert sorted(row["design"] for row in rows) == list(range(12)) and not any(row["error"] for row in rows)
+
+
+def test_a_row_whose_process_dies_each_time_is_a_row_with_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2]')
+    monkeypatch.setattr(workers._Worker, "row", lambda *_: None)
+    (row,) = workers.rows_by_processes(Job(lt.load(study)), [(0, {"lattice.a.level.fraction": 0.2})], 1)
+    assert row["design"] == 0 and "its process died 3 times" in row["error"]
+
+
+def test_an_interrupt_says_where_the_rows_are(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 200 }')
+    process = started(study, tmp_path / "out.csv", 2, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "out.csv.rows").exists() or (tmp_path / "out.csv.rows").read_text().count("\n") < 3:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate()[1]
+    assert process.returncode == 130 and "of 200 rows stand in" in said and "Traceback" not in said
+
+
+def test_a_dask_cluster_gives_the_same_table(tmp_path: Path):
+    pytest.importorskip("distributed")
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3, 0.4, 1.5]')
+    for name, more in (("here.csv", ()), ("there.csv", ("--cluster", "local:2"))):
+        done = command("sweep", study, "-o", tmp_path / name, "--per-cell", 8, *more)
+        assert done.returncode == 0, done.stderr
+    assert table(tmp_path / "here.csv") == table(tmp_path / "there.csv")
+
+
+# --- drawings, objectives, mistakes -----------------------------------------------------------------------------------
+
+
+def test_the_table_is_drawn_with_its_pareto_front(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3, 0.4]')
+    plot = ("--plot", "fraction", "area_mm2", "wall_mm", "--front", "min,max")
+    done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8, *plot)
+    assert done.returncode == 0, done.stderr
+    drawing = (tmp_path / "out.svg").read_text()
+    assert drawing.count("<circle") == 3 and "Pareto front: fraction min, area_mm2 max" in drawing
+    again = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "again.svg", *plot)
+    assert again.returncode == 0 and (tmp_path / "again.svg").read_text() == drawing
+    wrong = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "no.svg", "--plot", "fraction", "colour")
+    assert wrong.returncode == 1 and 'there is no column "colour"; with numbers there are design, ' in wrong.stderr
+
+
+def test_an_objective_is_a_plain_function():
+    design = {
+        "region": lt.region.box(size=[4, 4, 4]),
+        "lattice": {"a": lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.3))},
+    }
+    path = "lattice.a.level.fraction"
+    of = lt.objective(design, [path], ["fraction", "volume_mm3"], per_cell=16)
+    made = of({path: 0.25})
+    assert made["volume_mm3"] == 64 * made["fraction"] and list(made) == ["fraction", "volume_mm3"]
+    with pytest.raises(ValueError, match=r"fraction is 1\.5"):
+        of({path: 1.5})
+    with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
+        of({})
+
+
+@pytest.mark.parametrize(
+    ("sweep", "said"),
+    [
+        ('"lattice.a.levl.fraction" = [0.2]', 'unknown key "levl"; did you mean "level"?'),
+        ('"latice.a.level.fraction" = [0.2]', 'unknown key "latice"; did you mean "lattice"?'),
+        ('"lattice.a.cell" = ["gyroid", "gyriod"]', 'unknown cell "gyriod"; did you mean "gyroid"?'),
+        ('"lattice.a.level.fraction" = []', "at least one value needed, found none"),
+        ('"lattice.a.level.fraction" = 0.3', "a list"),
+        ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3 }', "count is missing"),
+        ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3 }\nsampling = "latin"', "the number of designs is missing"),
+        ('"lattice.a.level.fraction" = { from = 0, to = 0.3, count = 3, scale = "log" }', "both ends greater than 0"),
+        ('"lattice.a.level.fraction" = [0.2]\nsampling = "lhs"', 'did you mean "latin"?'),
+        ('"region.box.size[7]" = [1]', "there is no item [7] in the list"),
+        ("", "nothing varies"),
+    ],
+)
+def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: str, said: str):
+    done = command("sweep", written(tmp_path, sweep), "-o", tmp_path / "out.csv")
+    assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert "study.toml:" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("sweep", "more", "said"),
+    [
+        ('"lattice.a.level.fraction" = [0.2]\nwhere = ["lattice.a.level.fraction > 1"]', (), "no design keeps the conditions"),
+        ('"lattice.a.level.fraction" = [0.2]\nwhere = ["fraction > 1"]', (), "names fraction, which is no key"),
+        ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 1000001 }', (), "made with --yes only"),
+        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--meshes", "one.stl"), "write {design} where the number goes"),
+        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--properties", "colour"), 'unknown property "colour"'),
+    ],
+)
+def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple, said: str):
+    done = command("sweep", written(tmp_path, sweep), "-o", tmp_path / "out.csv", *more)
+    assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_a_design_without_a_sweep_is_refused(tmp_path: Path):
+    (tmp_path / "plain.toml").write_text(BASE)
+    done = command("sweep", tmp_path / "plain.toml", "-o", tmp_path / "out.csv")
+    assert done.returncode == 1 and "the design has no [sweep]" in done.stderr
+
+
+def test_a_sweep_changes_nothing_for_other_commands(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.1]')
+    (tmp_path / "plain.toml").write_text(BASE)
+    reports = [command("check", path, "--json").stdout for path in (study, tmp_path / "plain.toml")]
+    assert reports[0] == reports[1] and reports[0]
+    assert lt.load(study).to_dict()["sweep"] == {"lattice.a.level.fraction": [0.1]}
+    lt.load(study).save(tmp_path / "saved.toml")
+    assert lt.load(tmp_path / "saved.toml") == lt.load(study)
