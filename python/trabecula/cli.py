@@ -360,6 +360,11 @@ COMMANDS = {
         option("--beams", action="store_true", help="the unit cells of beams instead: group, nodes, valence, Maxwell count"),
         JSON,
     ),
+    "doctor": (
+        "Say what is installed, and what is missing: versions, processors, memory, extras.",
+        "example:\n  trabecula doctor",
+        JSON,
+    ),
     "schema": (
         "Print the JSON Schema of designs, by which an editor completes and checks them.",
         "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"

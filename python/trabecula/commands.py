@@ -21,7 +21,21 @@ from .starter import starter
 from .terminal import Progress, figure, say, settle, warn, warned
 from .texts import counted, table, voids
 
-__all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "sweep", "tets", "voxels"]
+__all__ = [
+    "cells",
+    "check",
+    "doctor",
+    "measure",
+    "mesh",
+    "new",
+    "render",
+    "schema",
+    "simplify",
+    "slice",
+    "sweep",
+    "tets",
+    "voxels",
+]
 
 
 #: The JSON Schema beside a new design.
@@ -502,6 +516,16 @@ def cells(args) -> None:
 
 
 # --- what they share -------------------------------------------------------------------------------------------------
+
+
+def doctor(args) -> None:
+    """``trabecula doctor``."""
+    from .doctor import state, words
+
+    found = state()
+    if args.json:
+        return put_json(found)
+    print("\n".join(words(found)))
 
 
 def put_json(figures) -> None:

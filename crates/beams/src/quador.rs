@@ -227,6 +227,8 @@ impl Quadors {
                 };
                 Pencil::new(norm(sub(z.center, a.center)), [a.radius, z.radius], b.profile).map_err(|f| f.under(&at()))
             })
+            .collect::<Vec<Result<_, _>>>() // whole, so that of several faults the first by number is said
+            .into_iter()
             .collect::<Result<_, _>>()?;
         let ends: Vec<[u32; 2]> = graph.beams.iter().map(|b| b.ends).collect();
         let (mut firsts, half_beams) = half_beams(graph, &pencils);

@@ -20,7 +20,7 @@ mod default_spacing;
 mod design_schema;
 mod joins;
 mod sample;
-mod sweep_kind;
+mod study_kind;
 #[cfg(test)]
 mod tests;
 mod volume_error;
@@ -57,7 +57,7 @@ pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
-pub use sweep_kind::*;
+pub use study_kind::*;
 
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -295,7 +295,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 }
 
 /// The cell that a tree describes, as under the key `cell` of a lattice.
-pub fn cell(node: &Node) -> Result<Cell, DesignError> {
+pub fn cell(node: &Node) -> Result<Arc<Cell>, DesignError> {
     let spec = CellSpec::read(&At::alone(node, "cell"))?;
     spec.valid().map_err(|f| DesignError::fault("cell", f))?;
     Ok(build_cell::cell(&spec, "cell", &NoFiles)?.1)

@@ -327,7 +327,8 @@ impl Quadors {
         let of = |&i: &usize| {
             hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, DEFAULT_ORDER).ok_or_else(|| unresolved_face(i))
         };
-        let each = classes.sample.par_iter().map(of).collect::<Result<_, _>>()?;
+        let each: Vec<Result<_, Fault>> = classes.sample.par_iter().map(of).collect();
+        let each = each.into_iter().collect::<Result<_, _>>()?;
         Ok((classes, each))
     }
 

@@ -1,6 +1,10 @@
 //! The named surfaces: each a short Fourier series, with its formula, symmetry and source.
 
-use super::series::Term;
+use std::sync::{Arc, OnceLock};
+
+use super::Cell;
+use super::series::{Series, Term};
+use geometry::fault::Fault;
 
 /// A named surface.
 #[derive(Clone, Copy, Debug)]
@@ -179,6 +183,17 @@ impl Named {
             terms.extend(waves.into_iter().map(|(hkl, phase)| Term { hkl, amplitude, phase }));
         }
         terms
+    }
+
+    /// The cell, one for all designs of a process: what takes time to find of it (levels, connectivity, necks) is found once.
+    pub fn cell(&self) -> Result<Arc<Cell>, Fault> {
+        static CELLS: [OnceLock<Arc<Cell>>; CATALOGUE.len()] = [const { OnceLock::new() }; CATALOGUE.len()];
+        let series = Series::new(self.terms())?;
+        let made = || Arc::new(Cell::new(series));
+        Ok(match CATALOGUE.iter().position(|n| n.name == self.name) {
+            Some(i) => CELLS[i].get_or_init(made).clone(),
+            None => made(),
+        })
     }
 }
 

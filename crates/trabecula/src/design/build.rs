@@ -219,12 +219,7 @@ fn members(
 fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let (name, cell) = cell(&spec.cell, &below("cell"), environment.loader)?;
-    let left_out = cell.truncation();
-    let mut cell = build_level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
-    if let Some(share) = left_out {
-        cell = cell.truncated(share);
-    }
-    let cell = Arc::new(cell);
+    let cell = build_level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
     let here = Environment { path: below("map"), ..*environment };
     let level = Environment { path: below("level"), ..*environment };
     let map = match spec.level.amount.length() {

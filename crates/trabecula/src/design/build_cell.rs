@@ -1,6 +1,7 @@
 //! Cells: data to series.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use super::Loader;
 use super::data::*;
@@ -17,14 +18,15 @@ pub(super) fn cell<'a>(
     spec: &'a CellSpec,
     path: &str,
     loader: &dyn Loader,
-) -> Result<(Option<&'a str>, Cell), DesignError> {
-    let (name, terms, at) = match spec {
+) -> Result<(Option<&'a str>, Arc<Cell>), DesignError> {
+    let (terms, at) = match spec {
         CellSpec::Name(name) => {
             let known = named(&name.0).ok_or_else(|| DesignError::new(path, "no such cell"))?;
-            (Some(name.0.as_str()), known.terms(), path.to_string())
+            let cell = known.cell().map_err(|f| DesignError::fault(path, f))?;
+            return Ok((Some(name.0.as_str()), cell));
         }
         CellSpec::Kind(CellKind::File(f)) => {
-            return Ok((None, cell_file::cell(f, &format!("{path}.file"), loader)?));
+            return Ok((None, Arc::new(cell_file::cell(f, &format!("{path}.file"), loader)?)));
         }
         CellSpec::Kind(CellKind::Tet(_)) => {
             let message = "a tetrahedral cell goes with a map over a tetrahedral mesh ([lattice.NAME.map.tets])";
@@ -45,11 +47,11 @@ pub(super) fn cell<'a>(
                     all
                 }
             };
-            (None, terms, at)
+            (terms, at)
         }
     };
     let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
-    Ok((name, Cell::new(series)))
+    Ok((None, Arc::new(Cell::new(series))))
 }
 
 fn plain_term(t: &TermSpec) -> Term {

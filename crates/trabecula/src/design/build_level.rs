@@ -347,15 +347,23 @@ fn check_sheet(part: PartSpec, key: &str, path: &str) -> Result<(), DesignError>
 }
 
 /// The cell of a lattice whose mid-surface is f = mid: the same series less a constant.
-pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str) -> Result<Cell, DesignError> {
+pub(super) fn about_mid(
+    cell: Arc<Cell>,
+    spec: &LevelSpec,
+    part: PartSpec,
+    path: &str,
+) -> Result<Arc<Cell>, DesignError> {
     let path = format!("{path}.mid");
     let mid = spec.mid;
     if mid == 0.0 {
         return Ok(cell);
     }
     check_mid(mid, cell.range(), part, &path)?;
-    let series = cell.series().about(mid);
-    Ok(Cell::new(series.map_err(|f| DesignError::fault(&path, f))?))
+    let about = Cell::new(cell.series().about(mid).map_err(|f| DesignError::fault(&path, f))?);
+    Ok(Arc::new(match cell.truncation() {
+        Some(share) => about.truncated(share),
+        None => about,
+    }))
 }
 
 /// Refuses a mid-surface f = mid of a part that has none, or outside the values that the cell takes.
