@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from . import beams, blend, cell, grade, level, map, region, reports
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
+    from .layers import Layer, Layers
     from .levels import fraction, iso
     from .mesh import Mesh
     from .parts import write_parts
@@ -37,6 +38,8 @@ __all__ = [
     "DesignError",
     "DesignWarning",
     "Lattice",
+    "Layer",
+    "Layers",
     "Mesh",
     "Quadors",
     "Slice",
@@ -73,6 +76,8 @@ _HOMES = {
     "skin": "design",
     "DesignError": "errors",
     "DesignWarning": "errors",
+    "Layer": "layers",
+    "Layers": "layers",
     "Mesh": "mesh",
     "Quadors": "quadors",
     "Slice": "quadors",

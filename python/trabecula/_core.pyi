@@ -10,6 +10,7 @@ from .reports import (
     DesignReport,
     EstimateReport,
     IslandsReport,
+    LayersReport,
     MeshReport,
     QualityReport,
     RepairReport,
@@ -27,6 +28,7 @@ __version__: str
 Progress = Callable[[int, int], Any]
 
 def mesh_formats() -> list[MeshFormat]: ...
+def layer_formats() -> list[tuple[str, str, bool, bool]]: ...
 def schema() -> str: ...
 def report_schema() -> str: ...
 def read_file(path: str | PathLike[str]) -> bytes: ...
@@ -61,6 +63,32 @@ class Design:
     def to_json(self) -> str: ...
     def varied(self, values: list[tuple[str, Any]]) -> Design: ...
     def build(self, folder: str | PathLike[str]) -> Solid: ...
+
+Section = tuple[float, float, float, list[NDArray[np.float64]], float]
+
+class Layers:
+    heights: list[float]
+    def __init__(
+        self,
+        solid: Solid,
+        layer: float,
+        tolerance: float,
+        step: float,
+        begin: float | None = None,
+        end: float | None = None,
+        adaptive: list[float] | None = None,
+    ) -> None: ...
+    def some(self, first: int, count: int, threads: int | None = None) -> list[Section]: ...
+    def at(self, z: float) -> Section: ...
+    def save(
+        self,
+        file: tuple[str, str, str],
+        binary: bool = False,
+        pixel: tuple[float, list[int], list[float]] | None = None,
+        exposure: list[float] = ...,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> LayersReport: ...
 
 class Solid:
     @property

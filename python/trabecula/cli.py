@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from .formats import (
     DESIGNS,
+    LAYER_WRITES,
     MESH_READS,
     MESH_WRITES,
     MESHES,
@@ -83,6 +84,17 @@ def size(text: str) -> tuple[int, int]:
     if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
         raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, found {text!r}")
     return int(parts[0]), int(parts[1])
+
+
+def exposure(text: str) -> tuple[float, float]:
+    """Two times by a comma, s."""
+    try:
+        layer, first = map(float, text.split(","))
+    except ValueError:
+        layer = first = 0.0
+    if not (0 < layer < math.inf and 0 < first < math.inf):
+        raise argparse.ArgumentTypeError(f"expected two times in s by a comma, such as 8,35, found {text!r}")
+    return layer, first
 
 
 def parts(text: str) -> list[str]:
@@ -309,15 +321,35 @@ COMMANDS = {
         *(PROGRESS, JSON, NOTICES[0]),
     ),
     "slice": (
-        "Slice the beams of a design at a height: loops of conic arcs, exact area, drawing.",
-        "The beams are sliced uncut: without the region that cuts them, and without a skin.\n\n"
-        "examples:\n  trabecula slice part.toml --z 5\n  trabecula slice part.toml --z 5 -o layer.svg --chord 0.005",
-        file("design", DESIGNS, "a design with beams (.toml or .json), or - for standard input", "DESIGN", True),
-        option("--z", type=number("a height in mm"), required=True, metavar="MM", help="height of the plane, mm"),
-        option("--beams", metavar="NAME", help="the beams to slice (needed only if there are several)"),
-        output(("svg",), "the drawing to write (.svg)", False),
-        option("--chord", type=LENGTH, default=0.01, metavar="MM", help="chord error of the drawing, mm (default: 0.01)"),
-        JSON,
+        "Slice a design into layers for a machine, from its field and without a mesh; or at one height.",
+        "The name of OUT decides the format: .cli (--binary or text), .svg, .3mf (slices), or pictures of a --pixel in .zip\n"
+        "(PNG), .sl1 (resin printers) or .npy. Contours are within the tolerance of the section in the middle of each layer and\n"
+        "have its area; grey is the exact area fraction of a pixel. Layers are written while they are made.\n"
+        "With --z a design that is beams alone is cut in exact conic arcs (also with --beams, uncut by region and skin).\n\n"
+        "examples:\n  trabecula slice part.toml -o part.cli --layer 0.05 --binary\n"
+        "  trabecula slice part.toml -o part.3mf --layer 0.05 --tolerance 0.002\n"
+        "  trabecula slice part.toml -o part.zip --layer 0.05 --pixel 0.05\n"
+        "  trabecula slice part.toml -o part.sl1 --layer 0.05 --pixel 0.047 --size 2560x1440\n"
+        "  trabecula slice part.toml --z 5 -o section.svg\n  trabecula slice beams.toml --z 5 -o arcs.svg --chord 0.005",
+        DESIGN,
+        [
+            option("--layer", type=LENGTH, metavar="MM", help="thickness of a layer, mm"),
+            option("--z", type=number("a height in mm"), metavar="MM", help="one section at this height, mm"),
+        ],
+        output(LAYER_WRITES, f"the file to write ({dotted(LAYER_WRITES)}; with --z .svg)", False),
+        option("--tolerance", type=LENGTH, default=0.001, metavar="MM", help="distance of contours from the section (0.001)"),
+        option("--from", type=number("a height in mm"), dest="start", metavar="MM", help="where the first layer begins, mm"),
+        option("--to", type=number("a height in mm"), dest="stop", metavar="MM", help="where the last layer ends, mm"),
+        option("--step", type=LENGTH, metavar="MM", help="edge of the cells in which the section is looked for, mm"),
+        option("--adaptive", type=LENGTH, metavar="MM", help="thinner layers by slope: greatest height of steps, mm"),
+        option("--least", type=LENGTH, metavar="MM", help="thinnest adaptive layer, mm (default: a quarter of --layer)"),
+        option("--binary", action="store_true", help="write .cli as bytes"),
+        option("--pixel", type=LENGTH, metavar="MM", help="edge of a pixel of pictures, mm"),
+        option("--size", type=size, metavar="WxH", help="pixels of pictures, the part in the middle (default: the part)"),
+        option("--exposure", type=exposure, default=(8.0, 35.0), metavar="S,S", help="of layers and first ones, s (8,35)"),
+        option("--beams", metavar="NAME", help="the beams to cut in arcs, of several"),
+        option("--chord", type=LENGTH, metavar="MM", help="chord error of drawn arcs, mm (default: 0.01)"),
+        *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
     "measure": (
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
@@ -452,6 +484,10 @@ def serve(argv: list[str] | None) -> int:
         top.error("simplify needs --tolerance MM, --triangles N, or both")
     if args.command == "mesh" and args.smooth and (args.tolerance, args.triangles, args.chord) != (None, None, None):
         top.error("--smooth is for the triangles of a grid: leave out --tolerance, --triangles and --chord")
+    if args.command == "slice" and args.layer is None and args.z is None:
+        top.error("slice needs --layer MM and -o OUT for all layers, or --z MM for one section")
+    if args.command == "slice" and args.layer is not None and args.output is None:
+        top.error("slice --layer needs -o OUT, the file of layers to write")
     if args.command is None:
         top.print_help(sys.stderr)
         return 2

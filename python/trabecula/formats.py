@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from typing import NamedTuple
 
 from . import _core
 
 __all__ = [
-    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "RESULT_READS", "TET_READS"),
-    *("TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
+    *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
+    *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
 ]
 
 DESIGNS = ("toml", "json")
@@ -23,6 +24,21 @@ STEP_WRITES = ("step", "stp")
 #: Formats of tables.
 SWEEP_WRITES = ("csv", "parquet")
 VOXEL_WRITES = ("npy", "vti")
+
+
+class LayerRow(NamedTuple):
+    """A format of layers."""
+
+    title: str
+    #: Whether it holds pictures rather than contours.
+    pictures: bool
+    #: Whether all layers have one thickness.
+    uniform: bool
+
+
+#: The formats of layers by suffix.
+LAYERS = {suffix: LayerRow(*row) for suffix, *row in _core.layer_formats()}
+LAYER_WRITES = tuple(LAYERS)
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
 MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")

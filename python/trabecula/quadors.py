@@ -9,6 +9,7 @@ from functools import cached_property
 from . import _core
 from .files import write_svg
 from .given import number, positive, three, whole
+from .outlines import outlines_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -154,16 +155,7 @@ class Slice:
 
     def svg(self, chord: float = 0.01) -> str:
         """A drawing in mm, v upwards, the solid filled."""
-        import numpy as np
-
-        loops = self.polygons(chord)
-        corners = np.concatenate(loops) if loops else np.zeros((1, 2))
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        width, height = np.maximum(high - low, 1e-6)
-        path = " ".join("M " + " L ".join(f"{u:.9g} {-v:.9g}" for u, v in loop) + " Z" for loop in loops)
-        box = f"{low[0]:.9g} {-high[1]:.9g} {width:.9g} {height:.9g}"
-        size = f'width="{width:.9g}mm" height="{height:.9g}mm" viewBox="{box}"'
-        return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n<path fill-rule="nonzero" d="{path}"/>\n</svg>\n'
+        return outlines_svg(self.polygons(chord))
 
     def write(self, path: str | os.PathLike[str], chord: float = 0.01) -> None:
         """Writes the drawing (.svg)."""

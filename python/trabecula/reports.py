@@ -24,6 +24,7 @@ __all__ = [
     "LargestBit",
     "LargestIsland",
     "LatticeReport",
+    "LayersReport",
     "LooseBodies",
     "MapSpread",
     "MeshReport",
@@ -432,6 +433,23 @@ class LatticeReport(Report):
     """Root mean square share of a cell from a file that the kept terms leave out."""
     wavelength: float
     """The smallest wavelength, mm."""
+
+
+class LayersReport(Report):
+    """What a file of layers holds."""
+
+    contours: int
+    """Number of contours, holes included."""
+    empty: int
+    """Layers without a contour."""
+    largest: float
+    """The largest area of a layer, mm²."""
+    layers: int
+    """Number of layers."""
+    points: int
+    """Number of points of all contours."""
+    volume: float
+    """The sum of area times thickness over the layers, mm³: each area is that of the section in the layer's middle."""
 
 
 class LooseBodies(Report):

@@ -13,8 +13,9 @@ from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES
-from .given import positive, whole
+from .given import number, positive, whole
 from .islands import check_islands, left_out, warn_islands
+from .layers import Layers
 from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
@@ -548,6 +549,40 @@ class Solid(Seen):
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
+
+    def layers(
+        self,
+        layer: float,
+        tolerance: float = 0.001,
+        start: float | None = None,
+        stop: float | None = None,
+        step: float | None = None,
+        threads: int | None = None,
+        adaptive: float | None = None,
+        least: float | None = None,
+    ) -> Layers:
+        """The layers of the part, for machines: a sequence of ``Layer`` (``z``, ``height``, ``loops``, ``area``), each made from
+        the field when it is asked for, without a mesh; and ``save(path)``.
+
+        ``layer`` is their thickness, mm, along z from ``start`` to ``stop`` (mm; default: the region's ends, where the last one
+        ends thinner). A layer is the section in its middle, so the sum of area times thickness is the volume by the midpoint
+        rule. Contours are within ``tolerance`` (mm) of the section and have its area; corners where surfaces meet are kept.
+        ``step`` is the edge (mm) of the cells in which the section is looked for, by default one and a half times
+        ``report().spacing``, with beams once; cells that leave it undecided are refined to an eighth.
+
+        ``adaptive`` (mm) is the greatest height of steps on the surface, layer height times the vertical component of the
+        surface's unit normal: layers are then as thick as it allows on 95 % of their contours, from ``least`` (mm, by default a
+        quarter of ``layer``) to ``layer``.
+        """
+        coarse = 1.0 if self.beams else 1.5  # crevices between beams show in finer cells only
+        spacing = coarse * self._usual if step is None else positive("step", step)
+        begin = None if start is None else number("start", start)
+        end = None if stop is None else number("stop", stop)
+        thick, within = positive("layer", layer), positive("tolerance", tolerance)
+        cusp = None if adaptive is None else [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
+        if cusp is None and least is not None:
+            raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
+        return Layers(self, _core.Layers(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
 
     def thickness(
         self,

@@ -11,6 +11,7 @@ mod elements;
 mod frd;
 mod indexed;
 mod join;
+mod layer_files;
 mod npy;
 mod number;
 mod obj;
@@ -27,6 +28,7 @@ mod xml;
 
 pub use elements::Elements;
 pub use indexed::{Aside, Indexed};
+pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, Stack, Target};
 pub use npy::{read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;

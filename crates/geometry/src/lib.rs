@@ -55,6 +55,7 @@ pub mod distance;
 pub mod fault;
 pub mod feature_edges;
 pub mod formats;
+pub mod layer;
 pub mod math;
 pub mod measure;
 pub mod mesh;

@@ -7,6 +7,7 @@ mod design;
 mod error;
 mod file;
 mod folder;
+mod layers;
 mod machine;
 mod mesh;
 mod node;
@@ -44,6 +45,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::design::Design;
+    #[pymodule_export]
+    use crate::layers::Layers;
     #[pymodule_export]
     use crate::mesh::{Mesh, MeshFormat};
     #[pymodule_export]
@@ -86,6 +89,13 @@ mod _core {
     #[pyfunction]
     fn mesh_formats() -> Vec<MeshFormat> {
         geometry::formats::FORMATS.iter().map(MeshFormat::of).collect()
+    }
+
+    /// The formats of layers, in the order in which texts name them: suffix, what it is, whether it holds pictures, whether all
+    /// layers have one thickness.
+    #[pyfunction]
+    fn layer_formats() -> Vec<(&'static str, &'static str, bool, bool)> {
+        crate::layers::formats()
     }
 
     /// The JSON Schema of a design, as JSON text.

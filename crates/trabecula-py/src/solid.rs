@@ -42,6 +42,11 @@ impl Solid {
         Solid { built, design }
     }
 
+    /// The solid itself.
+    pub fn solid(&self) -> &trabecula::Solid {
+        &self.built.solid
+    }
+
     /// The solved map of a lattice.
     fn solved(&self, lattice: &str) -> PyResult<&Phase> {
         let found = self.built.lattices.iter().find(|(name, _)| name == lattice);

@@ -48,6 +48,7 @@ pub mod grade;
 pub mod implicit;
 mod kind;
 pub mod lattice;
+pub mod layers;
 pub mod map;
 pub mod mesher;
 pub mod region;

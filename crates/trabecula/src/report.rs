@@ -3,6 +3,7 @@
 
 mod beams_report;
 mod design_report;
+mod layers_report;
 mod mesh_report;
 mod tets_report;
 
@@ -17,6 +18,7 @@ pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     PeriodReport, RbfReport, RegionReport, SingularLineReport, TransitionReport,
 };
+pub use layers_report::LayersReport;
 pub use mesh_report::{
     DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,
     RepairReport, SimplifyReport, SmoothReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread,
@@ -63,6 +65,7 @@ struct Reports {
     estimate: EstimateReport,
     tets: TetMeshReport,
     step: StepReport,
+    layers: LayersReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

@@ -22,7 +22,7 @@ const LAYERS: &[&[&str]] = &[
     &["mesher", "lattice", "tiling", "truss", "skin", "beam_surface"],
     &["blend"],
     &["solid"],
-    &["extract"],
+    &["extract", "layers"],
     &["analysis"],
     &["report"],
     &["design"],

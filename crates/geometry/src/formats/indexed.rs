@@ -2,7 +2,7 @@
 //! number has to be known before they are written.
 
 use std::borrow::Cow;
-use std::io;
+use std::io::{self, Seek, Write};
 use std::ops::Range;
 
 use crate::math::Vec3;
@@ -63,5 +63,17 @@ impl Aside for Vec<Vec<u8>> {
 
     fn copy_to(&mut self, out: &mut dyn io::Write) -> io::Result<()> {
         self.iter().try_for_each(|bytes| out.write_all(bytes))
+    }
+}
+
+/// A file that is written and then read back from its beginning.
+impl Aside for std::fs::File {
+    fn put(&mut self, bytes: Vec<u8>) -> io::Result<()> {
+        self.write_all(&bytes)
+    }
+
+    fn copy_to(&mut self, out: &mut dyn io::Write) -> io::Result<()> {
+        self.seek(io::SeekFrom::Start(0))?;
+        io::copy(self, out).map(|_| ())
     }
 }

@@ -102,6 +102,12 @@ pub fn write_npy<W: Write>(shape: [usize; 3], data: &[u8], out: &mut W) -> io::R
     if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(data.len()) {
         return Err(invalid(format!("an array of {x} × {y} × {z} does not have {} bytes", data.len())));
     }
+    write_header(shape, &mut *out)?;
+    out.write_all(data)
+}
+
+/// Writes what precedes the bytes of such an array.
+pub(super) fn write_header<W: Write + ?Sized>([x, y, z]: [usize; 3], out: &mut W) -> io::Result<()> {
     let mut header = format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");
     // Magic, version and length take ten bytes; the data begin at a multiple of 64.
     while (10 + header.len() + 1) % 64 != 0 {
@@ -110,8 +116,7 @@ pub fn write_npy<W: Write>(shape: [usize; 3], data: &[u8], out: &mut W) -> io::R
     header.push('\n');
     out.write_all(b"\x93NUMPY\x01\x00")?;
     out.write_all(&(header.len() as u16).to_le_bytes())?;
-    out.write_all(header.as_bytes())?;
-    out.write_all(data)
+    out.write_all(header.as_bytes())
 }
 
 #[cfg(test)]

@@ -12,7 +12,8 @@ mod deflate;
 mod package;
 mod read;
 
-use package::{Entry, Piece};
+use package::Entry;
+pub use package::Piece;
 pub use read::read;
 
 const MODEL: &str = "3D/3dmodel.model";
@@ -47,11 +48,8 @@ pub fn write_objects(
     if objects.iter().any(|o| o.1.counts().iter().any(|n| *n >= i32::MAX as usize)) {
         return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
-    let mut model = Entry::new(MODEL, aside);
-    let mut head = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\" \
-         xmlns:trabecula=\"urn:trabecula:design\">\n"
-    );
+    let mut model = Model::new(aside);
+    let mut head = Model::head(" xmlns:trabecula=\"urn:trabecula:design\"");
     let facts = [("Title", &meta.title), ("Application", &meta.application), ("trabecula:Design", &meta.design)];
     for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
         head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text)));
@@ -67,16 +65,43 @@ pub fn write_objects(
         tail.push_str(&format!("<item objectid=\"{id}\"/>\n"));
     }
     model.push(Piece::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()))?;
-    let (mut first, mut second) = (Vec::new(), Vec::new());
-    let mut types = Entry::new("[Content_Types].xml", &mut first);
-    types.push(Piece::of(TYPES.as_bytes()))?;
-    let mut relations = Entry::new("_rels/.rels", &mut second);
-    relations.push(Piece::of(RELATIONS.as_bytes()))?;
-    package::write(&mut [types, relations, model], package::LIMIT, out)
+    model.finish(out)
+}
+
+/// The model of a package, made piece by piece.
+pub struct Model<'a>(Entry<'a>);
+
+impl<'a> Model<'a> {
+    /// An empty model, whose pieces are put aside.
+    pub fn new(aside: &'a mut dyn Aside) -> Model<'a> {
+        Model(Entry::new(MODEL, aside))
+    }
+
+    /// How its text begins, with more attributes of the model.
+    pub fn head(attributes: &str) -> String {
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\"{attributes}>\n"
+        )
+    }
+
+    /// Adds a piece of its text.
+    pub fn push(&mut self, piece: Piece) -> io::Result<()> {
+        self.0.push(piece)
+    }
+
+    /// Writes the package.
+    pub fn finish(mut self, out: &mut (impl Write + ?Sized)) -> io::Result<()> {
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        let mut types = Entry::new("[Content_Types].xml", &mut first);
+        types.push(Piece::of(TYPES.as_bytes()))?;
+        let mut relations = Entry::new("_rels/.rels", &mut second);
+        relations.push(Piece::of(RELATIONS.as_bytes()))?;
+        package::write(&mut [types, relations, self.0.lent()], package::LIMIT, &mut &mut *out)
+    }
 }
 
 /// Adds the vertices and triangles of a mesh.
-fn push_mesh(model: &mut Entry, mesh: &dyn Indexed) -> io::Result<()> {
+fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
     let [vertices, triangles] = mesh.counts();
     let points = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);

@@ -1,0 +1,140 @@
+//! Layers of a solid: contours as arrays, and files for machines.
+
+use std::io::BufWriter;
+use std::path::PathBuf;
+
+use geometry::formats::{Encoded, LAYER_FORMATS, LayerFormat, Raster, Stack};
+use geometry::layer::Layer;
+use geometry::math::Aabb;
+use geometry::progress::Stopped;
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use trabecula::layers::{Adaptive, Plan, Slicer};
+use trabecula::report::LayersReport;
+
+use crate::error;
+use crate::file;
+use crate::report::report;
+use crate::run::run;
+use crate::solid::Solid;
+
+/// Height of the section, lower and upper face (mm), closed contours (n, 2), area (mm²).
+type Section<'py> = (f64, f64, f64, Vec<Bound<'py, PyArray2<f64>>>, f64);
+
+/// A solid that is ready to be sliced.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct Layers {
+    slicer: Slicer,
+    bounds: Aabb,
+}
+
+fn section<'py>(py: Python<'py>, layer: &Layer) -> PyResult<Section<'py>> {
+    let closed = |l: &Vec<[f64; 2]>| {
+        let flat: Vec<f64> = l.iter().chain(l.first()).flatten().copied().collect();
+        flat.into_pyarray(py).reshape([l.len() + 1, 2])
+    };
+    let loops = layer.loops.iter().map(closed).collect::<PyResult<_>>()?;
+    Ok((layer.z, layer.bottom, layer.top, loops, layer.area()))
+}
+
+#[pymethods]
+impl Layers {
+    /// Of a solid: thickness of layers, tolerance, edge of the cells of the sampling grid, begin and end (mm), greatest
+    /// cusp and least thickness where it follows the slope (mm).
+    #[new]
+    #[pyo3(signature = (solid, layer, tolerance, step, begin=None, end=None, adaptive=None))]
+    fn new(
+        py: Python<'_>,
+        solid: &Solid,
+        layer: f64,
+        tolerance: f64,
+        step: f64,
+        begin: Option<f64>,
+        end: Option<f64>,
+        adaptive: Option<[f64; 2]>,
+    ) -> PyResult<Layers> {
+        let solid = solid.solid();
+        let adaptive = adaptive.map(|[cusp, least]| Adaptive { cusp, least });
+        let plan = Plan { layer, tolerance, step, adaptive, range: [begin, end] };
+        let slicer = run(py, None, None, |_| Slicer::new(solid, &plan))?.map_err(error::fault)?;
+        Ok(Layers { slicer, bounds: solid.region.bounds() })
+    }
+
+    /// Where layers begin, and the end of the last one, mm.
+    #[getter]
+    fn heights(&self) -> Vec<f64> {
+        self.slicer.heights().to_vec()
+    }
+
+    /// Some layers in a row.
+    #[pyo3(signature = (first, count, threads=None))]
+    fn some<'py>(
+        &self,
+        py: Python<'py>,
+        first: usize,
+        count: usize,
+        threads: Option<usize>,
+    ) -> PyResult<Vec<Section<'py>>> {
+        let end = self.slicer.len().min(first.saturating_add(count));
+        let made: Vec<Layer> =
+            run(py, threads, None, |_| (first..end).into_par_iter().map(|i| self.slicer.layer(i)).collect())?;
+        made.iter().map(|l| section(py, l)).collect()
+    }
+
+    /// The section at a height, mm.
+    fn at<'py>(&self, py: Python<'py>, z: f64) -> PyResult<Section<'py>> {
+        section(py, &run(py, None, None, |_| self.slicer.at(z))?)
+    }
+
+    /// Writes all layers to a file, given as path, suffix and title; `pixel` is the edge of a pixel (mm), its numbers along x and
+    /// y and the lower left corner. Gives its `reports.LayersReport`.
+    #[pyo3(signature = (file, binary=false, pixel=None, exposure=[8.0, 35.0], threads=None, progress=None))]
+    fn save<'py>(
+        &self,
+        py: Python<'py>,
+        file: (PathBuf, String, String),
+        binary: bool,
+        pixel: Option<(f64, [usize; 2], [f64; 2])>,
+        exposure: [f64; 2],
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (path, suffix, title) = file;
+        let format = LayerFormat::of(&suffix)
+            .ok_or_else(|| PyValueError::new_err(format!("no format of layers is named {suffix}")))?;
+        let stack = Stack {
+            heights: self.slicer.heights().to_vec(),
+            bounds: self.bounds,
+            title,
+            application: format!("Trabecula {}", env!("CARGO_PKG_VERSION")),
+            binary,
+            raster: pixel.map(|(pixel, size, origin)| Raster { origin, pixel, size }),
+            exposure,
+        };
+        let made = run(py, threads, progress, |p| {
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path).map_err(Stopped::Io)?);
+            let mut aside = file::nameless(&path, ".1").map_err(Stopped::Io)?;
+            let mut writer = (format.open)(&stack, &mut out, &mut aside).map_err(Stopped::Io)?;
+            let mut total = LayersReport::default();
+            let encode = |index: usize, layer: &Layer| {
+                let encoded = (format.encode)(&stack, index, layer);
+                (LayersReport::from(layer), layer.area(), encoded)
+            };
+            let take = |(figures, area, encoded): (LayersReport, f64, std::io::Result<Encoded>)| {
+                total.add(&figures);
+                encoded.and_then(|e| writer.put(e, area)).map_err(Stopped::Io)
+            };
+            self.slicer.each(p, encode, take)?;
+            writer.finish().map_err(Stopped::Io)?;
+            Ok(total)
+        })?;
+        report(py, "LayersReport", &made.map_err(error::stopped)?)
+    }
+}
+
+/// The formats of layers: suffix, what it is, whether it holds pictures, whether all layers have one thickness.
+pub fn formats() -> Vec<(&'static str, &'static str, bool, bool)> {
+    LAYER_FORMATS.iter().map(|f| (f.suffix, f.title, f.pictures, f.uniform)).collect()
+}

@@ -1,0 +1,158 @@
+//! Roots of implicit surfaces in a layer's plane, many at a time: on sides of polygons, where two surfaces meet, and nearest to a
+//! point.
+
+use super::outline::{Outline, Root};
+use super::plane_grid::{PlaneGrid, lifted};
+use crate::implicit::Surface;
+use geometry::layer::{Point, length};
+use geometry::math::Vec3;
+
+/// Surfaces at a height.
+#[derive(Clone, Copy)]
+pub(super) struct Plane<'a> {
+    pub surfaces: &'a [Surface],
+    pub z: f64,
+}
+
+/// Values and gradients in the plane at points.
+pub(super) struct Evaluated {
+    pub values: Vec<f64>,
+    pub gradients: Vec<Vec3>,
+}
+
+/// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
+const BATCH: usize = 1024;
+
+impl Plane<'_> {
+    /// Evaluates a surface at points of the plane.
+    pub fn evaluate(&self, surface: u32, points: impl Iterator<Item = Point>) -> Evaluated {
+        let points: Vec<Vec3> = points.map(|p| lifted(p, self.z)).collect();
+        let mut out = Evaluated { values: vec![0.0; points.len()], gradients: vec![[0.0; 3]; points.len()] };
+        let field = &self.surfaces[surface as usize].field;
+        let parts = out.values.chunks_mut(BATCH).zip(out.gradients.chunks_mut(BATCH));
+        for (points, (values, gradients)) in points.chunks(BATCH).zip(parts) {
+            field.gradients(points, values, gradients);
+        }
+        out
+    }
+}
+
+impl Evaluated {
+    /// The value, the gradient in the plane and its length, of a point.
+    pub fn at(&self, i: usize) -> (f64, Point, f64) {
+        let [x, y, _] = self.gradients[i];
+        (self.values[i], [x, y], length([x, y]))
+    }
+}
+
+/// Rounds of a bracketed iteration.
+const ROUNDS: usize = 40;
+
+/// A root that is still looked for: where it lies between, from the end where the surface is not positive.
+struct Bracket {
+    root: u32,
+    low: f64,
+    high: f64,
+}
+
+/// Solves for the roots of all surfaces on their sides to `accuracy` (mm): Newton's method within a bracket.
+pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accuracy: f64) {
+    let mut order: Vec<u32> = (0..outline.roots.len() as u32).collect();
+    order.sort_by_key(|r| outline.roots[*r as usize].surface);
+    let roots = &mut outline.roots;
+    for of in order
+        .chunk_by(|a, b| roots[*a as usize].surface == roots[*b as usize].surface)
+        .map(<[u32]>::to_vec)
+        .collect::<Vec<_>>()
+    {
+        let surface = roots[of[0] as usize].surface;
+        let mut open: Vec<Bracket> = of.iter().map(|&root| Bracket { root, low: 0.0, high: 1.0 }).collect();
+        for round in 0..ROUNDS {
+            let found = plane.evaluate(surface, open.iter().map(|b| roots[b.root as usize].position(grid)));
+            let mut i = 0;
+            open.retain_mut(|b| {
+                let (value, gradient, _) = found.at(i);
+                i += 1;
+                // The first evaluation is at a guess, whose gradient is not that of the root.
+                !step(&mut roots[b.root as usize], b, grid, (value, gradient), accuracy) || round == 0
+            });
+            if open.is_empty() {
+                break;
+            }
+        }
+    }
+}
+
+/// One step for a root; whether it is near enough.
+fn step(root: &mut Root, b: &mut Bracket, grid: &PlaneGrid, (value, gradient): (f64, Point), accuracy: f64) -> bool {
+    let [p, q] = root.side.map(|n| grid.position(n));
+    let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+    let slope = gradient[0] * dx + gradient[1] * dy;
+    if (value <= 0.0) == root.falls {
+        b.low = b.low.max(root.at);
+    } else {
+        b.high = b.high.min(root.at);
+    }
+    root.gradient = gradient;
+    let newton = root.at - value / slope;
+    let next = if newton > b.low && newton < b.high { newton } else { 0.5 * (b.low + b.high) };
+    let moved = (next - root.at).abs() * length([dx, dy]);
+    root.at = next;
+    moved <= accuracy
+}
+
+/// A point where two surfaces meet, looked for from a guess within a box.
+pub(super) struct Meeting {
+    pub surfaces: [u32; 2],
+    pub point: Point,
+    pub bounds: [Point; 2],
+    /// The gradients of both there.
+    pub gradients: [Point; 2],
+    /// Whether it was found.
+    pub found: bool,
+}
+
+/// Solves for points where two surfaces meet, to `accuracy` (mm), by Newton's method.
+pub(super) fn meet(meetings: &mut [Meeting], plane: Plane, accuracy: f64) {
+    let mut open: Vec<usize> = (0..meetings.len()).collect();
+    for _ in 0..ROUNDS / 2 {
+        let mut values = vec![[0.0; 2]; open.len()];
+        for k in 0..2 {
+            let mut order: Vec<usize> = (0..open.len()).collect();
+            let surfaces: Vec<u32> = open.iter().map(|m| meetings[*m].surfaces[k]).collect();
+            order.sort_by_key(|i| surfaces[*i]);
+            for of in order.chunk_by(|a, b| surfaces[*a] == surfaces[*b]) {
+                let surface = surfaces[of[0]];
+                let found = plane.evaluate(surface, of.iter().map(|i| meetings[open[*i]].point));
+                for (n, i) in of.iter().enumerate() {
+                    let (value, gradient, _) = found.at(n);
+                    values[*i][k] = value;
+                    meetings[open[*i]].gradients[k] = gradient;
+                }
+            }
+        }
+        let mut i = 0;
+        open.retain(|m| {
+            let m = &mut meetings[*m];
+            let [v, w] = values[i];
+            i += 1;
+            let [[a, b], [c, d]] = m.gradients;
+            let determinant = a * d - b * c;
+            let size = [0, 1].map(|k| m.bounds[1][k] - m.bounds[0][k]);
+            let most = size[0].max(size[1]);
+            let by = [(-v * d + w * b) / determinant, (-w * a + v * c) / determinant];
+            let length = length(by);
+            if !length.is_finite() {
+                return false;
+            }
+            let scale = (most / length).min(1.0);
+            m.point = [0, 1].map(|k| m.point[k] + scale * by[k]);
+            let inside = (0..2).all(|k| m.point[k] >= m.bounds[0][k] && m.point[k] <= m.bounds[1][k]);
+            m.found = length <= accuracy && inside;
+            length > accuracy
+        });
+        if open.is_empty() {
+            break;
+        }
+    }
+}

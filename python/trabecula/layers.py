@@ -1,0 +1,175 @@
+"""Layers of a solid from its field: contours as arrays, and files for machines."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from . import _core
+from .files import check_place, extension, special, whole_file, write_svg
+from .formats import LAYER_WRITES, LAYERS
+from .given import number, positive, whole
+from .machine import fits
+from .outlines import outlines_svg
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Any
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .reports import LayersReport
+    from .solid import Solid
+
+    Progress = Callable[[int, int], Any]
+
+__all__ = ["Layer", "Layers"]
+
+#: Layers that are made at once while a sequence is gone through.
+AHEAD = 8
+#: Most pixels along an edge of a picture.
+MOST_PIXELS = 1 << 20
+
+
+@dataclass(frozen=True)
+class Layer:
+    """The cross-section of a part in one layer."""
+
+    #: Height of the section, in the middle of the layer, mm.
+    z: float
+    #: Lower face of the layer, mm.
+    bottom: float
+    #: Upper face, mm.
+    top: float
+    #: Closed contours (n, 2), mm, the first point repeated at the end: simple polygons that do not meet, outer ones
+    #: counter-clockwise, holes clockwise.
+    loops: list[NDArray[np.float64]]
+    #: Area of the section, mm².
+    area: float
+
+    @property
+    def height(self) -> float:
+        """Thickness of the layer, mm."""
+        return self.top - self.bottom
+
+    def svg(self) -> str:
+        """A drawing in mm, y upwards, the solid filled."""
+        return outlines_svg([loop[:-1] for loop in self.loops])
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the drawing (.svg)."""
+        write_svg(path, self.svg)
+
+    def __repr__(self) -> str:
+        return f"<trabecula.Layer at z = {self.z:g} mm: {len(self.loops)} contours, {self.area:.6g} mm²>"
+
+
+class Layers(Sequence):
+    """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
+
+    def __init__(self, solid: Solid, core: _core.Layers, threads: int | None):
+        self._solid = solid
+        self._core = core
+        self._threads = threads
+        #: Where layers begin, and the end of the last one, mm.
+        self.heights: list[float] = core.heights
+
+    def __repr__(self) -> str:
+        return f"<trabecula.Layers: {len(self)} from {self.heights[0]:g} to {self.heights[-1]:g} mm>"
+
+    def __len__(self) -> int:
+        return len(self.heights) - 1
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        at = index + len(self) if index < 0 else index
+        if not 0 <= at < len(self):
+            raise IndexError(f"layer {index} of {len(self)}")
+        return _layer(self._core.some(at, 1, self._threads)[0])
+
+    def __iter__(self) -> Iterator[Layer]:
+        for first in range(0, len(self), AHEAD):
+            yield from map(_layer, self._core.some(first, AHEAD, self._threads))
+
+    def at(self, z: float) -> Layer:
+        """The section at a height ``z`` (mm): a layer without thickness."""
+        return _layer(self._core.at(number("z", z)))
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        binary: bool = False,
+        pixel: float | None = None,
+        size: tuple[int, int] | None = None,
+        exposure: tuple[float, float] = (8.0, 35.0),
+        progress: Progress | None = None,
+    ) -> LayersReport:
+        """Writes all layers to a file and gives its figures; a few layers are held in memory at a time.
+
+        ``path`` ends in .cli (``binary`` or text), .svg, .3mf (slices), or for pictures in .zip (PNG and a manifest), .sl1
+        (resin printers) or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey is the
+        exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without it they are
+        as large as the region. ``exposure`` (s, of layers and of the first ones) is for .sl1.
+        """
+        kind = extension(path, LAYER_WRITES)
+        row = LAYERS[kind]
+        if binary and kind != "cli":
+            raise ValueError(f"binary is for .cli; {os.fsdecode(path)} has one form only")
+        steps = [b - a for a, b in zip(self.heights, self.heights[1:], strict=False)]
+        if row.uniform and any(abs(step - steps[0]) > 1e-9 * steps[0] for step in steps[1:-1]):
+            raise ValueError(f"a .{kind} has layers of one thickness; write adaptive layers as .cli, .svg, .3mf or .zip")
+        raster = None
+        if row.pictures:
+            raster = self._raster(kind, pixel, size)
+        elif pixel is not None or size is not None:
+            raise ValueError(f"pixel and size are for pictures (.zip, .sl1, .npy); a .{kind} holds contours")
+        times = [positive("exposure", t) for t in exposure]
+        check_place(path)
+        if special(os.fsdecode(path)):
+            raise ValueError(f"{os.fsdecode(path)} is a device or a pipe; layers are written to a file")
+        title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
+        if raster:
+            self._check_room(kind, path, raster[1], raster[0])
+        with whole_file(path) as temporary:
+            return self._core.save((temporary, kind, title), binary, raster, times, self._threads, progress)
+
+    def _raster(self, kind: str, pixel: float | None, size: tuple[int, int] | None) -> tuple:
+        """Edge of a pixel, numbers of pixels and the lower left corner of pictures."""
+        if pixel is None:
+            raise ValueError(f"a .{kind} holds pictures: give pixel, the edge of a pixel in mm")
+        edge = positive("pixel", pixel)
+        low, high = self._solid.bounds
+        extents = [high[a] - low[a] for a in (0, 1)]
+        needed = [max(1, math.ceil(e / edge - 1e-9)) for e in extents]
+        if size is None:
+            size = (needed[0], needed[1])
+        size = tuple(whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in size)
+        if any(n < m for n, m in zip(size, needed, strict=True)):
+            raise ValueError(
+                f"pictures of {size[0]} x {size[1]} pixels of {edge:g} mm are smaller than the part: it needs "
+                f"{needed[0]} x {needed[1]}; use a larger pixel, or turn or divide the part"
+            )
+        origin = [low[a] - 0.5 * (size[a] * edge - extents[a]) for a in (0, 1)]
+        return edge, list(size), origin
+
+    def _check_room(self, kind: str, path, size: list[int], pixel: float) -> None:
+        """Refuses pictures that neither memory nor disk can hold."""
+        count = size[0] * size[1]
+        threads = self._threads or os.cpu_count() or 1
+        held = 2.0 * threads * count if kind == "npy" else 0.1 * threads * count
+        fits(held, f"pictures of {size[0]} x {size[1]} pixels", edge=pixel, power=2, word="pixel")
+        if kind == "npy":
+            fits(float(count) * len(self), f"{len(self)} pictures of {size[0]} x {size[1]} pixels", path, pixel, 2, "pixel")
+
+
+def _too_many(count: int, edge: float) -> int:
+    raise ValueError(f"pixel {edge:g} mm makes {count:.3g} pixels along an edge; at most {MOST_PIXELS} are possible")
+
+
+def _layer(made: tuple) -> Layer:
+    return Layer(*made)
