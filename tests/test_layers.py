@@ -64,7 +64,9 @@ DESIGNS = {
         lattice={"a": lattice(), "b": lattice("sheet", "primitive")},
         blend=lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-2: 0, 2: 1})),
     ),
-    "beams": lambda: lt.Design(region=lt.region.box(size=[8, 8, 8]), beams=lt.Beams("octet", lt.map.affine(4), radius=0.3)).build(),
+    "beams": lambda: lt.Design(
+        region=lt.region.box(size=[8, 8, 8]), beams=lt.Beams("octet", lt.map.affine(4), radius=0.3)
+    ).build(),
 }
 
 
@@ -275,7 +277,7 @@ def test_pictures_have_the_area_of_layers(part, tmp_path):
         # Each pixel on the boundary is rounded by half a 255th at most; signs are random.
         edge = ((image > 0) & (image < 255)).sum()
         assert grey == pytest.approx(layer.area, abs=5 * 0.5 / 255 * pixel**2 * math.sqrt(edge) + 1e-9)
-        assert (stack[:, ::-1, i].T == image).all()
+        assert (image == stack[:, ::-1, i].T).all()
         large = png(resin.read(f"{config['jobDir']}{i:05}.png"))
         assert large.shape == (180, 200) and (large[10:170, 20:180] == image).all()
 
@@ -292,7 +294,9 @@ def test_the_same_bytes_for_any_number_of_threads(part, tmp_path):
         if suffix == "cli":
             files = [re.sub(rb"LABEL/1,\d", b"", f) for f in files]
         if suffix == "3mf":
-            models = [zipfile.ZipFile(io.BytesIO((tmp_path / f"{t}.3mf").read_bytes())).read("3D/3dmodel.model") for t in (1, 2)]
+            models = [
+                zipfile.ZipFile(io.BytesIO((tmp_path / f"{t}.3mf").read_bytes())).read("3D/3dmodel.model") for t in (1, 2)
+            ]
             files = [re.sub(rb'Title">\d|name="\d"', b"", m) for m in models]
         assert files[0] == files[1], suffix
 

@@ -579,7 +579,11 @@ class Solid(Seen):
         begin = None if start is None else number("start", start)
         end = None if stop is None else number("stop", stop)
         thick, within = positive("layer", layer), positive("tolerance", tolerance)
-        cusp = None if adaptive is None else [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
+        cusp = (
+            None
+            if adaptive is None
+            else [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
+        )
         if cusp is None and least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
         return Layers(self, _core.Layers(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
