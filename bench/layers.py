@@ -2,9 +2,9 @@
 
   python bench/layers.py [--size 100] [--cell 10] [--layer 0.05] [--tolerance 0.001 0.01] [--some 20]
 
-Layers are made of a gyroid sheet (30 %) in a cube, written as binary CLI. The mesh has the grid spacing that `mesh` uses by
-default; trimesh slices `--some` heights of it in one call, and its time is scaled to all of them, that of meshing added. Pictures are
-of 7680 x 4320 pixels.
+Layers are made of a gyroid sheet (30 %) in a cube, written as binary CLI. The mesh has the grid spacing that `mesh`
+uses by default; trimesh slices `--some` heights of it in one call, and its time is scaled to all of them, that of
+meshing added. Pictures are of 7680 x 4320 pixels.
 """
 
 import argparse

@@ -310,7 +310,7 @@ def test_the_same_bytes_for_any_number_of_threads(part, tmp_path):
         ({"layer": 1e-9}, "layers; at most"),
         ({"layer": 0.1, "tolerance": 1e-9}, "single precision"),
         ({"layer": 0.1, "start": 5}, "the part lies between -4 and 4 mm"),
-        ({"layer": 0.1, "start": 2, "stop": 1}, "no layer is between 2 and 1 mm"),
+        ({"layer": 0.1, "start": 2, "stop": 1}, "no layer is between 2 mm and 1 mm"),
     ],
 )
 def test_bad_layers_are_refused(arguments, why):

@@ -67,9 +67,10 @@ class Design:
 Section = tuple[float, float, float, list[NDArray[np.float64]], float]
 
 class Layers:
-    heights: list[float]
-    def __init__(
-        self,
+    @property
+    def heights(self) -> list[float]: ...
+    @staticmethod
+    def of(
         solid: Solid,
         layer: float,
         tolerance: float,
@@ -77,7 +78,7 @@ class Layers:
         begin: float | None = None,
         end: float | None = None,
         adaptive: list[float] | None = None,
-    ) -> None: ...
+    ) -> Layers: ...
     def some(self, first: int, count: int, threads: int | None = None) -> list[Section]: ...
     def at(self, z: float) -> Section: ...
     def save(

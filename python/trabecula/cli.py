@@ -323,8 +323,8 @@ COMMANDS = {
     "slice": (
         "Slice a design into layers for a machine, from its field and without a mesh; or at one height.",
         "The name of OUT decides the format: .cli (--binary or text), .svg, .3mf (slices), or pictures of a --pixel in .zip\n"
-        "(PNG), .sl1 (resin printers) or .npy. Contours are within the tolerance of the section in the middle of each layer and\n"
-        "have its area; grey is the exact area fraction of a pixel. Layers are written while they are made.\n"
+        "(PNG), .sl1 (resin printers) or .npy. Contours are within the tolerance of the section in the middle of each layer\n"
+        "and have its area; grey is the exact area fraction of a pixel. Layers are written while they are made.\n"
         "With --z a design that is beams alone is cut in exact conic arcs (also with --beams, uncut by region and skin).\n\n"
         "examples:\n  trabecula slice part.toml -o part.cli --layer 0.05 --binary\n"
         "  trabecula slice part.toml -o part.3mf --layer 0.05 --tolerance 0.002\n"

@@ -9,18 +9,8 @@ from . import _core
 
 __all__ = [
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
-    *(
-        "RESULT_READS",
-        "TET_READS",
-        "TET_WRITES",
-        "STDIN",
-        "STEP_WRITES",
-        "SWEEP_WRITES",
-        "VOXEL_WRITES",
-        "dotted",
-        "is_design",
-        "kind_of",
-    ),
+    *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES"),
+    *("dotted", "is_design", "kind_of"),
 ]
 
 DESIGNS = ("toml", "json")

@@ -113,8 +113,8 @@ class Layers(Sequence):
 
         ``path`` ends in .cli (``binary`` or text), .svg, .3mf (slices), or for pictures in .zip (PNG and a manifest), .sl1
         (resin printers) or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey is the
-        exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without it they are
-        as large as the region. ``exposure`` (s, of layers and of the first ones) is for .sl1.
+        exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without it they
+        are as large as the region. ``exposure`` (s, of layers and of the first ones) is for .sl1.
         """
         kind = extension(path, LAYER_WRITES)
         row = LAYERS[kind]

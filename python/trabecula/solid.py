@@ -561,8 +561,8 @@ class Solid(Seen):
         adaptive: float | None = None,
         least: float | None = None,
     ) -> Layers:
-        """The layers of the part, for machines: a sequence of ``Layer`` (``z``, ``height``, ``loops``, ``area``), each made from
-        the field when it is asked for, without a mesh; and ``save(path)``.
+        """The layers of the part, for machines: a sequence of ``Layer`` (``z``, ``height``, ``loops``, ``area``), each made
+        from the field when it is asked for, without a mesh; and ``save(path)``.
 
         ``layer`` is their thickness, mm, along z from ``start`` to ``stop`` (mm; default: the region's ends, where the last one
         ends thinner). A layer is the section in its middle, so the sum of area times thickness is the volume by the midpoint
@@ -579,14 +579,12 @@ class Solid(Seen):
         begin = None if start is None else number("start", start)
         end = None if stop is None else number("stop", stop)
         thick, within = positive("layer", layer), positive("tolerance", tolerance)
-        cusp = (
-            None
-            if adaptive is None
-            else [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
-        )
-        if cusp is None and least is not None:
+        cusp = None
+        if adaptive is not None:
+            cusp = [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
+        elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
-        return Layers(self, _core.Layers(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
+        return Layers(self, _core.Layers.of(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
 
     def thickness(
         self,

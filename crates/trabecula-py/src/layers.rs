@@ -43,9 +43,9 @@ fn section<'py>(py: Python<'py>, layer: &Layer) -> PyResult<Section<'py>> {
 impl Layers {
     /// Of a solid: thickness of layers, tolerance, edge of the cells of the sampling grid, begin and end (mm), greatest
     /// cusp and least thickness where it follows the slope (mm).
-    #[new]
+    #[staticmethod]
     #[pyo3(signature = (solid, layer, tolerance, step, begin=None, end=None, adaptive=None))]
-    fn new(
+    fn of(
         py: Python<'_>,
         solid: &Solid,
         layer: f64,

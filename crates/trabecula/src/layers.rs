@@ -221,8 +221,8 @@ impl Slicer {
         rings
     }
 
-    /// Makes all layers, maps each with its number by `map` on its thread and passes the results to `take` in order. A few layers a thread are held at
-    /// a time.
+    /// Makes all layers, maps each with its number by `map` on its thread and passes the results to `take` in order. A few layers
+    /// a thread are held at a time.
     ///
     /// # Errors
     /// What `take` reports; `Interrupted` if the progress asks for it.
@@ -257,9 +257,9 @@ fn heights(plan: &Plan, [low, high]: [f64; 2]) -> Result<Heights, Fault> {
     let from = plan.range[0].unwrap_or(low).max(low);
     let to = plan.range[1].unwrap_or(high).min(high);
     if from >= to {
-        let range = plan.range.map(|z| z.map_or("its end".to_string(), number));
+        let range = plan.range.map(|z| z.map_or("its end".to_string(), |z| format!("{} mm", number(z))));
         let message = format!(
-            "the part lies between {} and {} mm; no layer is between {} and {} mm",
+            "the part lies between {} and {} mm; no layer is between {} and {}",
             number(low),
             number(high),
             range[0],
