@@ -45,6 +45,7 @@ impl Layers {
     /// cusp and least thickness where it follows the slope (mm).
     #[staticmethod]
     #[pyo3(signature = (solid, layer, tolerance, step, begin=None, end=None, adaptive=None))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn of(
         py: Python<'_>,
         solid: &Solid,
@@ -91,6 +92,7 @@ impl Layers {
     /// Writes all layers to a file, given as path, suffix and title; `pixel` is the edge of a pixel (mm), its numbers along x and
     /// y and the lower left corner. Gives its `reports.LayersReport`.
     #[pyo3(signature = (file, binary=false, pixel=None, exposure=[8.0, 35.0], threads=None, progress=None))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn save<'py>(
         &self,
         py: Python<'py>,
