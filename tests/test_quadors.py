@@ -142,13 +142,16 @@ def test_planes_and_points_that_are_none_are_refused(octet, quadors):
 
 
 def test_the_command_draws_a_slice(tmp_path):
-    """Nine discs halfway along the cells, their area in closed form, and a drawing with as many loops."""
+    """Nine discs halfway along the cells, their area in closed form, and a drawing with as many loops; four of them in the part."""
     design = tmp_path / "sc.toml"
     design.write_text(
         'schema = 1\n[region.box]\nmin = [0, 0, 0]\nmax = [20, 20, 20]\n[beams.core]\ncell = "sc"\nradius = 1\n'
         'hub = 1\nprofile = "cylinder"\nmap.affine.wavelength = 10\n'
     )
     words = [sys.executable, "-m", "trabecula", "slice", str(design), "--z", "5", "-o", str(tmp_path / "o.svg"), "--json"]
+    part = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+    assert part["area"] == pytest.approx(4 * math.pi, rel=1e-5) and part["loops"] == 9  # those on the sides are cut
+    words += ["--beams", "core"]  # whole
     ran = subprocess.run(words, capture_output=True, text=True, check=True)
     told = json.loads(ran.stdout)
     assert told["area"] == pytest.approx(told["loops"] * math.pi, rel=1e-12) and told["loops"] >= 9
