@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -21,13 +22,20 @@ def design(cell=None, part="lower", level=None, region=None, **keys):
 
 def test_a_part_is_closed_whole_and_as_full_as_asked():
     solid = design().build()
-    report = solid.report()["lattices"]["a"]
-    assert report["tets"]["solid_fraction"] == pytest.approx(0.25, abs=1e-9)
+    report = solid.report()
+    ball = 4 / 3 * np.pi * 8**3
+    assert report["region"]["volume"] == pytest.approx(ball, rel=1e-12)
+    # Flat tetrahedra leave out a tenth; bent onto the ball they fill it, and the level makes up for what that changes.
+    lattice = report["lattices"]["a"]
+    assert lattice["tets"]["volume"] < 0.95 * ball and lattice["fraction"] == pytest.approx(0.25, abs=5e-4)
     mesh = solid.mesh(edge=0.25)
     assert mesh.closed and mesh.pieces == 1
-    # Whatever the steps: the fraction of a cell is known within 1e-4.
+    # Whatever the steps: sampling the level costs 2e-3, chords of the ball (edge / 2R)² = 6e-4 at most.
     for edge in (0.25, 0.4):
-        assert solid.mesh(edge=edge).volume == pytest.approx(0.25 * report["tets"]["volume"], rel=4e-4)
+        assert solid.mesh(edge=edge).volume == pytest.approx(0.25 * ball, rel=3e-3)
+    # Caps are on the ball.
+    ends = np.unique(mesh.triangles[mesh.cut])
+    assert np.abs(np.linalg.norm(mesh.vertices[ends], axis=1) - 8).max() < 1e-6
     assert solid.field(np.array([[20.0, 0, 0]]))[0] > 0
 
 
@@ -49,9 +57,9 @@ def test_overlapping_cells_are_told_as_they_are_made():
         told = solid.report().lattices["a"]
         mesh, grid = solid.mesh(edge=told.tets.edge / 24), design(lt.cell.tet(cell), method="implicit", **keys).build()
         assert told.tets.pieces == mesh.pieces == grid.report().lattices["a"].tets.pieces == 1
-        assert told.tets.solid_fraction == pytest.approx(fraction, abs=0.002)
+        assert told.fraction == pytest.approx(fraction, abs=0.002)
         # Second order in 24 steps.
-        assert mesh.volume / told.tets.volume == pytest.approx(fraction, abs=0.005)
+        assert mesh.solid_fraction == pytest.approx(fraction, abs=0.005)
         assert grid.mesh(edge=told.tets.edge / 16).volume == pytest.approx(mesh.volume, rel=0.02)
         assert told.tets.creases.mean > 10 > 0.05 > told.tets.creases.smoothed
 
@@ -146,7 +154,7 @@ def test_zones_pass_into_each_other_and_keep_the_fraction():
     mesh = solid.mesh(edge=0.2)
     assert mesh.closed and mesh.pieces == 1
     # Second order in the steps of the surface, of which there are twenty to an edge.
-    assert mesh.volume == pytest.approx(0.3 * report["tets"]["volume"], rel=0.02)
+    assert mesh.solid_fraction == pytest.approx(0.3, rel=0.02)
     far = lt.region.box(size=[1, 1, 1], center=[50, 0, 0])
     with pytest.raises(lt.DesignError, match="no tetrahedron's middle"):
         design(lt.cell.tet(zones={0: "iwp", 1: "diamond"}), zones={1: far}).build()
@@ -197,6 +205,68 @@ def test_a_single_tetrahedron_sharp_or_smooth():
         volume(sharpness=0.1)
     with pytest.raises(lt.DesignError, match="corners: expected a list of four"):
         lt.Design(region=lt.region.tetrahedron(corners[:3]), lattice={"a": cell}).build()
+
+
+@pytest.mark.parametrize("surface", ["net", "rounded"])
+def test_ends_at_the_surface_count_in_the_fraction(surface):
+    plain, solid = design().build(), design(surface=surface).build()
+    told = solid.report().lattices["a"]
+    # A twentieth of the volume that chords cost an edge of a sixteenth of a tetrahedron's, and 0.0005 of sampling.
+    mesh = solid.mesh(edge=told.tets.edge / 20)
+    assert mesh.closed and mesh.pieces == 1
+    assert told.fraction == pytest.approx(0.25, abs=1e-3) and mesh.solid_fraction == pytest.approx(0.25, abs=5e-3)
+    assert told.tets.surface == surface and 0.1 < told.tets.end_radius < 2
+    cut = mesh.area_cut / plain.mesh(edge=told.tets.edge / 20).area_cut
+    # Of half balls nothing but points is on the surface; a net covers more of it than the ports that it ties.
+    assert cut < 0.05 if surface == "rounded" else cut > 2
+
+
+def test_a_net_may_be_on_a_part_of_the_surface():
+    above = lt.region.halfspace(point=[0, 0, 0], normal=[0, 0, -1])
+    solid = design(surface="net", net={"radius": 0.5, "on": above}).build()
+    assert solid.report().lattices["a"].tets.end_radius == 0.5
+    mesh = solid.mesh(edge=0.25)
+    middles = mesh.vertices[mesh.triangles[mesh.cut]].mean(axis=1)[:, 2]
+    corners = mesh.vertices[mesh.triangles[mesh.cut]]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert areas[middles > 1].sum() > 2 * areas[middles < -1].sum()
+    for keys, words in (
+        ({"surface": "rounded", "net": {"radius": 1}}, 'there is a net with surface = "net" alone, found "rounded"'),
+        ({"surface": "net", "net": {"on": lt.region.sphere(radius=2)}}, "no triangle of the mesh's boundary has its middle"),
+        ({"surface": "net", "net": {"radius": 6}}, "make up"),
+        ({"surface": "nets"}, 'did you mean "net"'),
+    ):
+        with pytest.raises(lt.DesignError, match=words):
+            design(**keys).build()
+
+
+def test_open_ends_are_open_in_files(tmp_path):
+    solid = design(surface="open").build()
+    assert solid.open_ends and not design().build().open_ends and solid.mesh(edge=0.4).closed
+    (tmp_path / "a.toml").write_text(design(surface="open").to_toml())
+    run = [sys.executable, "-m", "trabecula", "mesh", tmp_path / "a.toml", "-o", tmp_path / "a.stl", "--edge", "0.4", "--json"]
+    told = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
+    assert told["open"] and not lt.Mesh.read(tmp_path / "a.stl").closed
+
+
+def test_a_region_cuts_a_mesh_that_is_not_one_of_it(tmp_path):
+    """Tetrahedra of a box about a ball: the ball cuts them; of the ball itself they are bent onto it."""
+    block = lt.Design(region=lt.region.box(size=[20, 20, 20]), lattice=design().lattice)
+    lt.TetMesh.of(block).write(tmp_path / "box.vtu")
+    lt.TetMesh.of(design()).write(tmp_path / "ball.vtu")
+    ball = 4 / 3 * np.pi * 8**3
+    for name, whole in (("box", False), ("ball", True)):
+        cell, level = lt.cell.tet("diamond"), lt.level.fraction(0.25)
+        lattice = lt.Lattice(cell=cell, part="lower", map=lt.map.tets(path=str(tmp_path / f"{name}.vtu")), level=level)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            solid = lt.Design(region=lt.region.sphere(radius=8), lattice={"a": lattice}).build()
+            report = solid.report()
+        assert any("is not a mesh of this region" in w["message"] for w in report["warnings"]) != whole, said
+        assert report["region"]["volume"] == pytest.approx(ball, rel=1e-9)
+        mesh = solid.mesh(edge=0.3)
+        # Cells that are cut have another share than whole ones, some per cent on the whole.
+        assert mesh.solid_fraction == pytest.approx(0.25, rel=0.02 if whole else 0.1)
 
 
 def test_the_boundary_may_be_left_open(tmp_path):

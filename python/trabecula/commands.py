@@ -197,7 +197,8 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     options = {**resolution(args), "threads": args.threads, "progress": progress, "islands": args.islands}
     options |= {"smooth": True} if args.smooth else {}
     asked = {} if args.chord is None else {"chord": args.chord}
-    whole = lighter or args.smooth or args.open
+    is_open = args.open or solid.open_ends
+    whole = lighter or args.smooth or is_open
     if not whole and (kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))):
         given = {"edge": None, "per_cell": None, "chord": None} | options
 
@@ -231,7 +232,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
         if surface.voids:
             warn(voids(surface.voids))
     settle()
-    if args.open:
+    if is_open:
         surface = surface.uncapped()
         made |= {"triangles": surface.counts[1], "open": True}
         say("open at the region's boundary: volume and fraction are the closed part's")

@@ -186,6 +186,8 @@ def tets(
     zones: Mapping[int, dict] | None = None,
     overlap: float | None = None,
     method: Literal["explicit", "implicit"] | None = None,
+    surface: Literal["capped", "open", "net", "rounded"] | None = None,
+    net: dict | None = None,
     path: str | os.PathLike[str] | None = None,
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     split: bool | None = None,
@@ -201,6 +203,8 @@ def tets(
     overlap: Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach
         beyond themselves and are mixed with their neighbours, from 0 (creases) to 0.2. [from 0 to 0.2, default 0.0]
     method: How the surface is made. [default "explicit"]
+    surface: How the lattice ends at the part's surface. [default "capped"]
+    net: The net of surface = "net". [optional]
     path: Path of the file, relative to the design file: vtu, vtk; with the extra "fe" of the Python package also msh,
         inp, med, mesh and others. [optional]
     unit: Unit of the file's coordinates (mm unless given). [optional]
@@ -214,6 +218,8 @@ def tets(
         zones=numbered(zones),
         overlap=overlap,
         method=method,
+        surface=surface,
+        net=net,
         path=None if path is None else os.fspath(path),
         unit=unit,
         split=split,

@@ -573,11 +573,12 @@ class RegionReport(Report):
     bounds: list[list[float]]
     """Lower and upper corner of its bounds, mm."""
     described_volume: float | None
-    """Volume of the region as described, mm³, where a lattice fills tetrahedra in its place; else None."""
+    """Volume of the region as described, mm³, of a lattice over tetrahedra; else None."""
     volume: float
-    """Volume of what the lattice fills, mm³: of the tetrahedra, where it is a lattice over them."""
+    """Volume of what the lattice fills, mm³: the region's, or of what it has in common with tetrahedra that are no mesh of
+    it."""
     volume_exact: bool
-    """Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra are not the region."""
+    """Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra have only a part of it."""
 
 
 class RepairReport(Report):
@@ -836,6 +837,8 @@ class TilingReport(Report):
     """Angles between walls at faces of tetrahedra; None where there are none."""
     edge: float
     """Mean length of edges, mm."""
+    end_radius: float | None
+    """Radius of the net's rods, or of rounded ends, mm; None with flat ends."""
     face_fraction: float | list[float] | None
     """Share of a tetrahedron's face that is solid; None for zones."""
     joins: list[ZoneJoin] | None
@@ -851,6 +854,8 @@ class TilingReport(Report):
     """Number of ports on each face of a tetrahedron; None for zones."""
     solid_fraction: float
     """Volume of solid over volume of the mesh."""
+    surface: str
+    """How the lattice ends at the part's surface: capped, open, net or rounded."""
     thickness: WallSpread | None
     """Thickness of the walls, mm; None for networks and for zones."""
     volume: float

@@ -212,6 +212,12 @@ class Solid(Seen):
         return self._core.coarser_spacing()
 
     @property
+    def open_ends(self) -> bool:
+        """Whether files of its mesh have no caps on the region's boundary (``surface = "open"`` of a map over tetrahedra): ``mesh``
+        closes them all the same, and ``Mesh.uncapped`` takes the caps off."""
+        return self._core.open_ends
+
+    @property
     def _default(self) -> float:
         """The grid spacing of a mesh unless another is asked for, mm."""
         return self._coarser[0] if self._coarser else self._usual

@@ -53,11 +53,11 @@ def _design(it: Report) -> Iterator[str]:
     extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
     about = "" if it.region.volume_exact else "about "
     volume, described = it.region.volume, it.region.described_volume
-    if described is None or it.region.volume_exact:
+    if described is None or it.region.volume_exact or abs(volume / described - 1) < 1e-6:
         yield f"region  {extent} mm, {about}{figure(volume)} mm³"
     else:
         off = 100 * (volume / described - 1)
-        yield f"region  {extent} mm, {figure(described)} mm³, of which tetrahedra fill {figure(volume)} mm³ ({off:+.1f} %)"
+        yield f"region  {extent} mm, {figure(described)} mm³, of which tetrahedra have {figure(volume)} mm³ ({off:+.1f} %)"
     for name, lattice in it.lattices.items():
         yield f"lattice {name}: {lattice.part}, wavelength {figure(lattice.wavelength)} mm"
         yield from _lattice(lattice)
@@ -154,6 +154,9 @@ def _tiling(it: Report) -> Iterator[str]:
     if it.thickness:
         w = it.thickness
         yield f"  walls      {figure(w.mean)} mm on average, 90 % between {figure(w.low)} and {figure(w.high)} mm"
+    if it.end_radius is not None:
+        what = "net of rods of radius" if it.surface == "net" else "rounded to"
+        yield f"  ends       {what} {figure(it.end_radius)} mm at the surface"
     if it.creases:
         smooth = " (before smoothing)" if it.overlap else ""
         yield f"  creases    {it.creases.mean:.0f}° on average, {it.creases.max:.0f}° at most at faces of tetrahedra{smooth}"

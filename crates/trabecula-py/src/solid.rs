@@ -312,6 +312,12 @@ impl Solid {
         ))
     }
 
+    /// Whether files of its mesh have no caps on the region's boundary.
+    #[getter]
+    fn open_ends(&self) -> bool {
+        self.built.is_open()
+    }
+
     /// The chord error at which a mesh is made unless another resolution is asked for, mm; None on a grid.
     #[getter]
     fn default_chord(&self, py: Python<'_>) -> PyResult<Option<f64>> {

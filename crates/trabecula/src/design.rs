@@ -18,9 +18,11 @@ mod coarse_steps;
 mod data;
 mod default_spacing;
 mod design_schema;
+mod finish_tiling;
 mod joins;
 mod sample;
 mod study_kind;
+mod surface_net;
 #[cfg(test)]
 mod tests;
 mod volume_error;
@@ -35,6 +37,7 @@ use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
 use crate::environment;
 use crate::extract::GridSurface;
+use crate::implicit::Implicit;
 use crate::kind::{At, Kind};
 use crate::lattice::Lattice;
 use crate::region::Region;
@@ -126,6 +129,14 @@ pub struct Tiled {
     pub alone: bool,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
+    /// How it ends at the part's surface.
+    pub ends: Ends,
+    /// The radius of the net's rods, or of rounded ends, mm.
+    pub radius: Option<f64>,
+    /// The solid fraction of the finished part, where the level was solved for it.
+    pub finished: Option<f64>,
+    /// The lattice as it ends.
+    field: Arc<dyn Implicit>,
     /// Which zones join, where zones have cells of their own and it can be predicted.
     pub joins: Option<Joins>,
 }
@@ -349,6 +360,11 @@ impl Built {
     pub fn whole_beams(&self, name: &str) -> bool {
         let found = self.beams.iter().find(|b| b.0 == name);
         found.is_some_and(|(_, made)| build_beams::lone(self) && build_beams::held(made, self))
+    }
+
+    /// Whether files of its mesh are to have no caps on the region's boundary.
+    pub fn is_open(&self) -> bool {
+        self.tilings.iter().any(|t| t.ends == Ends::Open)
     }
 
     /// The transitions between the lattices of a blend; empty without one.

@@ -3,6 +3,7 @@
 mod affine;
 mod affine_kind;
 mod cohomology;
+pub(crate) mod curved_tets;
 mod distortion;
 mod edge_squares;
 mod fixed_faces;
@@ -32,6 +33,7 @@ mod solution;
 mod spline;
 mod stress_kind;
 mod stretch;
+pub(crate) mod surface_feet;
 mod surface_frames;
 mod sweep;
 mod sweep_kind;
@@ -53,7 +55,7 @@ pub use stretch::Stretch;
 pub use surface_frames::Aligned;
 pub use sweep::{Path, Sweep};
 pub use tet_map::Tets;
-pub use tets_kind::{Joined, MadeTetsKind, MesherKind, Method, TetFileKind, TetsKind};
+pub use tets_kind::{Ends, Joined, MadeTetsKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind};
 
 use std::sync::Arc;
 

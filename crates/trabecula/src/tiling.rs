@@ -11,6 +11,8 @@ mod blended_share;
 mod crease;
 mod mixture;
 mod node_levels;
+mod ports;
+mod rounded;
 mod surface;
 mod walls;
 
@@ -21,10 +23,13 @@ use crate::cell::{Cut, Part};
 use crate::field::Field;
 use crate::implicit::Implicit;
 use crate::map::Tets;
-use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
+use crate::map::curved_tets::within;
+use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
 pub use node_levels::Amount;
+pub use ports::Ports;
+pub use rounded::Rounded;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
 pub use walls::Spread;
 
@@ -78,6 +83,9 @@ struct Known {
 
 /// Largest number of tetrahedra that are evaluated for a bound.
 const MOST: usize = 256;
+/// How far beyond a tetrahedron its function is followed, in barycentric coordinates, towards a surface that its mesh does not
+/// reach: farther out the lattice goes on straight.
+const BEYOND: f64 = 0.1;
 
 impl Tiling {
     /// A single cell over a mesh.
@@ -110,9 +118,9 @@ impl Tiling {
             let turn = |c: &Share| {
                 let w = c.weights.as_ref()?;
                 let most = c.cell.series().amplitude() / c.scale;
-                Some(most * norm(linear_slope(&map, w, t)))
+                Some(most * map.steeper(t) * norm(linear_slope(map.slopes(t), w, map.tet(t))))
             };
-            own * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
+            own * more * spectral_norm(&j) * map.steeper(t) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
         Tiling { map, cells, part, level, lipschitz: Arc::new(lipschitz), cut: Cut::new(part), blended: None }
@@ -134,44 +142,36 @@ impl Tiling {
     /// f and t, and their gradients, at points in tetrahedra.
     fn known_in(&self, at: &[(usize, Bary)]) -> Vec<Known> {
         let mut out = vec![Known::default(); at.len()];
-        let barys: Vec<Bary> = at.iter().map(|a| a.1).collect();
+        let far = self.map.overlap().max(BEYOND);
+        let barys: Vec<Bary> = at.iter().map(|a| within(a.1, far)).collect();
+        let slopes: Vec<Mat3> = at.iter().map(|(t, l)| self.map.slopes_at(*t, *l)).collect();
         let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
         for c in &self.cells {
             c.cell.gradients(&barys, &mut v, &mut g);
             for (i, (t, l)) in at.iter().enumerate() {
-                let m = self.map.slopes(*t);
+                let m = &slopes[i];
                 let slope = (0..3).fold([0.0; 3], |s, k| add(s, scale(m[k], g[i][k])));
                 let k = &mut out[i];
                 let (f, slope) = (v[i] / c.scale, scale(slope, 1.0 / c.scale));
                 match &c.weights {
                     None => (k.f, k.slope) = (k.f + f, add(k.slope, slope)),
                     Some(w) => {
-                        let l = self.tamed(*l);
-                        let weight = self.linear(w, *t, l);
-                        let turn = scale(linear_slope(&self.map, w, *t), f);
+                        let weight = self.linear(w, *t, within(*l, self.map.overlap()));
+                        let turn = scale(linear_slope(m, w, self.map.tet(*t)), f);
                         k.f += weight * f;
                         k.slope = add(k.slope, add(scale(slope, weight), turn));
                     }
                 }
             }
         }
-        for (k, (t, l)) in out.iter_mut().zip(at) {
-            k.t = self.level_at(*t, self.tamed(*l));
+        for ((k, m), (t, l)) in out.iter_mut().zip(&slopes).zip(at) {
+            // Moved back to the overlap from outside, which bounds the linear extrapolation.
+            k.t = self.level_at(*t, within(*l, self.map.overlap()));
             if let Level::Nodes(of) = &self.level {
-                k.slope_t = linear_slope(&self.map, of, *t);
+                k.slope_t = linear_slope(m, of, self.map.tet(*t));
             }
         }
         out
-    }
-
-    /// Coordinates that are farther outside than the overlap, clamped and normalised: it bounds the linear extrapolation.
-    fn tamed(&self, l: Bary) -> Bary {
-        if l.iter().all(|v| *v >= -self.map.overlap() - 1e-9) {
-            return l;
-        }
-        let l = l.map(|v| v.max(0.0));
-        let sum: f64 = l.iter().sum();
-        l.map(|v| v / sum)
     }
 
     fn known(&self, points: &[Vec3]) -> Vec<Known> {
@@ -230,7 +230,7 @@ impl Tiling {
         };
         let b = l.map(rise);
         let w = b.iter().map(|v| v.0).product();
-        let m = self.map.slopes(t);
+        let m = self.map.slopes_at(t, l);
         let last = scale(add(add(m[0], m[1]), m[2]), -1.0);
         let slopes = [m[0], m[1], m[2], last];
         let one = |i: usize| {
@@ -303,10 +303,9 @@ impl Tiling {
     }
 }
 
-/// The gradient (per mm) of what is linear in a tetrahedron.
-fn linear_slope(map: &Tets, of: &[f64], t: usize) -> Vec3 {
-    let v = map.tet(t).map(|n| of[n as usize]);
-    let m = map.slopes(t);
+/// The gradient (per mm) of what is linear in the coordinates of a tetrahedron of these nodes, whose slopes are `m`.
+fn linear_slope(m: &Mat3, of: &[f64], nodes: [u32; 4]) -> Vec3 {
+    let v = nodes.map(|n| of[n as usize]);
     (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], v[i] - v[3])))
 }
 

@@ -4,12 +4,14 @@ use std::sync::{Arc, OnceLock};
 
 use super::build_cell::cell;
 use super::data::*;
+use super::finish_tiling::Finished;
 use super::{
     Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_level, build_skin, build_tets, build_tiling,
     sample, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
+use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};
 use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
@@ -71,9 +73,12 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let at = |path: String| Environment { path, region: &region, points: &points, filled: &filled, loader };
 
     let (mut lattices, mut tilings, mut graphs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut nets = Vec::new();
     if let Some(domain) = domain {
         let environment = at(format!("lattice.{}", domain.name));
-        tilings.push(tiled(domain, &environment, &mut warnings)?);
+        let (made, net) = tiled(domain, &environment, &mut warnings)?;
+        tilings.push(made);
+        nets.extend(net);
     }
     for (name, spec) in d.lattice.iter().filter(|(_, s)| !matches!(s.map, MapKind::Tets(_))) {
         let environment = at(format!("lattice.{name}"));
@@ -98,7 +103,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     };
     let mut solid = Solid::new(region.clone(), Some(field), wavelength);
     solid.transition = blend.as_ref().and_then(|b| b.width);
-    let solid = filled.into_iter().fold(solid, Solid::with);
+    let solid = filled.into_iter().chain(nets).fold(solid, Solid::with);
     Ok(Built { solid, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures: OnceLock::new() })
 }
 
@@ -143,15 +148,18 @@ fn sampled(region: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, De
     Ok(points)
 }
 
-/// The lattice over a tetrahedral mesh.
+/// The lattice over a tetrahedral mesh, and the net that ties its ports.
 fn tiled(
     domain: build_tiling::Domain,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
-) -> Result<Tiled, DesignError> {
-    let build_tiling::Made { tiling, alone, explicit, zones, joins } =
+) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
+    let build_tiling::Made { done, alone, explicit, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
-    Ok(Tiled { name: domain.name.to_string(), tiling, zones, mesh: domain.report, alone, explicit, joins })
+    let Finished { tiling, field, net, radius, fraction } = done;
+    let (name, ends) = (domain.name.to_string(), domain.ends());
+    let mesh = domain.report;
+    Ok((Tiled { name, tiling, zones, mesh, alone, explicit, joins, ends, radius, finished: fraction, field }, net))
 }
 
 /// A lattice, with warnings of likely mistakes.
@@ -182,7 +190,7 @@ fn only(
 ) -> Result<Arc<dyn Implicit>, DesignError> {
     match (lattices, tilings, graphs) {
         ([(_, one)], [], []) => Ok(one.clone()),
-        ([], [one], []) => Ok(one.tiling.clone()),
+        ([], [one], []) => Ok(one.field.clone()),
         ([], [], [(_, one)]) => Ok(one.field()),
         ([], [], []) => Err(DesignError::new("lattice", "no lattice given; give one")),
         _ => Err(DesignError::new("blend", "several lattices need a blend to say where each is")),
@@ -203,9 +211,9 @@ fn members(
     let tilings = tilings.iter().map(|t| build_blend::Member {
         table: "lattice",
         name: t.name.clone(),
-        of: match <[_; 2]>::try_from(t.tiling.parts()) {
+        of: match <[_; 2]>::try_from(t.field.parts()) {
             Ok(sides) => Constituent::Wall { sides, half: t.tiling.uniform(), wavelength: t.tiling.wavelength() },
-            Err(_) => Constituent::Field { field: t.tiling.clone(), wavelength: t.tiling.wavelength() },
+            Err(_) => Constituent::Field { field: t.field.clone(), wavelength: t.tiling.wavelength() },
         },
     });
     let graphs = graphs.iter().map(|(name, b)| build_blend::Member {

@@ -22,8 +22,6 @@ const LOST: f64 = 0.02;
 const DEEP: f64 = 0.17;
 /// The share that is warned of at any depth.
 const MUCH: f64 = 0.1;
-/// The share of the region's volume by which that of the tetrahedra may differ before it is warned of.
-const OFF: f64 = 0.01;
 
 /// A tetrahedral mesh of a region, and its report.
 #[derive(Clone, Debug)]
@@ -204,31 +202,12 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     });
     made.report.region_volume = Some(own);
     made.names = names;
-    made.warnings.extend(other_volume(&made.report, own, spec, &environment.path));
     Ok(made)
 }
 
-/// A warning where the tetrahedra have not the region's volume `own` (mm³): the lattice fills them, not the region.
-fn other_volume(report: &TetReport, own: f64, spec: &TetsKind, path: &str) -> Option<Warning> {
-    let volume = report.quality.volume;
-    let off = volume / own - 1.0;
-    let lost = report.fit.as_ref().map_or(0.0, |f| f.lost);
-    // Five digits.
-    let [tets, region] = [volume, own].map(|v| number(format!("{v:.4e}").parse().unwrap_or(v)));
-    let message = match spec {
-        TetsKind::Made(_) if off.abs() > OFF => format!(
-            "the tetrahedra fill {tets} mm³, {:+.1} % of the region's {region} mm³: lattice, skin and cuts end at their flat \
-             faces; use a smaller size",
-            100.0 * off
-        ),
-        TetsKind::File(file) if off.abs() > OFF || lost > OFF => format!(
-            "the lattice fills the tetrahedra of {}, {tets} mm³, and not the region, {region} mm³, which is not cut out of them, only \
-             compared; give the region that they are a mesh of, or size to have this one meshed",
-            file.path
-        ),
-        _ => return None,
-    };
-    Some(Warning { path: path.to_string(), message })
+/// A number to five digits.
+pub(super) fn five(v: f64) -> f64 {
+    format!("{v:.4e}").parse().unwrap_or(v)
 }
 
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
@@ -422,37 +401,29 @@ mod tests {
         assert!(made(graded).unwrap().report.quality.tets > 500);
     }
 
-    /// A ball of radius 1 has 4π/3 mm³; its chords leave out some per cent, and what the lattice fills is what is reported.
+    /// A ball of radius 1 has 4π/3 mm³. Flat tetrahedra leave out some per cent; bent onto it they fill it. A mesh of something else is cut.
     #[test]
-    fn the_volume_of_tetrahedra_is_told_from_that_of_the_region() {
+    fn lattices_fill_the_region_whatever_its_tetrahedra_have() {
         let ball = |map: &str| {
             let text = format!(
                 "schema = 1\n[region.sphere]\nradius = 1\n[lattice.core]\ncell.tet.name = \"primitive\"\npart = \"lower\"\n\
                  level.fraction = 0.5\n[lattice.core.map.tets]\n{map}\n"
             );
-            Design::from_toml(&text).unwrap().build(&Files).unwrap().report()
+            Design::from_toml(&text).unwrap().build(&Files).unwrap()
         };
         let own = 4.0 / 3.0 * core::f64::consts::PI;
-        let coarse = ball("size = 0.5");
-        let (region, tets) = (&coarse.region, coarse.lattices["core"].tets.as_ref().unwrap());
-        assert!(!region.volume_exact && (region.volume / tets.volume - 1.0).abs() < 1e-9, "{region:?}");
-        assert!((region.described_volume.unwrap() / own - 1.0).abs() < 1e-12);
-        let off = 100.0 * (region.volume / own - 1.0);
-        let warned =
-            |r: &crate::report::DesignReport, words: &str| r.warnings.iter().any(|w| w.message.contains(words));
-        assert!(
-            off < -1.0 && warned(&coarse, &format!("{off:+.1} % of the region's 4.1888 mm³")),
-            "{:?}",
-            coarse.warnings
-        );
+        let built = ball("size = 0.5");
+        let report = built.report();
+        let (region, tets) = (&report.region, report.lattices["core"].tets.as_ref().unwrap());
+        assert!(region.volume_exact && (region.volume / own - 1.0).abs() < 1e-12, "{region:?}");
+        assert!(tets.volume < 0.99 * own && built.tilings[0].explicit, "{}", tets.volume);
         let cube = ball("path = \"tets.vtk\"");
-        assert!(
-            warned(&cube, "fills the tetrahedra of tets.vtk, 1 mm³, and not the region, 4.1888 mm³"),
-            "{:?}",
-            cube.warnings
-        );
-        let fine = ball("size = 0.15");
-        assert!(!fine.region.volume_exact && !warned(&fine, "% of the region's"), "{:?}", fine.warnings);
+        let report = cube.report();
+        let warned = report.warnings.iter().any(|w| w.message.contains("tets.vtk is not a mesh of this region"));
+        assert!(warned && !cube.tilings[0].explicit, "{:?}", report.warnings);
+        // An eighth of the ball, by sampling.
+        assert!((report.region.volume / (own / 8.0) - 1.0).abs() < 0.01, "{:?}", report.region);
+        assert!(!report.region.volume_exact && (report.region.described_volume.unwrap() / own - 1.0).abs() < 1e-12);
         let of_box = made("size = 0.3").unwrap();
         assert!((of_box.report.region_volume.unwrap() - of_box.mesh.volume()).abs() < 1e-9);
         let file = TetFileKind { path: "hex.vtk".into(), unit: None, split: false, joined: Joined::default() };

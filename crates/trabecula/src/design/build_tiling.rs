@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use super::build_cell::orbit_terms;
 use super::build_level::{check_mid, within_wavelength};
-use super::build_tets::{self, TetReport};
+use super::build_tets::{self, TetReport, five};
 use super::built_report::Varied;
 use super::data::*;
+use super::finish_tiling::{Finish, Finished};
 use super::joins::{Joins, joins};
 use super::warn::gaps;
 use super::{CellZone, Design, Loader, Warning, ZoneNames, cell_zones, sample};
@@ -17,10 +18,10 @@ use crate::environment::Environment;
 use crate::grade::Grade;
 use crate::grade::Quantity;
 use crate::kind::DesignError;
-use crate::map::Tets;
-use crate::region::{MeshRegion, Region};
+use crate::map::{Ends, Tets};
+use crate::region::{Intersection, MeshRegion, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
-use geometry::fault::Fault;
+use geometry::fault::{Fault, number};
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
@@ -36,8 +37,28 @@ pub(super) struct Domain<'a> {
     names: ZoneNames,
     /// The report on the mesh.
     pub report: TetReport,
-    /// The mesh's own boundary.
+    /// What the lattice fills.
     pub region: Region,
+    /// Whether that is the mesh, bent onto the region's surface.
+    fit: MeshFit,
+}
+
+impl Domain<'_> {
+    /// How the lattice ends at the part's surface.
+    pub fn ends(&self) -> Ends {
+        self.joined.surface
+    }
+}
+
+/// How a mesh fits the region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MeshFit {
+    /// It is a mesh of the region: bent, it fills it.
+    Whole,
+    /// It is one but for edges and walls finer than its tetrahedra.
+    Nearly,
+    /// The region cuts it.
+    Cut,
 }
 
 /// The lattice over tetrahedra of a design, by name, and their mesh.
@@ -108,8 +129,8 @@ pub(super) fn domain<'a>(
     }
     let path = format!("{path}.map.tets");
     let joined = match spec_of_mesh {
-        TetsKind::Made(m) => m.joined,
-        TetsKind::File(f) => f.joined,
+        TetsKind::Made(m) => m.joined.clone(),
+        TetsKind::File(f) => f.joined.clone(),
     };
     let (made, filled) = match soup {
         Some(made) => (made, Some(region.clone())),
@@ -121,13 +142,50 @@ pub(super) fn domain<'a>(
         }
     };
     warnings.extend(made.warnings);
-    let map = Tets::new(&made.mesh, joined.overlap).map_err(|f| DesignError::fault(&path, f))?;
-    let region = match filled {
-        Some(region) => region,
-        None => enclosed(map.boundary(), &path)?,
+    let wrong = |f| DesignError::fault(&path, f);
+    let (map, region, fit) = match filled {
+        Some(region) => (Tets::new(&made.mesh, joined.overlap).map_err(wrong)?, region, MeshFit::Whole),
+        None => {
+            let bent = Tets::of_region(&made.mesh, joined.overlap, region).map_err(wrong)?;
+            match spec_of_mesh {
+                _ if bent.fits() => (bent, region.clone(), MeshFit::Whole),
+                TetsKind::Made(_) => (bent, region.clone(), MeshFit::Nearly),
+                TetsKind::File(file) => {
+                    let flat = Tets::new(&made.mesh, joined.overlap).map_err(wrong)?;
+                    warnings.push(Warning { path: path.clone(), message: cut(&made.report, &file.path) });
+                    let common = common(region, &flat, &made.report, &path)?;
+                    (flat, common, MeshFit::Cut)
+                }
+            }
+        }
     };
     let (names, report) = (made.names, made.report);
-    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), names, report, region }))
+    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), names, report, region, fit }))
+}
+
+/// What a region and a mesh of something else have in common: the region, if the mesh holds it.
+fn common(region: &Region, mesh: &Tets, report: &TetReport, path: &str) -> Result<Region, DesignError> {
+    if report.fit.as_ref().is_some_and(|f| f.lost == 0.0) {
+        return Ok(region.clone());
+    }
+    let both = Intersection::new(vec![region.clone(), enclosed(mesh.boundary(), path)?]);
+    let both: Region = Arc::new(both.map_err(|f| DesignError::fault(path, f))?);
+    if both.bounds().is_empty() || sample::inside(&both, sample::COUNT).0.is_empty() {
+        let message = "the tetrahedra of the file and the region have nothing in common; is it a mesh of this region, in the right \
+                       place and unit?";
+        return Err(DesignError::new(path, message));
+    }
+    Ok(both)
+}
+
+/// Says that a region cuts the tetrahedra of a file.
+fn cut(report: &TetReport, file: &str) -> String {
+    let [tets, region] =
+        [Some(report.quality.volume), report.region_volume].map(|v| number(five(v.unwrap_or(f64::NAN))));
+    format!(
+        "{file} is not a mesh of this region (its tetrahedra fill {tets} mm³, the region {region} mm³): the lattice fills what they have \
+         in common, and its cells are cut at the region's surface; give the region that they are a mesh of to have them end there"
+    )
 }
 
 /// A ready cell.
@@ -177,7 +235,8 @@ fn series_cell(spec: &TetSeriesSpec, path: &str) -> Result<TetCell, DesignError>
 
 /// A lattice over a mesh.
 pub(super) struct Made {
-    pub tiling: Arc<Tiling>,
+    /// The lattice with its ends.
+    pub done: Finished,
     /// Whether nothing else is in the part: no skin, no kept zone.
     pub alone: bool,
     /// Whether its surface is made without a grid.
@@ -207,11 +266,9 @@ pub(super) fn lattice(
     let part: Part = domain.spec.part.into();
     let spec = &domain.spec.level;
     let path = below("level");
-    for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
-        if set {
-            let message = "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
-            return Err(DesignError::new(format!("{path}.{option}"), message));
-        }
+    if spec.fit != Fit::Table {
+        let message = "the fraction of a tetrahedral cell is exact; leave this out";
+        return Err(DesignError::new(format!("{path}.fit"), message));
     }
     let mid = spec.mid;
     if mid != 0.0 {
@@ -259,15 +316,44 @@ pub(super) fn lattice(
         Amount::Thickness => tiling.walled(&values).meeting(None),
     };
     check(&tiling, &path)?;
-    warn(&tiling, &path, warnings);
-    Ok(made(tiling, domain, environment))
+    let made = made(tiling, &values, domain, environment, &path)?;
+    check(&made.done.tiling, &path)?;
+    warn(&made.done.tiling, &path, warnings);
+    Ok(made)
 }
 
-/// A lattice of one cell.
-fn made(tiling: Tiling, domain: &Domain, environment: &Environment) -> Made {
-    let alone = environment.filled.is_empty();
-    let explicit = alone && domain.joined.method == Method::Explicit;
-    Made { tiling: Arc::new(tiling), alone, explicit, zones: Vec::new(), joins: None }
+/// A lattice with its ends, at the level at which the finished part has the mean of the fractions asked for, if that is another than that
+/// of its cells or `of = "part"`; `path` is that of the amount.
+fn made(
+    tiling: Tiling,
+    values: &[f64],
+    domain: &Domain,
+    environment: &Environment,
+    path: &str,
+) -> Result<Made, DesignError> {
+    let spec = &domain.spec.level;
+    let fraction = matches!(spec.amount, AmountSpec::Fraction(_) | AmountSpec::Porosity(_));
+    let whole = spec.of == Of::Part;
+    if whole && !fraction {
+        let message = "of = \"part\" goes with a fraction or a porosity";
+        return Err(DesignError::new(format!("{}.level.of", environment.path), message));
+    }
+    let finish = Finish::new(&domain.joined, environment, path)?;
+    let map = &domain.map;
+    let bent = map.is_bent() && domain.fit != MeshFit::Cut;
+    let asked = (fraction && (whole || bent || finish.changes())).then(|| {
+        let at = |n: u32| values[(n as usize).min(values.len() - 1)];
+        let mean = |t: usize| map.tet(t).map(at).iter().sum::<f64>() / 4.0;
+        let sums = (0..map.len()).fold((0.0, 0.0), |(s, v), t| (s + map.volume(t) * mean(t), v + map.volume(t)));
+        sums.0 / sums.1
+    });
+    let alone = environment.filled.is_empty() && domain.fit != MeshFit::Cut && !finish.changes();
+    let explicit = alone && domain.joined.method == Method::Explicit && domain.fit == MeshFit::Whole;
+    let done = match asked {
+        Some(asked) if explicit && bent => finish.bent(tiling, asked)?,
+        _ => finish.made(tiling, asked, whole)?,
+    };
+    Ok(Made { done, alone, explicit, zones: Vec::new(), joins: None })
 }
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
@@ -309,8 +395,8 @@ fn zoned(
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level).meeting(Some(&values));
-    let made = made(tiling, domain, environment);
-    let joins = made.alone.then(|| joins(&made.tiling, &zoned, 0.5 * (lo + hi)));
+    let made = made(tiling, &values, domain, environment, &path)?;
+    let joins = made.alone.then(|| joins(&made.done.tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
     if let Some(joins) = &joins {
         joins.warn(&given, &at, warnings);

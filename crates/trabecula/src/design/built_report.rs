@@ -198,6 +198,8 @@ fn tiled(it: &Tiled) -> LatticeReport {
         pieces: None,
         joins: None,
         overlap: tiling.map.overlap(),
+        surface: it.ends.word(),
+        end_radius: it.radius,
         thickness: None,
         ports: None,
         face_fraction: None,
@@ -207,8 +209,8 @@ fn tiled(it: &Tiled) -> LatticeReport {
         part: word(part),
         wavelength: tiling.wavelength(),
         iso: None,
-        fraction: Varying::Number(solid / volume),
-        porosity: Varying::Number(1.0 - solid / volume),
+        fraction: Varying::Number(it.finished.unwrap_or(solid / volume)),
+        porosity: Varying::Number(1.0 - it.finished.unwrap_or(solid / volume)),
         thickness: None,
         pore: None,
         pore_sides: None,
@@ -238,7 +240,10 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let cell = &tiling.cells[0].cell;
     let levels = tiling.levels();
     let iso = Varied { min: levels.lo, max: levels.hi };
-    let share = iso.map(|t| tiling.fraction(t));
+    let share = match it.finished {
+        Some(of_part) if !tiling.varies() => Varied { min: of_part, max: of_part },
+        _ => iso.map(|t| tiling.fraction(t)),
+    };
     let spread = tiling.thickness();
     let tets = TilingReport {
         pieces: it.alone.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),

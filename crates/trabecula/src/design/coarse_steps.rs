@@ -6,7 +6,7 @@ use geometry::fault::{counted, number};
 
 /// Share of the solid's volume by which a surface may be off.
 const OFF: f64 = 0.01;
-/// Share of the mesh that may be solid or not: with an overlap the fraction is known by samples.
+/// Share of the mesh that may be solid or not: with an overlap, and where tetrahedra are bent, the fraction is known by samples.
 const SAMPLED: f64 = 0.002;
 /// Fewest steps along the edge of a tetrahedron.
 pub(super) const LEAST: f64 = 4.0;
@@ -20,12 +20,13 @@ impl Built {
             return None;
         }
         let tiling = &only.tiling;
-        let (all, solid) = tiling.volumes();
-        let (found, share) = (volume / all, solid / all);
+        let (flat, solid) = tiling.volumes();
+        let all = only.mesh.region_volume.filter(|_| tiling.map.is_bent()).unwrap_or(flat);
+        let (found, share) = (volume / all, only.finished.unwrap_or(solid / flat));
         let off = found / share - 1.0;
         let predicted = if pieces > 1 { connectivity(tiling).map(|c| c.components) } else { None };
         let broken = predicted.filter(|p| pieces > *p);
-        let most = if tiling.map.overlap() > 0.0 { OFF.max(SAMPLED / share) } else { OFF };
+        let most = if tiling.map.overlap() > 0.0 || only.finished.is_some() { OFF.max(SAMPLED / share) } else { OFF };
         if off.abs() <= most && broken.is_none() {
             return None;
         }

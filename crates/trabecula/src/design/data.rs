@@ -7,7 +7,9 @@ use crate::cell::{catalogue, named};
 pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, OneOrThree, Table};
-pub use crate::map::{AffineKind, Joined, MadeTetsKind, MapKind, MesherKind, Method, TetFileKind, TetsKind};
+pub use crate::map::{
+    AffineKind, Ends, Joined, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
+};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::symmetry::Group;
 

@@ -1,8 +1,11 @@
 //! Point location in a tetrahedral mesh: a position is represented by a tetrahedron and barycentric coordinates, which
-//! are affine in each tetrahedron and continuous across faces (equations 12 and 13 of Chen et al.).
+//! are affine in each tetrahedron and continuous across faces (equations 12 and 13 of Chen et al.). Those at the boundary may be bent
+//! onto the surface of a region (`curved_tets`).
 
 use std::collections::{HashMap, VecDeque};
 
+use super::curved_tets::{Curves, settled};
+use crate::region::Region;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
 use geometry::tetmesh::TetMesh;
@@ -32,6 +35,8 @@ pub struct Tets {
     boxes: Boxes,
     /// Overlap: the barycentric distance by which a tetrahedron extends beyond its faces.
     overlap: f64,
+    /// How tetrahedra at the boundary are bent, if they are.
+    curves: Option<Curves>,
 }
 
 /// A uniform grid of boxes, with the tetrahedra that each may intersect.
@@ -122,9 +127,45 @@ impl Tets {
             },
             overlap,
             tets,
+            curves: None,
         };
         out.index();
         Ok(out)
+    }
+
+    /// As `new`, the tetrahedra at the boundary bent onto the surface of a region of which it is a mesh.
+    ///
+    /// # Errors
+    /// As `new`.
+    pub fn of_region(mesh: &TetMesh, overlap: f64, region: &Region) -> Result<Tets, Fault> {
+        let flat = Tets::new(mesh, overlap)?;
+        let nodes = settled(&flat, &**region);
+        let mut out = if nodes == flat.nodes { flat } else { Tets::new(&TetMesh { nodes, ..mesh.clone() }, overlap)? };
+        let curves = Curves::new(&out, region);
+        out.curves = Some(curves);
+        out.index();
+        Ok(out)
+    }
+
+    /// How tetrahedra at the boundary are bent onto a region, if they are.
+    pub(crate) fn curves(&self) -> Option<&Curves> {
+        self.curves.as_ref()
+    }
+
+    /// Whether any tetrahedron is bent.
+    pub fn is_bent(&self) -> bool {
+        self.curves.as_ref().is_some_and(|c| (0..self.len()).any(|t| c.sway(t) > 0.0))
+    }
+
+    /// The distance of the bent boundary from the surface of the region, in edges of its triangles, at most; `None` if the mesh
+    /// is not bent onto one.
+    pub fn off_region(&self) -> Option<f64> {
+        self.curves.as_ref().map(|c| c.off)
+    }
+
+    /// Whether its bent boundary is the surface of a region, but for a tenth of its edges.
+    pub fn fits(&self) -> bool {
+        self.curves.as_ref().is_some_and(Curves::fits)
     }
 
     /// Sorts tetrahedra into boxes; empty boxes refer to a nearest non-empty one.
@@ -199,11 +240,11 @@ impl Tets {
         self.boxes.list = pairs.into_iter().map(|p| p.1).collect();
     }
 
-    /// The vertices of a tetrahedron enlarged by the overlap.
+    /// The vertices of a tetrahedron enlarged by the overlap, and so that it holds its bends.
     fn grown(&self, t: usize) -> [Vec3; 4] {
         let corners = self.corners(t);
         let middle = scale(corners.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
-        let by = 1.0 + 4.0 * self.overlap;
+        let by = 1.0 + 4.0 * (self.overlap + self.reach(t));
         corners.map(|p| add(middle, scale(sub(p, middle), by)))
     }
 
@@ -262,12 +303,34 @@ impl Tets {
         self.tets[t].map(|v| self.nodes[v as usize])
     }
 
-    /// The gradients (per mm) of the first three barycentric coordinates; the fourth's is minus their sum.
+    /// The gradients (per mm) of the first three barycentric coordinates of the flat tetrahedron; the fourth's is minus their sum.
     pub fn slopes(&self, t: usize) -> &Mat3 {
         &self.slopes[t]
     }
 
-    /// Volume (mm³) of a tetrahedron.
+    /// These gradients of the tetrahedron as it is bent, where its coordinates are `l`.
+    pub fn slopes_at(&self, t: usize, l: [f64; 4]) -> Mat3 {
+        let bent = self.curves.as_ref().and_then(|c| c.slopes(t, l, &columns(&self.corners(t))));
+        bent.unwrap_or(self.slopes[t])
+    }
+
+    /// The factor by which functions of the coordinates may be steeper than in the flat tetrahedron.
+    pub fn steeper(&self, t: usize) -> f64 {
+        self.curves.as_ref().map_or(1.0, |c| c.steeper(t))
+    }
+
+    /// How far a tetrahedron reaches beyond its flat faces, in barycentric coordinates.
+    fn reach(&self, t: usize) -> f64 {
+        self.curves.as_ref().map_or(0.0, |c| c.reach(t))
+    }
+
+    /// The point (mm) whose barycentric coordinates in a tetrahedron as it is bent are `l`.
+    pub fn place(&self, t: usize, l: [f64; 4]) -> Vec3 {
+        let flat = self.corners(t).iter().zip(l).fold([0.0; 3], |s, (p, v)| add(s, scale(*p, v)));
+        self.curves.as_ref().map_or(flat, |c| add(flat, c.moved(t, l)))
+    }
+
+    /// Volume (mm³) of a flat tetrahedron.
     pub fn volume(&self, t: usize) -> f64 {
         volume(self.corners(t)).abs()
     }
@@ -292,34 +355,44 @@ impl Tets {
         edges.sum::<f64>() / (6 * self.len()) as f64
     }
 
-    /// The boundary, counter-clockwise seen from outside.
+    /// The flat boundary, counter-clockwise seen from outside.
     pub fn boundary(&self) -> geometry::mesh::Mesh {
         let mut out = geometry::mesh::Mesh::default();
         let mut names: HashMap<u32, u32> = HashMap::new();
+        for f in self.boundary_nodes() {
+            let named = f.map(|v| {
+                *names.entry(v).or_insert_with(|| {
+                    out.vertices.push(self.nodes[v as usize]);
+                    out.vertices.len() as u32 - 1
+                })
+            });
+            out.triangles.push(named);
+        }
+        out
+    }
+
+    /// The nodes of the faces on the boundary, counter-clockwise seen from outside.
+    pub(crate) fn boundary_nodes(&self) -> Vec<[u32; 3]> {
+        let mut out = Vec::new();
         for t in 0..self.len() {
-            for (face, f) in FACES.iter().enumerate() {
-                if self.across[t][face] != NONE {
-                    continue;
-                }
-                let mut f = f.map(|i| self.tets[t][i]);
-                if self.flipped[t] {
-                    f.swap(1, 2);
-                }
-                let named = f.map(|v| {
-                    *names.entry(v).or_insert_with(|| {
-                        out.vertices.push(self.nodes[v as usize]);
-                        out.vertices.len() as u32 - 1
-                    })
-                });
-                out.triangles.push(named);
+            for (_, f) in FACES.iter().enumerate().filter(|f| self.across[t][f.0] == NONE) {
+                let f = f.map(|i| self.tets[t][i]);
+                out.push(if self.flipped[t] { [f[0], f[2], f[1]] } else { f });
             }
         }
         out
     }
 
-    /// Barycentric coordinates of a point with respect to a tetrahedron.
+    /// Barycentric coordinates of a point with respect to a tetrahedron as it is bent.
     #[inline]
     pub fn bary(&self, t: usize, p: Vec3) -> [f64; 4] {
+        let flat = self.flat_bary(t, p);
+        self.curves.as_ref().map_or(flat, |c| c.bary(t, flat))
+    }
+
+    /// Barycentric coordinates of a point with respect to a flat tetrahedron.
+    #[inline]
+    fn flat_bary(&self, t: usize, p: Vec3) -> [f64; 4] {
         let d = sub(p, self.nodes[self.tets[t][3] as usize]);
         let m = &self.slopes[t];
         let l = [dot(m[0], d), dot(m[1], d), dot(m[2], d)];
@@ -330,9 +403,16 @@ impl Tets {
     /// with some coordinates negative.
     pub fn locate(&self, p: Vec3) -> (usize, [f64; 4]) {
         let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
+        let lowest = |l: &[f64; 4]| l.iter().copied().fold(f64::INFINITY, f64::min);
         for &t in self.boxes.of(self.boxes.index(self.boxes.box_at(p))) {
-            let l = self.bary(t as usize, p);
-            let least = l.iter().copied().fold(f64::INFINITY, f64::min);
+            let mut l = self.flat_bary(t as usize, p);
+            if let Some(curves) = &self.curves {
+                if lowest(&l) + curves.sway(t as usize) < best.0 {
+                    continue;
+                }
+                l = curves.bary(t as usize, l);
+            }
+            let least = lowest(&l);
             if least > best.0 {
                 best = (least, t as usize, l);
                 if least >= 0.0 {
@@ -385,7 +465,7 @@ impl Tets {
 }
 
 /// The signed volume of a tetrahedron, mm³.
-fn volume([a, b, c, d]: [Vec3; 4]) -> f64 {
+pub(super) fn volume([a, b, c, d]: [Vec3; 4]) -> f64 {
     dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0
 }
 

@@ -70,7 +70,7 @@ pub struct TetFileKind {
 }
 
 /// How the cells of tetrahedra are joined.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Kind)]
+#[derive(Clone, Debug, Default, PartialEq, Kind)]
 pub struct Joined {
     /// Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach beyond
     /// themselves and are mixed with their neighbours, from 0 (creases) to 0.2.
@@ -79,13 +79,54 @@ pub struct Joined {
     /// How the surface is made.
     #[kind(default)]
     pub method: Method,
+    /// How the lattice ends at the part's surface.
+    #[kind(default)]
+    pub surface: Ends,
+    /// The net of surface = "net".
+    pub net: Option<NetSpec>,
+}
+
+/// How a lattice over tetrahedra ends at the part's surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "end at the surface")]
+pub enum Ends {
+    /// Closed where the surface cuts it, by caps that lie on the surface.
+    #[default]
+    #[kind(hints("flat", "closed"))]
+    Capped,
+    /// As capped, but files of meshes have no caps: the lattice's surface alone, to be joined to others.
+    Open,
+    /// Tied by a net of rods on the surface, from port to port.
+    #[kind(hints("tied", "web", "mesh"))]
+    Net,
+    /// Rounded: struts end in half balls, walls in half circles.
+    #[kind(hints("round", "balls"))]
+    Rounded,
+}
+
+impl Ends {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        ["capped", "open", "net", "rounded"][self as usize]
+    }
+}
+
+/// A net on the part's surface that ties the ports of a lattice.
+#[derive(Clone, Debug, Default, PartialEq, Kind)]
+pub struct NetSpec {
+    /// Radius of its rods, whose middles are on the surface, so that half of each is in the part; of the area of the lattice's own
+    /// ports unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    pub radius: Option<f64>,
+    /// Where it is: on triangles of the boundary whose middles are in this region; everywhere unless given.
+    pub on: Option<RegionKind>,
 }
 
 /// How the surface of a tetrahedral lattice is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(noun = "method")]
 pub enum Method {
-    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin or keep zones.
+    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones, net or rounded ends.
     #[default]
     Explicit,
     /// On a grid over the part, like other lattices.

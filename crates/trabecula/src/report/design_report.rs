@@ -79,11 +79,11 @@ pub struct LatticeReport {
 pub struct RegionReport {
     /// Lower and upper corner of its bounds, mm.
     pub bounds: [[f64; 3]; 2],
-    /// Volume of what the lattice fills, mm³: of the tetrahedra, where it is a lattice over them.
+    /// Volume of what the lattice fills, mm³: the region's, or of what it has in common with tetrahedra that are no mesh of it.
     pub volume: f64,
-    /// Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra are not the region.
+    /// Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra have only a part of it.
     pub volume_exact: bool,
-    /// Volume of the region as described, mm³, where a lattice fills tetrahedra in its place; else None.
+    /// Volume of the region as described, mm³, of a lattice over tetrahedra; else None.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub described_volume: Option<f64>,
 }

@@ -182,6 +182,10 @@ pub struct TilingReport {
     pub joins: Option<Vec<ZoneJoin>>,
     /// Overlap of tetrahedra, 0 to 0.2 of their size.
     pub overlap: f64,
+    /// How the lattice ends at the part's surface: capped, open, net or rounded.
+    pub surface: &'static str,
+    /// Radius of the net's rods, or of rounded ends, mm; None with flat ends.
+    pub end_radius: Option<f64>,
     /// Thickness of the walls, mm; None for networks and for zones.
     pub thickness: Option<WallSpread>,
     /// Number of ports on each face of a tetrahedron; None for zones.

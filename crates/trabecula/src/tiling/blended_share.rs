@@ -80,7 +80,6 @@ impl Tiling {
 
     /// Points evenly spread over a tetrahedron, mm.
     pub(super) fn points_in(&self, t: usize, count: usize) -> Vec<[f64; 3]> {
-        let c = self.map.corners(t);
         let mut state = t as u64;
         let shift = [0; 3].map(|_| random(&mut state));
         let point = |k: usize| {
@@ -89,7 +88,7 @@ impl Tiling {
             let mut cuts: [f64; 3] = core::array::from_fn(|a| (shift[a] + even[a]).rem_euclid(1.0));
             cuts.sort_unstable_by(f64::total_cmp);
             let l = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
-            [0, 1, 2].map(|a| (0..4).map(|i| l[i] * c[i][a]).sum())
+            self.map.place(t, l)
         };
         (0..count).map(point).collect()
     }

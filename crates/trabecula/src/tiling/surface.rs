@@ -6,12 +6,14 @@
 //!
 //! *Closed, oriented, manifold, embedded.* A tetrahedron takes its corners in the order of the mesh's nodes. On a common face
 //! two tetrahedra then have the same small triangles, values and derivatives in all bits, hence the same vertices of the
-//! surface; nothing is welded by comparing coordinates. The mesh's boundary is a manifold (`component_links::manifold` refuses
+//! surface; nothing is welded by comparing coordinates. Tetrahedra at the boundary may be bent onto a region (`bent_nodes`). The mesh's
+//! boundary is a manifold (`component_links::manifold` refuses
 //! others), and caps are polygons in its small triangles. Affine maps keep embedded surfaces embedded.
 //!
 //! *After rounding to single precision.* Vertices stay `MARGIN` of a step away from nodes, so parts of the surface that do not
 //! meet are separated by that share of a small tetrahedron's height. Designs where rounding is not well below are refused.
 
+mod bent_nodes;
 mod component_links;
 mod connectivity;
 mod cubic_root;
@@ -32,6 +34,7 @@ use crate::map::tet_map::NONE;
 use crate::surface_maker::{
     self, Estimate, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty,
 };
+use bent_nodes::{BentNodes, Places};
 use component_links::ComponentLinks;
 pub use connectivity::{Connectivity, ZonePair, connectivity, steps_enough};
 use geometry::fault::{Fault, number};
@@ -60,6 +63,8 @@ struct Work<'a> {
     cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)>,
     /// The surface for each set of capped faces, where all tetrahedra have the same.
     same: [OnceLock<TetSurface>; 16],
+    /// Where the mesh is bent onto a region.
+    bent: OnceLock<Option<BentNodes>>,
     middle: Vec3,
 }
 
@@ -152,7 +157,15 @@ impl<'a> Work<'a> {
             }
             _ => tiling.level.clone(),
         };
-        Ok(Work { tiling, level, cells, template, same: Default::default(), middle: tiling.map.bounds().center() })
+        Ok(Work {
+            tiling,
+            level,
+            cells,
+            template,
+            same: Default::default(),
+            bent: OnceLock::new(),
+            middle: tiling.map.bounds().center(),
+        })
     }
 
     /// Whether all tetrahedra with the same capped faces have the same surface.
@@ -164,6 +177,13 @@ impl<'a> Work<'a> {
     fn mask(&self, t: usize) -> u8 {
         let across = self.tiling.map.across(t);
         (0..4).fold(0, |m, i| m | u8::from(across[i] == NONE) << i)
+    }
+
+    /// The nodes of the small tetrahedra, where they are bent.
+    fn places(&self, t: usize) -> Option<Places> {
+        let nodes = &self.cells[0].0;
+        let bent = self.bent.get_or_init(|| BentNodes::new(&self.tiling.map, nodes, &self.template));
+        bent.as_ref()?.places(&self.tiling.map, t, nodes)
     }
 
     fn tet_surface(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
@@ -231,7 +251,8 @@ impl<'a> Work<'a> {
             let sum = (0..4).fold([0.0; 3], |s, i| add(s, scale(corners[i], f64::from(k[i]))));
             sum.map(|v| v / n)
         };
-        let places: Vec<Vec3> = nodes.whole.iter().map(place).collect();
+        let bent = self.places(t);
+        let places: Vec<Vec3> = bent.map_or_else(|| nodes.whole.iter().map(place).collect(), |p| p.nodes);
         let known = self.tiling.known(&places);
         let values: Vec<f64> = known.iter().map(|k| k.f).collect();
         let levels: Vec<f64> = known.iter().map(|k| k.t).collect();
@@ -262,6 +283,14 @@ impl<'a> Work<'a> {
                 let ab = add(scale(corners[0], l[0]), scale(corners[1], l[1]));
                 add(add(ab, scale(corners[2], l[2])), scale(corners[3], l[3]))
             }));
+            if let Some(places) = self.places(t) {
+                // What is not moved has the same bits as in tetrahedra that are not.
+                for (v, ([a, b], at)) in surface.between.iter().enumerate().filter(|v| places.moved(surface.zero[v.0]))
+                {
+                    let [p, q] = [a, b].map(|n| places.nodes[*n as usize]);
+                    vertices[v] = add(p, scale(sub(q, p), *at));
+                }
+            }
             let first = out.totals.len();
             out.totals.resize(first + surface.solid_of.len(), Totals::ZERO);
             for (v, p) in vertices.iter().enumerate() {
@@ -419,6 +448,52 @@ impl SurfaceMaker for TilingSurface<'_> {
             memory: triangles * (12.0 + 12.0 + 1.0),
             stl: stl::HEADER as f64 + triangles * stl::RECORD as f64,
         })
+    }
+}
+
+impl Tiling {
+    /// The tiling's field in small tetrahedra of some tetrahedra: the value in the middle of each, its share of the volume as they are bent
+    /// onto the region, and of that of the flat ones. Ascending by value.
+    ///
+    /// # Errors
+    /// A mesh whose surface cannot be cut.
+    pub fn bent_shares(&self) -> Result<Vec<[f64; 3]>, Fault> {
+        const STEPS: usize = 8;
+        const TETS: usize = 600;
+        let work = Work::in_steps(self, STEPS)?;
+        let count = self.map.len().min(TETS);
+        let nodes = &work.cells[0].0;
+        let tet = |i: usize| {
+            let t = i * self.map.len() / count;
+            let middle = |small: &small_simplices::Small| {
+                let sum = |c: usize| small.nodes.iter().map(|n| f64::from(nodes.whole[*n as usize][c])).sum::<f64>();
+                core::array::from_fn(|c| sum(c) / (4 * STEPS) as f64)
+            };
+            let at: Vec<(usize, [f64; 4])> = work.template.tets.iter().map(|s| (t, middle(s))).collect();
+            let values: Vec<f64> = if self.map.overlap() > 0.0 {
+                let points: Vec<Vec3> = at.iter().map(|(t, l)| self.map.place(*t, *l)).collect();
+                self.known(&points).iter().map(|k| self.cut.value(k.f, k.t)).collect()
+            } else {
+                self.known_in(&at).iter().map(|k| self.cut.value(k.f, k.t)).collect()
+            };
+            let flat = self.map.volume(t) / values.len() as f64;
+            let places = work.places(t);
+            let volume = |small: &small_simplices::Small| match &places {
+                None => flat,
+                Some(p) => {
+                    let [a, b, c, d] = small.nodes.map(|n| p.nodes[n as usize]);
+                    dot(cross(sub(b, a), sub(c, a)), sub(d, a)).abs() / 6.0
+                }
+            };
+            let smalls = values.into_iter().zip(&work.template.tets);
+            smalls.map(|(v, small)| [v, volume(small), flat]).collect::<Vec<[f64; 3]>>()
+        };
+        let found: Vec<Vec<[f64; 3]>> = (0..count).into_par_iter().map(tet).collect();
+        let mut all = found.concat();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let [bent, flat] = [1, 2].map(|k| all.iter().map(|s| s[k]).sum::<f64>());
+        all.iter_mut().for_each(|s| (s[1], s[2]) = (s[1] / bent, s[2] / flat));
+        Ok(all)
     }
 }
 

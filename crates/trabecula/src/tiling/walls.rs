@@ -178,9 +178,7 @@ impl Tiling {
 
     /// The walls (mm) of a tetrahedron along the normals of these pieces of the mid-surface, each with the piece's area.
     fn along_normals(&self, t: usize, pieces: &[&Piece]) -> Vec<[f64; 2]> {
-        let corners = self.map.corners(t);
-        let place = |p: &&Piece| (0..4).fold([0.0; 3], |s, i| add(s, scale(corners[i], p.at[i])));
-        let mut places: Vec<Vec3> = pieces.iter().map(place).collect();
+        let mut places: Vec<Vec3> = pieces.iter().map(|p| self.map.place(t, p.at)).collect();
         // On to the mid-surface, where overlap has moved it too.
         let mut known = self.known(&places);
         for _ in 0..3 {

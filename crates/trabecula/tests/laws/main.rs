@@ -32,6 +32,7 @@ mod tets;
 mod thickness;
 mod tiling;
 mod tiling_amounts;
+mod tiling_curved;
 mod tiling_fields;
 mod walls;
 mod wavelength;

@@ -44,6 +44,8 @@ pub(super) struct TetSurface {
     pub vertices: Vec<Bary>,
     /// The coordinates that are zero at each, a bit for each.
     pub zero: Vec<u8>,
+    /// The nodes that each lies between, and the share of the way from the first to the second.
+    pub between: Vec<([u32; 2], f64)>,
     /// How many of them are corners on edges.
     pub crossings: usize,
     /// Triangles for a positive tetrahedron, component by component, and whether each is a cap.
@@ -161,6 +163,7 @@ impl TetSurface {
                 scratch.node[n] = out.vertices.len() as u32;
                 out.vertices.push(nodes.grid.bary(nodes.whole[n]));
                 out.zero.push(template.zero[n]);
+                out.between.push(([n as u32; 2], 0.0));
             } else {
                 scratch.node[n] = NONE;
             }
@@ -216,6 +219,7 @@ impl TetSurface {
                     (x + at * (y - x)) / n
                 });
                 self.zero.push(zero);
+                self.between.push(([*a, *b], at));
                 *name = v as u32;
             }
         }

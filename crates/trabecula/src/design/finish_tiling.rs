@@ -1,0 +1,216 @@
+//! How a lattice over tetrahedra ends at the surface, and the level at which the finished part has the fraction asked for.
+
+use std::sync::Arc;
+
+use super::sample;
+use super::surface_net::Net;
+use crate::cell::Part;
+use crate::csg_tree::CsgSolid;
+use crate::environment::{self, Environment};
+use crate::field::Field;
+use crate::implicit::Implicit;
+use crate::kind::DesignError;
+use crate::map::{Ends, Joined};
+use crate::region::{Notes, Region};
+use crate::tiling::{Rounded, Tiling};
+use geometry::fault::number;
+use geometry::math::Vec3;
+use geometry::progress::checkpoint;
+
+/// Points at which the finished part is sampled; spread evenly, their share is within about 0.0005.
+const POINTS: usize = 150_000;
+/// The most rounds of the level, and the share that is close enough.
+const ROUNDS: usize = 8;
+const NEAR: f64 = 2e-4;
+
+/// A lattice with its ends.
+pub(super) struct Finished {
+    pub tiling: Arc<Tiling>,
+    /// The lattice as it ends.
+    pub field: Arc<dyn Implicit>,
+    /// The net that ties its ports.
+    pub net: Option<CsgSolid>,
+    /// The radius of the net's rods, or of rounded ends, mm.
+    pub radius: Option<f64>,
+    /// The solid fraction of the finished part, where the level was solved for it.
+    pub fraction: Option<f64>,
+}
+
+/// What gives a lattice its ends.
+pub(super) struct Finish<'a> {
+    ends: Ends,
+    region: Region,
+    /// The radius as given.
+    radius: Option<f64>,
+    on: Option<Region>,
+    environment: &'a Environment<'a>,
+    /// Of the level's key, and of the map.
+    path: String,
+    map: String,
+}
+
+impl<'a> Finish<'a> {
+    /// Reads how a lattice is to end; `environment` is that of the lattice, `path` that of the amount.
+    pub fn new(joined: &Joined, environment: &'a Environment<'a>, path: &str) -> Result<Finish<'a>, DesignError> {
+        let map = format!("{}.map.tets", environment.path);
+        let net = match (&joined.net, joined.surface) {
+            (Some(_), ends) if ends != Ends::Net => {
+                let message = format!("there is a net with surface = \"net\" alone, found \"{}\"", ends.word());
+                return Err(DesignError::new(format!("{map}.net"), message));
+            }
+            (net, _) => net.clone().unwrap_or_default(),
+        };
+        let mut notes = Notes::default();
+        let on = net.on.map(|on| environment::region(&on, &format!("{map}.net.on"), environment.loader, &mut notes));
+        Ok(Finish {
+            ends: joined.surface,
+            region: environment.region.clone(),
+            radius: net.radius,
+            on: on.transpose()?,
+            environment,
+            path: path.to_string(),
+            map,
+        })
+    }
+
+    /// Whether the finished part has another fraction than the cells.
+    pub fn changes(&self) -> bool {
+        matches!(self.ends, Ends::Net | Ends::Rounded)
+    }
+
+    /// The lattice with its ends; with `asked`, at the level at which the finished part has that fraction: with skin and what is
+    /// kept solid if `whole`.
+    pub fn made(&self, tiling: Tiling, asked: Option<f64>, whole: bool) -> Result<Finished, DesignError> {
+        let net = match self.ends {
+            Ends::Net => Some(self.net(&tiling)?),
+            _ => None,
+        };
+        let Some(asked) = asked else {
+            return self.finished(Arc::new(tiling), net.as_ref());
+        };
+        let (points, _) = sample::inside(&self.region, POINTS);
+        let lattice = sample::values(&points, |p, out| tiling.values(p, out));
+        let kept: Vec<bool> = if whole { self.kept(&points) } else { vec![false; points.len()] };
+        let mut sorted = lattice.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let count = points.len() as f64;
+        let mut share = asked;
+        let mut best: Option<(f64, Finished)> = None;
+        for _ in 0..ROUNDS {
+            checkpoint();
+            let by = sorted[((share * count) as usize).min(points.len() - 1)];
+            let made = self.finished(Arc::new(tiling.clone().moved(by)), net.as_ref())?;
+            let solid = self.solid(&made, &points);
+            let found = solid.iter().zip(&kept).filter(|(s, k)| **s || **k).count() as f64 / count;
+            if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
+                best = Some((found, Finished { fraction: Some(found), ..made }));
+            }
+            if (found - asked).abs() < NEAR {
+                break;
+            }
+            share += asked - found;
+            if share <= 0.0 {
+                let message = format!(
+                    "the net, the skin and what is kept solid make up {found:.4} of the part already; ask for more than that, or give \
+                     net.radius a smaller one: {} is too little",
+                    number(asked)
+                );
+                return Err(DesignError::new(&self.path, message));
+            }
+            share = share.min(1.0);
+        }
+        match best {
+            Some((_, made)) => Ok(made),
+            None => self.finished(Arc::new(tiling), net.as_ref()),
+        }
+    }
+
+    /// The lattice with flat ends at the level at which its surface, made without a grid, encloses the fraction asked for: that of flat
+    /// tetrahedra, and what bending them changes.
+    pub fn bent(&self, tiling: Tiling, asked: f64) -> Result<Finished, DesignError> {
+        let samples = tiling.bent_shares().map_err(|f| DesignError::new(&self.map, f.message))?;
+        let below = |by: f64| {
+            let some = samples.iter().take_while(|s| s[0] <= by);
+            some.fold([0.0; 2], |[bent, flat], s| [bent + s[1], flat + s[2]])
+        };
+        // What the share gains where the field rises, over a twentieth of the samples to either side.
+        let middle = samples.partition_point(|s| s[0] <= 0.0);
+        let [low, high] =
+            [middle.saturating_sub(samples.len() / 20), (middle + samples.len() / 20).min(samples.len() - 1)];
+        let rate = 0.1 / (samples[high][0] - samples[low][0]).max(1e-12);
+        let mut by = 0.0;
+        let mut best: Option<(f64, Tiling)> = None;
+        for _ in 0..ROUNDS {
+            checkpoint();
+            let moved = tiling.clone().moved(by);
+            let (volume, solid) = moved.volumes();
+            let [bent, flat] = below(by);
+            let found = solid / volume + bent - flat;
+            if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
+                best = Some((found, moved));
+            }
+            if (found - asked).abs() < NEAR {
+                break;
+            }
+            by += (asked - found) / rate;
+        }
+        let (found, tiling) = best.unwrap_or((asked, tiling));
+        Ok(Finished { fraction: Some(found), ..self.finished(Arc::new(tiling), None)? })
+    }
+
+    /// The middle lines of the net.
+    fn net(&self, tiling: &Tiling) -> Result<Net, DesignError> {
+        let ports = tiling.ports().0;
+        let net = Net::new(&tiling.map, &self.region, &ports, self.on.as_ref());
+        net.ok_or_else(|| {
+            let message =
+                "no triangle of the mesh's boundary has its middle in this region; make it reach over the surface";
+            DesignError::new(format!("{}.net.on", self.map), message)
+        })
+    }
+
+    /// The lattice with its ends at its own level.
+    fn finished(&self, tiling: Arc<Tiling>, net: Option<&Net>) -> Result<Finished, DesignError> {
+        let sheet = || tiling.thickness().map(|w| w.mean);
+        let plain = Finished { field: tiling.clone(), tiling: tiling.clone(), net: None, radius: None, fraction: None };
+        match (self.ends, net) {
+            (Ends::Net, Some(net)) => {
+                // Half a rod has the area of a port, or is as deep as a wall is thick.
+                let own = || {
+                    if tiling.part == Part::Sheet { sheet() } else { None }.unwrap_or(2f64.sqrt() * tiling.ports().1)
+                };
+                let radius = self.radius.unwrap_or_else(own);
+                let solid = net.solid(radius).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))?;
+                Ok(Finished { net: Some(solid), radius: Some(radius), ..plain })
+            }
+            (Ends::Rounded, _) => {
+                let own = if tiling.part == Part::Sheet { sheet().map(|w| 0.5 * w) } else { None };
+                let radius = own.unwrap_or_else(|| tiling.ports().1);
+                let field = Arc::new(Rounded::new(&tiling, &self.region, radius));
+                Ok(Finished { field, radius: Some(radius), ..plain })
+            }
+            _ => Ok(plain),
+        }
+    }
+
+    /// Which points the skin and the keep zones fill.
+    fn kept(&self, points: &[Vec3]) -> Vec<bool> {
+        let mut kept = vec![false; points.len()];
+        for body in self.environment.filled {
+            let values = sample::values(points, |p, out| body.values(p, out));
+            kept.iter_mut().zip(values).for_each(|(k, v)| *k |= v <= 0.0);
+        }
+        kept
+    }
+
+    /// Which points the lattice and its net fill.
+    fn solid(&self, made: &Finished, points: &[Vec3]) -> Vec<bool> {
+        let values = sample::values(points, |p, out| made.field.values(p, out));
+        let mut solid: Vec<bool> = values.into_iter().map(|v| v <= 0.0).collect();
+        if let Some(net) = &made.net {
+            let values = sample::values(points, |p, out| net.values(p, out));
+            solid.iter_mut().zip(values).for_each(|(s, v)| *s |= v <= 0.0);
+        }
+        solid
+    }
+}

@@ -1,0 +1,383 @@
+//! Curved tetrahedra: the boundary edges of a mesh bent onto the surface of a region.
+//!
+//! In a tetrahedron with corners p and barycentric coordinates λ the position is x = Σ λ_i p_i + Σ 4 λ_i λ_j δ_ij, the second sum over
+//! its edges. δ is the way from the middle of an edge to the surface, and zero of edges inside the mesh; on a common face
+//! two tetrahedra have the same edges, hence the same positions.
+//!
+//! *One to one.* With π the nearest point of the tetrahedron in the metric of barycentric coordinates (that of a regular one), and
+//! the second sum of π(λ) taken outside too, x ↦ λ is the fixed point of λ ← λ₀(x) − A(π(λ)), λ₀ and A being the two sums in
+//! coordinates. The derivative of A is linear in λ, so its norm is greatest at a corner; it is kept below `MOST`, δ being
+//! reduced where it is not. Since π does not expand, the iteration contracts everywhere: each tetrahedron's coordinates are defined in
+//! all of space, with a Lipschitz constant at most 1/(1 − κ) times that of the flat one.
+
+use std::collections::HashMap;
+
+use super::surface_feet::{edge_feet, feet};
+use super::tet_map::{NONE, Tets};
+use crate::field::Field;
+use crate::region::Region;
+use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, scale, spectral_norm, sub, transpose};
+
+/// The greatest norm κ of the derivative of A.
+const MOST: f64 = 0.85;
+/// The greatest |δ|, in lengths of the edge: a chord of 140° of a circle.
+const FARTHEST: f64 = 0.35;
+/// |δ| below this share of the edge is rounding.
+const FLAT: f64 = 1e-9;
+/// The distance of the bent boundary from the surface, in edges, up to which the mesh is one of the region.
+const FIT: f64 = 0.1;
+/// Iterations of the inverse, and the change at which it has converged.
+const ROUNDS: usize = 200;
+const NEAR: f64 = 1e-13;
+
+/// The corners at the ends of each edge.
+pub(crate) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// An edge of the mesh's boundary.
+pub(crate) struct BoundaryEdge {
+    /// Its nodes, ascending.
+    pub nodes: [u32; 2],
+    /// The middles of its two faces (mm).
+    pub sides: [Vec3; 2],
+}
+
+/// How the tetrahedra at the boundary are bent.
+pub(crate) struct Curves {
+    /// The region whose surface they meet.
+    pub region: Region,
+    /// The edges of the boundary, ascending.
+    pub edges: Vec<BoundaryEdge>,
+    /// Number of each tetrahedron in `bent`, or [`NONE`].
+    index: Vec<u32>,
+    bent: Vec<Bent>,
+    /// Greatest distance of the bent boundary from the region's surface at middles of faces and quarters of edges, in edges.
+    pub off: f64,
+}
+
+/// A bent tetrahedron.
+struct Bent {
+    /// δ of each edge, mm, and in barycentric coordinates.
+    moved: [Vec3; 6],
+    shift: [[f64; 4]; 6],
+    /// The norm κ.
+    contraction: f64,
+    /// How far it reaches beyond its flat faces, and how far any of its points is moved at most, in barycentric coordinates.
+    reach: f64,
+    sway: f64,
+}
+
+/// The nearest point to `l` of all whose coordinates are at least −`by` and whose sum is one.
+pub(crate) fn within(l: [f64; 4], by: f64) -> [f64; 4] {
+    if l.iter().all(|v| *v >= -by) {
+        return l;
+    }
+    let mut sorted = l.map(|v| v + by);
+    sorted.sort_unstable_by(|a, b| b.total_cmp(a));
+    let (mut sum, mut cut) = (-(1.0 + 4.0 * by), 0.0);
+    for (k, v) in sorted.into_iter().enumerate() {
+        sum += v;
+        let here = sum / (k + 1) as f64;
+        if v > here {
+            cut = here;
+        }
+    }
+    l.map(|v| (v + by - cut).max(0.0) - by)
+}
+
+impl Bent {
+    fn new(map: &Tets, t: usize, moved: [Vec3; 6]) -> Bent {
+        let m = map.slopes(t);
+        let shift = moved.map(|d| {
+            let l = [dot(m[0], d), dot(m[1], d), dot(m[2], d)];
+            [l[0], l[1], l[2], -l[0] - l[1] - l[2]]
+        });
+        // An orthonormal basis of the directions of barycentric coordinates, whose sum is zero.
+        const B: [[f64; 4]; 3] = [[0.5, 0.5, -0.5, -0.5], [0.5, -0.5, 0.5, -0.5], [0.5, -0.5, -0.5, 0.5]];
+        let at_corner = |v: usize| {
+            let out: Mat3 = core::array::from_fn(|r| {
+                core::array::from_fn(|c| {
+                    let of = PAIRS.iter().zip(&shift).filter(|(pair, _)| pair.contains(&v));
+                    let one = |(pair, s): (&[usize; 2], &[f64; 4])| {
+                        let other = if pair[0] == v { pair[1] } else { pair[0] };
+                        4.0 * (0..4).map(|i| B[r][i] * s[i]).sum::<f64>() * B[c][other]
+                    };
+                    of.map(one).sum()
+                })
+            });
+            spectral_norm(&out)
+        };
+        let contraction = (0..4).map(at_corner).fold(0.0, f64::max);
+        // The hull of the corners and the control points: middles of edges plus 2δ.
+        let control = PAIRS.iter().zip(&shift).map(|(pair, s)| {
+            let l: [f64; 4] = core::array::from_fn(|i| 2.0 * s[i] + if pair.contains(&i) { 0.5 } else { 0.0 });
+            l.iter().fold(0.0f64, |m, v| m.max(-v))
+        });
+        let reach = control.fold(0.0, f64::max);
+        // 2 λ_i λ_j are shares, together below one.
+        let sway = shift.iter().flatten().fold(0.0f64, |m, s| m.max(2.0 * s.abs()));
+        Bent { moved, shift, contraction, reach, sway }
+    }
+
+    fn shifted(&self, l: [f64; 4]) -> [f64; 4] {
+        let l = within(l, 0.0);
+        let mut out = [0.0; 4];
+        for ([i, j], s) in PAIRS.iter().zip(&self.shift) {
+            let w = 4.0 * l[*i] * l[*j];
+            out.iter_mut().zip(s).for_each(|(o, s)| *o += w * s);
+        }
+        out
+    }
+}
+
+impl Bent {
+    /// The step n with n + A′(l) n = d, of coordinates in the tetrahedron.
+    fn newton(&self, l: &[f64; 4], d: &[f64; 4]) -> Option<[f64; 4]> {
+        if l.iter().any(|v| *v < 0.0) {
+            return None;
+        }
+        // Columns of A′ by three of the coordinates; the fourth is one less their sum, in all vectors zero less their sum.
+        let mut columns = [[0.0; 4]; 4];
+        for ([i, j], s) in PAIRS.iter().zip(&self.shift) {
+            for k in 0..4 {
+                columns[*i][k] += 4.0 * l[*j] * s[k];
+                columns[*j][k] += 4.0 * l[*i] * s[k];
+            }
+        }
+        let m: Mat3 = core::array::from_fn(|r| {
+            core::array::from_fn(|c| f64::from(u8::from(r == c)) + columns[c][r] - columns[3][r])
+        });
+        let n = apply(&inverse(&m), [d[0], d[1], d[2]]);
+        Some([n[0], n[1], n[2], -n[0] - n[1] - n[2]])
+    }
+}
+
+impl Curves {
+    /// Bends the boundary edges of a mesh whose nodes on the boundary are on the surface of a region.
+    pub fn new(map: &Tets, region: &Region) -> Curves {
+        let edges = boundary_edges(map);
+        let ends = |e: &BoundaryEdge| e.nodes.map(|n| map.nodes()[n as usize]);
+        let middles: Vec<Vec3> = edges.iter().map(|e| middle(ends(e), 0.5)).collect();
+        let sides: Vec<[Vec3; 2]> = edges.iter().map(|e| e.sides).collect();
+        let targets = edge_feet(&**region, &middles, &sides);
+        let mut moved: HashMap<[u32; 2], Vec3> = HashMap::with_capacity(edges.len());
+        for ((e, p), q) in edges.iter().zip(&middles).zip(&targets) {
+            let [a, b] = ends(e);
+            let (length, by) = (norm(sub(a, b)), sub(*q, *p));
+            let far = norm(by);
+            if far > FLAT * length && far.is_finite() {
+                moved.insert(e.nodes, scale(by, (FARTHEST * length / far).min(1.0)));
+            }
+        }
+        let mut out =
+            Curves { region: region.clone(), edges, index: vec![NONE; map.len()], bent: Vec::new(), off: 0.0 };
+        out.bend(map, &mut moved);
+        out.off = out.distance(map, &moved);
+        out
+    }
+
+    /// Makes the bent tetrahedra, and reduces the bends until all are one to one.
+    fn bend(&mut self, map: &Tets, moved: &mut HashMap<[u32; 2], Vec3>) {
+        let keys = |t: usize| {
+            let n = map.tet(t);
+            PAIRS.map(|[i, j]| [n[i], n[j]])
+        };
+        let touched = (0..map.len()).filter(|t| keys(*t).iter().any(|k| moved.contains_key(k)));
+        let touched: Vec<usize> = touched.collect();
+        let made = |t: usize, moved: &HashMap<[u32; 2], Vec3>| {
+            Bent::new(map, t, keys(t).map(|k| moved.get(&k).copied().unwrap_or_default()))
+        };
+        loop {
+            // Bends are reduced together: the least factor of an edge's tetrahedra counts, in whatever order.
+            let mut least: HashMap<[u32; 2], f64> = HashMap::new();
+            for &t in &touched {
+                let kappa = made(t, moved).contraction;
+                if kappa > MOST {
+                    for k in keys(t).into_iter().filter(|k| moved.contains_key(k)) {
+                        let by = least.entry(k).or_insert(1.0);
+                        *by = by.min(0.98 * MOST / kappa);
+                    }
+                }
+            }
+            if least.is_empty() {
+                break;
+            }
+            for (k, by) in least {
+                moved.entry(k).and_modify(|d| *d = scale(*d, by));
+            }
+        }
+        for t in touched {
+            self.index[t] = self.bent.len() as u32;
+            self.bent.push(made(t, moved));
+        }
+    }
+
+    /// The greatest distance of the bent boundary from the surface, in edges.
+    fn distance(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> f64 {
+        let at = |n: u32| map.nodes()[n as usize];
+        let bend = |a: u32, b: u32| moved.get(&[a.min(b), a.max(b)]).copied().unwrap_or_default();
+        let boundary = map.boundary_nodes();
+        let (mut points, mut lengths) = (Vec::new(), Vec::new());
+        for f in &boundary {
+            let length = (0..3).map(|i| norm(sub(at(f[i]), at(f[(i + 1) % 3])))).sum::<f64>() / 3.0;
+            let flat = scale(f.iter().fold([0.0; 3], |s, n| add(s, at(*n))), 1.0 / 3.0);
+            let bent = (0..3).fold(flat, |p, i| add(p, scale(bend(f[i], f[(i + 1) % 3]), 4.0 / 9.0)));
+            points.push(bent);
+            lengths.push(length);
+        }
+        for BoundaryEdge { nodes: [a, b], .. } in &self.edges {
+            for s in [0.25, 0.5, 0.75] {
+                let flat = middle([at(*a), at(*b)], s);
+                points.push(add(flat, scale(bend(*a, *b), 4.0 * s * (1.0 - s))));
+                lengths.push(norm(sub(at(*a), at(*b))));
+            }
+        }
+        let mut off = vec![0.0; points.len()];
+        self.region.values(&points, &mut off);
+        off.iter().zip(lengths).fold(0.0, |m, (v, l)| m.max(v.abs() / l))
+    }
+
+    /// Whether the bent boundary is the region's surface but for a small share of its edges.
+    pub fn fits(&self) -> bool {
+        self.off <= FIT
+    }
+
+    fn of(&self, t: usize) -> Option<&Bent> {
+        self.bent.get(self.index[t] as usize)
+    }
+
+    /// How far (mm) bending moves the point of a tetrahedron whose coordinates are `l`.
+    pub fn moved(&self, t: usize, l: [f64; 4]) -> Vec3 {
+        let Some(bent) = self.of(t) else { return [0.0; 3] };
+        let edges = PAIRS.iter().zip(&bent.moved);
+        edges.fold([0.0; 3], |s, ([i, j], d)| add(s, scale(*d, 4.0 * l[*i] * l[*j])))
+    }
+
+    /// How far a tetrahedron reaches beyond its flat faces, in barycentric coordinates.
+    pub fn reach(&self, t: usize) -> f64 {
+        self.of(t).map_or(0.0, |b| b.reach)
+    }
+
+    /// By how much bending changes a coordinate at most.
+    pub fn sway(&self, t: usize) -> f64 {
+        self.of(t).map_or(0.0, |b| b.sway)
+    }
+
+    /// The factor of Lipschitz constants of what is a function of the coordinates.
+    pub fn steeper(&self, t: usize) -> f64 {
+        self.of(t).map_or(1.0, |b| 1.0 / (1.0 - b.contraction))
+    }
+
+    /// The coordinates where those of the flat tetrahedron are `flat`.
+    pub fn bary(&self, t: usize, flat: [f64; 4]) -> [f64; 4] {
+        let Some(bent) = self.of(t) else { return flat };
+        // By how much the next coordinates of the iteration differ.
+        let change = |l: &[f64; 4]| -> [f64; 4] {
+            let by = bent.shifted(*l);
+            core::array::from_fn(|i| flat[i] - by[i] - l[i])
+        };
+        let size = |v: &[f64; 4]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (mut l, mut d) = (flat, change(&flat));
+        for _ in 0..ROUNDS {
+            let left = size(&d);
+            if left < NEAR {
+                break;
+            }
+            // Newton's step, where it contracts more than the iteration is sure to.
+            let newton = bent.newton(&l, &d).map(|n| core::array::from_fn(|i| l[i] + n[i]));
+            let newton = newton.map(|n| (n, change(&n))).filter(|n| size(&n.1) < bent.contraction * left);
+            (l, d) = newton.unwrap_or_else(|| {
+                let next = core::array::from_fn(|i| l[i] + d[i]);
+                (next, change(&next))
+            });
+        }
+        l
+    }
+
+    /// The gradients (per mm) of the first three coordinates at coordinates `l`, where the tetrahedron is bent; `to` has the edges from
+    /// the fourth corner as columns.
+    pub fn slopes(&self, t: usize, l: [f64; 4], to: &Mat3) -> Option<Mat3> {
+        let bent = self.of(t)?;
+        let l = within(l, 0.0);
+        // Rows: ∂x/∂λ_k with λ_3 = 1 − λ_0 − λ_1 − λ_2.
+        let mut rows = transpose(to);
+        for ([i, j], d) in PAIRS.iter().zip(&bent.moved) {
+            let partial = |k: usize| {
+                if k == *i {
+                    l[*j]
+                } else if k == *j {
+                    l[*i]
+                } else {
+                    0.0
+                }
+            };
+            for (k, row) in rows.iter_mut().enumerate() {
+                *row = add(*row, scale(*d, 4.0 * (partial(k) - partial(3))));
+            }
+        }
+        Some(inverse(&transpose(&rows)))
+    }
+}
+
+fn middle([a, b]: [Vec3; 2], s: f64) -> Vec3 {
+    add(scale(a, 1.0 - s), scale(b, s))
+}
+
+/// The edges of the boundary that have two faces, ascending.
+fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
+    let mut halves: Vec<([u32; 2], [u32; 3])> = Vec::new();
+    for f in map.boundary_nodes() {
+        for i in 0..3 {
+            let (a, b) = (f[i], f[(i + 1) % 3]);
+            halves.push(([a.min(b), a.max(b)], f));
+        }
+    }
+    halves.sort_unstable();
+    let third = |f: [u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, map.nodes()[*n as usize])), 1.0 / 3.0);
+    let edge = |pair: &[([u32; 2], [u32; 3])]| match pair {
+        [(nodes, f), (_, g)] => Some(BoundaryEdge { nodes: *nodes, sides: [third(*f), third(*g)] }),
+        _ => None,
+    };
+    halves.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect()
+}
+
+/// The nodes of a mesh, those on the boundary that are a little off the surface of a region moved onto it, where all
+/// tetrahedra keep at least half their volume.
+pub(crate) fn settled(map: &Tets, region: &dyn Field) -> Vec<Vec3> {
+    let boundary = map.boundary_nodes();
+    let old = map.nodes();
+    let mut shortest: HashMap<u32, f64> = HashMap::new();
+    for f in &boundary {
+        for i in 0..3 {
+            let length = norm(sub(old[f[i] as usize], old[f[(i + 1) % 3] as usize]));
+            for n in [f[i], f[(i + 1) % 3]] {
+                let s = shortest.entry(n).or_insert(length);
+                *s = s.min(length);
+            }
+        }
+    }
+    let mut on: Vec<(u32, f64)> = shortest.into_iter().collect();
+    on.sort_unstable_by_key(|n| n.0);
+    let points: Vec<Vec3> = on.iter().map(|n| old[n.0 as usize]).collect();
+    let mut new = old.to_vec();
+    for ((n, length), (p, q)) in on.iter().zip(points.iter().zip(feet(region, &points))) {
+        let far = norm(sub(q, *p));
+        if far > FLAT * length && far < 0.25 * length {
+            new[*n as usize] = q;
+        }
+    }
+    loop {
+        let spoilt = |t: &usize| {
+            let n = map.tet(*t);
+            let volume = |of: &[Vec3]| super::tet_map::volume(n.map(|v| of[v as usize]));
+            let (was, is) = (volume(old), volume(&new));
+            was * is < 0.5 * was * was
+        };
+        let bad: Vec<usize> = (0..map.len()).filter(spoilt).collect();
+        if bad.is_empty() {
+            return new;
+        }
+        for n in bad.into_iter().flat_map(|t| map.tet(t)) {
+            new[n as usize] = old[n as usize];
+        }
+    }
+}

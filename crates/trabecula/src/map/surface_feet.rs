@@ -1,0 +1,80 @@
+//! Points of a region's surface nearest to points of a mesh's boundary, on its sharp edges too.
+//!
+//! A point on an edge of the boundary mesh has a face on either side. Where the tangent planes of the region near these two faces
+//! differ, however near they are taken, the region has a sharp edge there, and the point belongs on both planes.
+
+use rayon::prelude::*;
+
+use crate::field::Field;
+use geometry::math::{Vec3, add, dot, norm, scale, sub};
+
+/// Normals that differ by less than this (degrees) belong to one smooth face.
+const SMOOTH: f64 = 25.0;
+/// How far towards the middles of both faces tangent planes are taken, in three rounds.
+const TOWARD: [f64; 3] = [0.35, 0.06, 0.01];
+/// Steps to the surface: one reaches it where the function is a distance.
+const STEPS: usize = 3;
+/// Points that a thread takes at once.
+const BATCH: usize = 256;
+
+/// Values and gradients of a field at many points.
+fn gradients(field: &dyn Field, points: &[Vec3]) -> (Vec<f64>, Vec<Vec3>) {
+    let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    let out = v.par_chunks_mut(BATCH).zip(g.par_chunks_mut(BATCH));
+    out.zip(points.par_chunks(BATCH)).for_each(|((v, g), p)| field.gradients(p, v, g));
+    (v, g)
+}
+
+/// Points (mm) moved to the surface of a region, given by its signed distance.
+pub(crate) fn feet(region: &dyn Field, points: &[Vec3]) -> Vec<Vec3> {
+    let mut feet = points.to_vec();
+    for _ in 0..STEPS {
+        let (v, g) = gradients(region, &feet);
+        for (p, (v, g)) in feet.iter_mut().zip(v.iter().zip(&g)) {
+            *p = sub(*p, scale(*g, *v));
+        }
+    }
+    feet
+}
+
+/// As `feet`, of points on edges of a boundary mesh whose faces have their middles at `sides`: on the region's sharp edge, if it
+/// has one there.
+pub(crate) fn edge_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]) -> Vec<Vec3> {
+    let mut out = feet(region, points);
+    let mut sharp: Vec<usize> = (0..points.len()).collect();
+    let mut at = points.to_vec();
+    for toward in TOWARD {
+        let seen = |i: &usize| sides[*i].map(|s| add(at[*i], scale(sub(s, points[*i]), toward)));
+        let near: Vec<Vec3> = sharp.iter().flat_map(seen).collect();
+        let (v, g) = gradients(region, &near);
+        let plane = |k: usize| (sub(near[k], scale(g[k], v[k])), g[k]);
+        let met =
+            sharp.iter().enumerate().filter_map(|(k, i)| Some((*i, meeting(at[*i], plane(2 * k), plane(2 * k + 1))?)));
+        let met: Vec<(usize, Vec3)> = met.collect();
+        sharp = met.iter().map(|m| m.0).collect();
+        for (i, p) in met {
+            at[i] = p;
+        }
+    }
+    let found: Vec<Vec3> = sharp.iter().map(|i| at[*i]).collect();
+    let mut off = vec![0.0; found.len()];
+    region.values(&found, &mut off);
+    for (i, off) in sharp.into_iter().zip(off) {
+        let near = norm(sub(sides[i][0], sides[i][1]));
+        if off.abs() < 1e-3 * near && norm(sub(at[i], points[i])) < near {
+            out[i] = at[i];
+        }
+    }
+    out
+}
+
+/// The point nearest to `p` on two planes (a point and the unit normal of each), if these differ.
+fn meeting(p: Vec3, a: (Vec3, Vec3), b: (Vec3, Vec3)) -> Option<Vec3> {
+    let c = dot(a.1, b.1);
+    if c > SMOOTH.to_radians().cos() || c < -0.999 {
+        return None;
+    }
+    let away = |(q, n): (Vec3, Vec3)| dot(n, sub(q, p));
+    let (x, y, s) = (away(a), away(b), 1.0 - c * c);
+    Some(add(p, add(scale(a.1, (x - c * y) / s), scale(b.1, (y - c * x) / s))))
+}

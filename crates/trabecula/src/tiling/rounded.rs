@@ -1,0 +1,137 @@
+//! Rounded ends: a lattice and the region meet in a fillet instead of an edge.
+//!
+//! With a the lattice's function, divided by its steepness so that it is about a distance at its surface, and b the region's distance, the
+//! intersection max(a, b) becomes min(max(a, b), −r) + |(max(a + r, 0), max(b + r, 0))|: within r of both surfaces the solid ends on a
+//! quarter circle of radius r. A strut of that radius ends in a half ball, the edge of a wall 2r thick in a half circle.
+
+use std::sync::Arc;
+
+use super::Tiling;
+use crate::field::Field;
+use crate::implicit::Implicit;
+use crate::region::Region;
+use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
+
+/// Values within this share of the cell's range are near the surface.
+const NEAR: f64 = 0.04;
+
+/// A lattice with rounded ends.
+pub struct Rounded {
+    /// The lattice, or one side of its sheet.
+    of: Arc<dyn Implicit>,
+    region: Region,
+    /// The radius, mm.
+    radius: f64,
+    /// The steepness (per mm) of the lattice at its surface.
+    steepness: Steepness,
+    parts: Vec<Arc<dyn Implicit>>,
+}
+
+/// |∇f| at the surface, as it varies with the size of tetrahedra.
+#[derive(Clone)]
+struct Steepness {
+    tiling: Arc<Tiling>,
+    at_nodes: Arc<Vec<f64>>,
+}
+
+impl Steepness {
+    fn new(tiling: &Arc<Tiling>) -> Steepness {
+        let range = tiling.cells[0].cell.range();
+        let width = (range.hi - range.lo) / tiling.cells[0].scale;
+        // The mean at points near the surface, in units of the bound of each tetrahedron.
+        let step = tiling.map.len().div_ceil(200).max(1);
+        let mut ratios = Vec::new();
+        for t in (0..tiling.map.len()).step_by(step) {
+            let known = tiling.known(&tiling.points_in(t, 200));
+            let near = known.iter().filter(|k| tiling.cut.value(k.f, k.t).abs() < NEAR * width);
+            ratios.extend(near.map(|k| norm(k.slope) / tiling.lipschitz[t]));
+        }
+        let ratio = if ratios.is_empty() { 0.5 } else { ratios.iter().sum::<f64>() / ratios.len() as f64 };
+        let mut sums = vec![(0.0, 0.0); tiling.map.nodes().len()];
+        for t in 0..tiling.map.len() {
+            for n in tiling.map.tet(t) {
+                sums[n as usize].0 += ratio * tiling.lipschitz[t];
+                sums[n as usize].1 += 1.0;
+            }
+        }
+        let mean = |(s, n): (f64, f64)| if n > 0.0 { s / n } else { 1.0 };
+        Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()) }
+    }
+
+    fn at(&self, p: Vec3) -> f64 {
+        let (t, l) = self.tiling.map.locate(p);
+        self.tiling.linear(&self.at_nodes, t, crate::map::curved_tets::within(l, 0.0))
+    }
+}
+
+impl Rounded {
+    /// A lattice in a region with its ends rounded to a radius (mm).
+    pub fn new(tiling: &Arc<Tiling>, region: &Region, radius: f64) -> Rounded {
+        let steepness = Steepness::new(tiling);
+        let one = |of: Arc<dyn Implicit>, parts| Rounded {
+            of,
+            region: region.clone(),
+            radius,
+            steepness: steepness.clone(),
+            parts,
+        };
+        let parts = tiling.parts().into_iter().map(|p| Arc::new(one(p, Vec::new())) as Arc<dyn Implicit>);
+        let parts = parts.collect();
+        one(tiling.clone(), parts)
+    }
+
+    /// The value where the lattice's is `a` and the region's `b`, and its derivatives by both.
+    fn joined(&self, a: f64, b: f64) -> (f64, f64, f64) {
+        let r = self.radius;
+        let (x, y) = ((a + r).max(0.0), (b + r).max(0.0));
+        let round = x.hypot(y);
+        if round > 0.0 { (round - r, x / round, y / round) } else { (a.max(b), f64::from(a >= b), f64::from(a < b)) }
+    }
+}
+
+impl Field for Rounded {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let mut b = vec![0.0; points.len()];
+        self.of.values(points, out);
+        self.region.values(points, &mut b);
+        for ((p, o), b) in points.iter().zip(out).zip(b) {
+            *o = self.joined(*o / self.steepness.at(*p), b).0;
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let (mut b, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+        self.of.gradients(points, values, gradients);
+        self.region.gradients(points, &mut b, &mut g);
+        for (i, p) in points.iter().enumerate() {
+            let steep = self.steepness.at(*p);
+            let (v, da, db) = self.joined(values[i] / steep, b[i]);
+            values[i] = v;
+            gradients[i] = add(scale(gradients[i], da / steep), scale(g[i], db));
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let (of, region) = (self.of.bound(b), self.region.bound(b));
+        let steep = self.steepness.at_nodes.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+        // The function rises with both.
+        let low = if of.lo < 0.0 { of.lo / steep.0 } else { of.lo / steep.1 };
+        let high = if of.hi < 0.0 { of.hi / steep.1 } else { of.hi / steep.0 };
+        Interval::new(self.joined(low, region.lo).0, self.joined(high, region.hi).0)
+    }
+}
+
+impl Implicit for Rounded {
+    fn lipschitz(&self) -> f64 {
+        let least = self.steepness.at_nodes.iter().copied().fold(f64::INFINITY, f64::min);
+        (self.of.lipschitz() / least).max(1.0)
+    }
+
+    fn has_creases(&self) -> bool {
+        true
+    }
+
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
+        self.parts.clone()
+    }
+}
