@@ -350,7 +350,8 @@ fn made(
     let alone = environment.filled.is_empty() && domain.fit != MeshFit::Cut && !finish.changes();
     let explicit = alone && domain.joined.method == Method::Explicit && domain.fit == MeshFit::Whole;
     let done = match asked {
-        Some(asked) if explicit && bent => finish.bent(tiling, asked)?,
+        // Blended functions are evaluated by position on both roads.
+        Some(asked) if explicit && bent && map.overlap() <= 0.0 => finish.bent(tiling, asked)?,
         _ => finish.made(tiling, asked, whole)?,
     };
     Ok(Made { done, alone, explicit, zones: Vec::new(), joins: None })

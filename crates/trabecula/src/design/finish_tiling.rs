@@ -20,8 +20,10 @@ use geometry::progress::checkpoint;
 /// Points at which the finished part is sampled; spread evenly, their share is within about 0.0005.
 const POINTS: usize = 150_000;
 /// The most rounds of the level, and the share that is close enough.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 12;
 const NEAR: f64 = 2e-4;
+/// By how much the finished part may have more than was asked for.
+const OFF: f64 = 5e-3;
 
 /// A lattice with its ends.
 pub(super) struct Finished {
@@ -94,8 +96,9 @@ impl<'a> Finish<'a> {
         let mut sorted = lattice.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = points.len() as f64;
-        let mut share = asked;
         let mut best: Option<(f64, Finished)> = None;
+        // The lattice's own share, and what the finished part has by it: secants, since a net grows with the lattice.
+        let (mut share, mut last): (f64, Option<[f64; 2]>) = (asked, None);
         for _ in 0..ROUNDS {
             checkpoint();
             let by = sorted[((share * count) as usize).min(points.len() - 1)];
@@ -108,21 +111,26 @@ impl<'a> Finish<'a> {
             if (found - asked).abs() < NEAR {
                 break;
             }
-            share += asked - found;
-            if share <= 0.0 {
-                let message = format!(
-                    "the net, the skin and what is kept solid make up {found:.4} of the part already; ask for more than that, or give \
-                     net.radius a smaller one: {} is too little",
-                    number(asked)
-                );
-                return Err(DesignError::new(&self.path, message));
-            }
-            share = share.min(1.0);
+            let steep = last.map(|[s, f]| (found - f) / (share - s)).filter(|g| (0.2..20.0).contains(g)).unwrap_or(1.0);
+            last = Some([share, found]);
+            // At most by half the way to nothing or everything.
+            share = (share + (asked - found) / steep).clamp(0.5 * share, 0.5 + 0.5 * share);
         }
         match best {
+            Some((found, _)) if found > asked + OFF => Err(self.too_full(asked, found)),
             Some((_, made)) => Ok(made),
             None => self.finished(Arc::new(tiling), net.as_ref()),
         }
+    }
+
+    /// Says that what is solid anyway is more than asked for.
+    fn too_full(&self, asked: f64, found: f64) -> DesignError {
+        let message = format!(
+            "with next to no lattice the net, the skin and what is kept solid make up {found:.4} of the part; ask for more than that, or \
+             for thinner ones: {} is too little",
+            number(asked)
+        );
+        DesignError::new(&self.path, message)
     }
 
     /// The lattice with flat ends at the level at which its surface, made without a grid, encloses the fraction asked for: that of flat
@@ -137,8 +145,8 @@ impl<'a> Finish<'a> {
         let middle = samples.partition_point(|s| s[0] <= 0.0);
         let [low, high] =
             [middle.saturating_sub(samples.len() / 20), (middle + samples.len() / 20).min(samples.len() - 1)];
-        let rate = 0.1 / (samples[high][0] - samples[low][0]).max(1e-12);
-        let mut by = 0.0;
+        let mut rate = 0.1 / (samples[high][0] - samples[low][0]).max(1e-12);
+        let (mut by, mut last): (f64, Option<[f64; 2]>) = (0.0, None);
         let mut best: Option<(f64, Tiling)> = None;
         for _ in 0..ROUNDS {
             checkpoint();
@@ -152,6 +160,11 @@ impl<'a> Finish<'a> {
             if (found - asked).abs() < NEAR {
                 break;
             }
+            if let Some([b, f]) = last {
+                let secant = (found - f) / (by - b);
+                rate = if secant > 0.1 * rate { secant } else { 2.0 * rate };
+            }
+            last = Some([by, found]);
             by += (asked - found) / rate;
         }
         let (found, tiling) = best.unwrap_or((asked, tiling));

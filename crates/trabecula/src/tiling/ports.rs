@@ -73,7 +73,9 @@ impl Ports {
             port.3 = port.3.max(zeros);
         }
         let whole = (STEPS * STEPS) as f64 / 2.0;
-        let areas: Vec<f64> = found.iter().map(|p| p.1 / whole * [1.0, 2.0, 6.0][p.3]).collect();
+        // Their ratios from the steps, their sum exactly, so that it is continuous in the level.
+        let exact = cell.face_fraction(part, iso) / (found.iter().map(|p| p.1).sum::<f64>() / whole).max(1e-12);
+        let areas: Vec<f64> = found.iter().map(|p| exact * p.1 / whole * [1.0, 2.0, 6.0][p.3]).collect();
         let inside = found.iter().filter(|p| p.3 == 0).map(|p| p.2.map(|v| v / p.1)).collect();
         Ports {
             at_edges: found.iter().any(|p| p.3 > 0),

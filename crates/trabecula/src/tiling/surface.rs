@@ -453,7 +453,7 @@ impl SurfaceMaker for TilingSurface<'_> {
 
 impl Tiling {
     /// The tiling's field in small tetrahedra of some tetrahedra: the value in the middle of each, its share of the volume as they are bent
-    /// onto the region, and of that of the flat ones. Ascending by value.
+    /// onto the region, and of that of the flat ones. Ascending by value. Without an overlap.
     ///
     /// # Errors
     /// A mesh whose surface cannot be cut.
@@ -469,15 +469,10 @@ impl Tiling {
                 let sum = |c: usize| small.nodes.iter().map(|n| f64::from(nodes.whole[*n as usize][c])).sum::<f64>();
                 core::array::from_fn(|c| sum(c) / (4 * STEPS) as f64)
             };
-            let at: Vec<(usize, [f64; 4])> = work.template.tets.iter().map(|s| (t, middle(s))).collect();
-            let values: Vec<f64> = if self.map.overlap() > 0.0 {
-                let points: Vec<Vec3> = at.iter().map(|(t, l)| self.map.place(*t, *l)).collect();
-                self.known(&points).iter().map(|k| self.cut.value(k.f, k.t)).collect()
-            } else {
-                self.known_in(&at).iter().map(|k| self.cut.value(k.f, k.t)).collect()
-            };
-            let flat = self.map.volume(t) / values.len() as f64;
             let places = work.places(t);
+            let known = self.known_in(&work.template.tets.iter().map(|s| (t, middle(s))).collect::<Vec<_>>());
+            let values: Vec<f64> = known.iter().map(|k| self.cut.value(k.f, k.t)).collect();
+            let flat = self.map.volume(t) / values.len() as f64;
             let volume = |small: &small_simplices::Small| match &places {
                 None => flat,
                 Some(p) => {
