@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::map::Tets;
-use crate::map::surface_feet::{edge_feet, feet};
+use crate::map::surface_feet::{edge_feet, feet, sharp_feet};
 use crate::region::Region;
 use crate::tiling::Ports;
 use ::beams::graph::{Beam, Graph, Hub, Profile};
@@ -29,7 +29,8 @@ pub(super) struct Net {
 type Edges = BTreeMap<[u32; 2], Vec<Vec3>>;
 
 impl Net {
-    /// The net on the faces of a mesh's boundary that have their middles in `on`; `None` if there is no such face.
+    /// The net on the faces of a mesh's boundary that have their middles in `on`, and along the sharp edges of the region there; `None` if
+    /// there is no such face.
     pub fn new(map: &Tets, region: &Region, ports: &Ports, on: Option<&Region>) -> Option<Net> {
         let at = |n: u32| map.nodes()[n as usize];
         let third = |f: &[u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, at(*n))), 1.0 / 3.0);
@@ -71,21 +72,22 @@ impl Net {
                 out.rod(a, b, feet(&**region, &inner));
             }
         }
-        if along {
-            let mut drawn: Vec<[u32; 2]> = Vec::new();
-            for f in &faces {
-                for i in 0..3 {
-                    let (a, b) = (f[i], f[(i + 1) % 3]);
-                    drawn.push([a.min(b), a.max(b)]);
-                }
+        let mut drawn: Vec<[u32; 2]> = Vec::new();
+        for f in &faces {
+            for i in 0..3 {
+                let (a, b) = (f[i], f[(i + 1) % 3]);
+                drawn.push([a.min(b), a.max(b)]);
             }
-            drawn.sort_unstable();
-            drawn.dedup();
-            for [a, b] in drawn {
-                let [p, q] = [a, b].map(|n| end(&mut out, &[n, n, n], &[1.0, 0.0, 0.0]));
-                let inner = on_edge(region, &out.between(p, q), &edges[&[a, b]]);
-                out.rod(p, q, inner);
-            }
+        }
+        drawn.sort_unstable();
+        drawn.dedup();
+        if !along {
+            drawn = sharp(map, region, &edges, drawn);
+        }
+        for [a, b] in drawn {
+            let [p, q] = [a, b].map(|n| end(&mut out, &[n, n, n], &[1.0, 0.0, 0.0]));
+            let inner = on_edge(region, &out.between(p, q), &edges[&[a, b]]);
+            out.rod(p, q, inner);
         }
         Some(out)
     }
@@ -120,6 +122,20 @@ impl Net {
         let quadors = Arc::new(Quadors::new(&Graph { hubs, beams }, Fillet::None)?);
         Ok(CsgSolid { surfaces: vec![Surface::smooth(quadors)], tree: CsgTree::Leaf(0) })
     }
+}
+
+/// Those of some edges that lie on sharp edges of the region.
+fn sharp(map: &Tets, region: &Region, edges: &Edges, of: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
+    let (mut some, mut middles, mut sides) = (Vec::new(), Vec::new(), Vec::new());
+    for e in of {
+        if let [a, b] = edges[&e][..] {
+            let [p, q] = e.map(|n| map.nodes()[n as usize]);
+            some.push(e);
+            middles.push(scale(add(p, q), 0.5));
+            sides.push([a, b]);
+        }
+    }
+    sharp_feet(&**region, &middles, &sides).into_iter().map(|(i, _)| some[i]).collect()
 }
 
 /// Points of an edge of the boundary, on the region's surface or its sharp edge.

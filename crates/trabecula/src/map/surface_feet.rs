@@ -41,6 +41,14 @@ pub(crate) fn feet(region: &dyn Field, points: &[Vec3]) -> Vec<Vec3> {
 /// has one there.
 pub(crate) fn edge_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]) -> Vec<Vec3> {
     let mut out = feet(region, points);
+    for (i, p) in sharp_feet(region, points, sides) {
+        out[i] = p;
+    }
+    out
+}
+
+/// The points of these that belong on a sharp edge of the region, by index, and where.
+pub(crate) fn sharp_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]) -> Vec<(usize, Vec3)> {
     let mut sharp: Vec<usize> = (0..points.len()).collect();
     let mut at = points.to_vec();
     for toward in TOWARD {
@@ -59,13 +67,11 @@ pub(crate) fn edge_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]
     let found: Vec<Vec3> = sharp.iter().map(|i| at[*i]).collect();
     let mut off = vec![0.0; found.len()];
     region.values(&found, &mut off);
-    for (i, off) in sharp.into_iter().zip(off) {
-        let near = norm(sub(sides[i][0], sides[i][1]));
-        if off.abs() < 1e-3 * near && norm(sub(at[i], points[i])) < near {
-            out[i] = at[i];
-        }
-    }
-    out
+    let close = |(i, off): &(usize, f64)| {
+        let near = norm(sub(sides[*i][0], sides[*i][1]));
+        off.abs() < 1e-3 * near && norm(sub(at[*i], points[*i])) < near
+    };
+    sharp.into_iter().zip(off).filter(close).map(|(i, _)| (i, at[i])).collect()
 }
 
 /// The point nearest to `p` on two planes (a point and the unit normal of each), if these differ.
