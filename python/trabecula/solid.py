@@ -213,8 +213,9 @@ class Solid(Seen):
 
     @property
     def open_ends(self) -> bool:
-        """Whether files of its mesh have no caps on the region's boundary (``surface = "open"`` of a map over tetrahedra): ``mesh``
-        closes them all the same, and ``Mesh.uncapped`` takes the caps off."""
+        """Whether files of its mesh have no caps on the region's boundary (``surface = "open"`` of a map over tetrahedra).
+
+        ``mesh`` has them all the same, and ``Mesh.uncapped`` takes them off."""
         return self._core.open_ends
 
     @property

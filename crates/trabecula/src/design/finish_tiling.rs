@@ -60,7 +60,7 @@ impl<'a> Finish<'a> {
                 let message = format!("there is a net with surface = \"net\" alone, found \"{}\"", ends.word());
                 return Err(DesignError::new(format!("{map}.net"), message));
             }
-            (net, _) => net.clone().unwrap_or_default(),
+            (net, _) => net.as_deref().cloned().unwrap_or_default(),
         };
         let mut notes = Notes::default();
         let on = net.on.map(|on| environment::region(&on, &format!("{map}.net.on"), environment.loader, &mut notes));

@@ -83,7 +83,7 @@ pub struct Joined {
     #[kind(default)]
     pub surface: Ends,
     /// The net of surface = "net".
-    pub net: Option<NetSpec>,
+    pub net: Option<Box<NetSpec>>,
 }
 
 /// How a lattice over tetrahedra ends at the part's surface.
