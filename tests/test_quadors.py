@@ -142,7 +142,7 @@ def test_planes_and_points_that_are_none_are_refused(octet, quadors):
 
 
 def test_the_command_draws_a_slice(tmp_path):
-    """Nine discs halfway along the cells, their area in closed form, and a drawing with as many loops; four of them in the part."""
+    """Nine discs halfway along the cells, their area in closed form; a drawing with as many loops; four in the part."""
     design = tmp_path / "sc.toml"
     design.write_text(
         'schema = 1\n[region.box]\nmin = [0, 0, 0]\nmax = [20, 20, 20]\n[beams.core]\ncell = "sc"\nradius = 1\n'
