@@ -1,0 +1,33 @@
+//! Effective properties of a periodic cell of voxels: stiffness and conductivity.
+//!
+//! A [`VoxelCell`] is a parallelepiped of voxels, each with the share of it that is solid. Trilinear finite elements, their stiffness
+//! weighted by that share, give the periodic field of each unit load; its energy is the effective tensor. The element is applied in
+//! modal coordinates ([`element`](mod@element)) without a stored matrix (`operator.rs`), and the systems are solved by conjugate gradients
+//! with geometric multigrid (`solve.rs`, `multigrid.rs`), so that the number of iterations does not grow with that of the voxels.
+//!
+//! ```
+//! use geometry::progress::Silent;
+//! use homogenise::{Material, VoxelCell};
+//!
+//! // Layers across z, half of them solid: stiff in the plane, nothing across.
+//! let fractions = (0..8 * 8 * 8).map(|i| if i / 64 < 4 { 1.0 } else { 0.0 }).collect();
+//! let edges = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+//! let cell = VoxelCell::new([8, 8, 8], edges, fractions).expect("fits");
+//! let material = Material::isotropic(1.0, 0.3).expect("valid");
+//! let c = cell.stiffness(&material, 1e-10, &Silent).expect("solved").tensor;
+//! assert!((c[0][0] - 0.5 / (1.0 - 0.09)).abs() < 1e-9);
+//! assert!(c[2][2].abs() < 1e-9);
+//! ```
+
+mod cell;
+mod dense;
+pub mod element;
+mod fields;
+mod lanes;
+mod material;
+mod multigrid;
+mod operator;
+mod solve;
+
+pub use cell::{Homogenised, VoxelCell};
+pub use material::{AXES, Material, Voigt, turned, voigt};

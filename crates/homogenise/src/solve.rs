@@ -1,0 +1,106 @@
+//! Conjugate gradients in f64, preconditioned by multigrid in f32.
+
+use geometry::fault::Fault;
+use geometry::progress::{Progress, Stopped};
+
+use crate::element::Element;
+use crate::fields::{add, combine, dot};
+use crate::multigrid::Multigrid;
+use crate::operator::Operator;
+
+/// Iterations after which a system is given up.
+const MOST: usize = 600;
+
+/// A grid of voxels with its preconditioner, and the fields of the iteration.
+pub struct System<const NC: usize> {
+    /// The operator.
+    pub operator: Operator<f64, NC>,
+    multigrid: Multigrid<NC>,
+    residual: Vec<f64>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
+}
+
+/// How a solution was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solved {
+    /// Iterations.
+    pub iterations: usize,
+    /// Length of the residual over that of the right-hand side.
+    pub residual: f64,
+}
+
+impl<const NC: usize> System<NC> {
+    /// The system of a grid of weights.
+    pub fn new(shape: [usize; 3], weights: &[f64], element: &Element) -> Self {
+        let operator = Operator::new(shape, weights.to_vec(), element);
+        let field = || vec![0.0; operator.len()];
+        System {
+            multigrid: Multigrid::new(shape, weights, element),
+            residual: field(),
+            direction: field(),
+            product: field(),
+            operator,
+        }
+    }
+
+    /// Solves A x = −A m for a periodic x, where m has the uniform gradient `modes` (times eight, by ξ).
+    ///
+    /// # Errors
+    /// An interruption; no convergence.
+    pub fn solve(
+        &mut self,
+        modes: &[f64; 9],
+        solution: &mut [f64],
+        tolerance: f64,
+        progress: &dyn Progress,
+    ) -> Result<Solved, Stopped> {
+        let System { operator, multigrid, residual, direction, product } = self;
+        solution.fill(0.0);
+        operator.uniform(modes, residual);
+        residual.iter_mut().for_each(|r| *r = -*r);
+        let start = dot(residual, residual).sqrt();
+        // Forces that are nothing but rounding: the uniform field is the solution.
+        let scale = operator.weights.iter().fold(0.0f64, |m, w| m.max(w.abs())) * operator.stiffest()
+            * modes.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        if start <= 1e-14 * scale * (operator.len() as f64).sqrt() {
+            return Ok(Solved { iterations: 0, residual: 0.0 });
+        }
+        let mut size = 0.0;
+        let mut now = 1.0f64;
+        for iteration in 0..MOST {
+            let done = (now.ln() / tolerance.ln()).clamp(0.0, 1.0);
+            if !progress.step((done * 1e6) as u64, 1_000_000) {
+                return Err(Stopped::Interrupted);
+            }
+            let found = multigrid.precondition(residual);
+            let along = dot(found, residual);
+            // Polak and Ribière's, which allows for a preconditioner that is linear to single precision only.
+            let turn = if iteration == 0 { 0.0 } else { (-dot(found, product) * size).max(0.0) };
+            combine(direction, found, |p, z| turn * p + f64::from(z));
+            operator.apply(direction, product);
+            let curvature = dot(direction, product);
+            if !(along > 0.0 && curvature > 0.0) {
+                return Err(Stopped::Refused(stalled(iteration, now)));
+            }
+            let slope = dot(direction, residual);
+            let length = slope / curvature;
+            size = length / along;
+            add(solution, length, direction);
+            add(residual, -length, product);
+            now = dot(residual, residual).sqrt() / start;
+            if now <= tolerance {
+                return Ok(Solved { iterations: iteration + 1, residual: now });
+            }
+        }
+        Err(Stopped::Refused(stalled(MOST, now)))
+    }
+}
+
+fn stalled(iterations: usize, residual: f64) -> Fault {
+    let message = format!(
+        "the solver stands at a relative residual of {residual:.1e} after {iterations} iterations; the solid hardly holds together \
+         at this resolution: take more voxels (n) or a greater fraction"
+    );
+    Fault::new("n", message)
+}
