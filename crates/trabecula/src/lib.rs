@@ -58,6 +58,7 @@ pub mod solid;
 pub mod surface_maker;
 pub mod tiling;
 pub mod truss;
+pub mod voxel_fractions;
 
 pub use cell::{Cell, Part};
 pub use design::{Built, Design, DesignError, Loader, NoFiles};

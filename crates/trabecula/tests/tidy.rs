@@ -22,7 +22,7 @@ const LAYERS: &[&[&str]] = &[
     &["mesher", "lattice", "tiling", "truss", "skin", "beam_surface"],
     &["blend"],
     &["solid"],
-    &["extract", "layers"],
+    &["extract", "layers", "voxel_fractions"],
     &["analysis"],
     &["report"],
     &["design"],
@@ -79,7 +79,7 @@ fn is_test(path: &Path) -> bool {
     path.components().any(|c| ["tests", "tests.rs", "laws.rs"].iter().any(|t| c.as_os_str() == *t))
 }
 
-const CRATES: [&str; 4] = ["geometry", "beams", "trabecula", "trabecula-py"];
+const CRATES: [&str; 5] = ["geometry", "beams", "homogenise", "trabecula", "trabecula-py"];
 
 #[test]
 fn modules_import_from_lower_layers_only() {
