@@ -25,9 +25,12 @@ pub mod element;
 mod fields;
 mod lanes;
 mod material;
+mod moduli;
 mod multigrid;
 mod operator;
+mod percolation;
 mod solve;
 
 pub use cell::{Homogenised, VoxelCell};
 pub use material::{AXES, Material, Voigt, turned, voigt};
+pub use moduli::{Moduli, bounds, conductivity_bounds};

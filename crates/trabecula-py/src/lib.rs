@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod design;
+mod effective;
 mod error;
 mod file;
 mod folder;
@@ -45,6 +46,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::design::Design;
+    #[pymodule_export]
+    use crate::effective::Cell;
     #[pymodule_export]
     use crate::layers::Layers;
     #[pymodule_export]

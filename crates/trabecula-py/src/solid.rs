@@ -47,6 +47,16 @@ impl Solid {
         &self.built.solid
     }
 
+    /// What was built.
+    pub fn built(&self) -> &Built {
+        &self.built
+    }
+
+    /// The design as TOML text.
+    pub fn text(&self) -> &str {
+        &self.design
+    }
+
     /// The solved map of a lattice.
     fn solved(&self, lattice: &str) -> PyResult<&Phase> {
         let found = self.built.lattices.iter().find(|(name, _)| name == lattice);

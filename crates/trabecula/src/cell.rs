@@ -93,6 +93,11 @@ impl Cell {
         &self.plain
     }
 
+    /// Periods of the function along each edge of the cell: common factors of the indices of its waves.
+    pub fn repeats(&self) -> [i32; 3] {
+        self.repeats
+    }
+
     /// Least and greatest value of f on the torus: the extremes of a grid, improved by climbing from each.
     pub fn range(&self) -> Interval {
         *self.range.get_or_init(|| {

@@ -2,9 +2,11 @@
 //!
 //! A box is the intersection of six half-spaces, a sheet that of its two sides.
 
+use std::sync::Arc;
+
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
-use geometry::math::{Aabb, Interval, Vec3};
+use geometry::math::{Aabb, Interval, Mat3, Vec3, add, apply, spectral_norm, transpose};
 
 /// A CSG tree over numbered implicit surfaces. Negation is at the leaves alone.
 #[derive(Clone, Debug, PartialEq)]
@@ -285,5 +287,49 @@ impl Field for CsgSolid {
         for (i, o) in out.iter_mut().enumerate() {
             *o = self.tree.value(&|f| f64::from(each[f][i])).0 as f32;
         }
+    }
+}
+
+impl CsgSolid {
+    /// The same solid in other coordinates: position = `corner` + `edges` u (mm), the edges as columns.
+    pub fn in_frame(mut self, corner: Vec3, edges: Mat3) -> CsgSolid {
+        for surface in &mut self.surfaces {
+            surface.field = Arc::new(Framed { field: surface.field.clone(), corner, edges });
+            (surface.pair, surface.plane) = (None, None);
+            surface.lipschitz *= spectral_norm(&edges);
+        }
+        self
+    }
+}
+
+/// A field in other coordinates.
+struct Framed {
+    field: Arc<dyn Field>,
+    corner: Vec3,
+    edges: Mat3,
+}
+
+impl Framed {
+    fn place(&self, u: Vec3) -> Vec3 {
+        add(self.corner, apply(&self.edges, u))
+    }
+}
+
+impl Field for Framed {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let points: Vec<Vec3> = points.iter().map(|u| self.place(*u)).collect();
+        self.field.values(&points, out);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let points: Vec<Vec3> = points.iter().map(|u| self.place(*u)).collect();
+        self.field.gradients(&points, values, gradients);
+        let back = transpose(&self.edges);
+        gradients.iter_mut().for_each(|g| *g = apply(&back, *g));
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let corner = |i: usize| self.place([0, 1, 2].map(|a| if i >> a & 1 == 1 { b.max[a] } else { b.min[a] }));
+        self.field.bound(&(0..8).fold(Aabb::EMPTY, |all, i| all.with(corner(i))))
     }
 }

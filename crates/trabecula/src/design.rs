@@ -25,6 +25,7 @@ mod study_kind;
 mod surface_net;
 #[cfg(test)]
 mod tests;
+mod unit_cell;
 mod volume_error;
 mod warn;
 
@@ -35,6 +36,7 @@ use serde_json::Value as Json;
 
 use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
+use crate::effective::UnitCell;
 use crate::environment;
 use crate::extract::GridSurface;
 use crate::implicit::Implicit;
@@ -365,6 +367,14 @@ impl Built {
     /// Whether files of its mesh are to have no caps on the region's boundary.
     pub fn is_open(&self) -> bool {
         self.tilings.iter().any(|t| t.ends == Ends::Open)
+    }
+
+    /// The periodic cell of which the design's lattice or beams are made. The region, skin and kept zones are no part of it.
+    ///
+    /// # Errors
+    /// A design that has no such cell: several lattices, a map that is not affine, an amount that varies; at the key that is in the way.
+    pub fn unit_cell(&self, design: &Design, loader: &dyn Loader) -> Result<UnitCell, DesignError> {
+        unit_cell::of(self, design, loader).map_err(|e| design.located(e))
     }
 
     /// The transitions between the lattices of a blend; empty without one.

@@ -41,6 +41,7 @@ pub mod cell;
 mod coincident;
 pub mod csg_tree;
 pub mod design;
+pub mod effective;
 mod environment;
 pub mod extract;
 pub mod field;

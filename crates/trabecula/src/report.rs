@@ -2,6 +2,7 @@
 //! prints and the attributes of the Python classes, whose text is made from the comments here (`scripts/report_classes.py`).
 
 mod beams_report;
+mod cell_report;
 mod design_report;
 mod layers_report;
 mod mesh_report;
@@ -14,6 +15,7 @@ use serde_json::Value as Json;
 pub use beams_report::{
     BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
 };
+pub use cell_report::{CellGrid, ConductivityReport, StiffnessReport};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     PeriodReport, RbfReport, RegionReport, SingularLineReport, TransitionReport,
@@ -66,6 +68,8 @@ struct Reports {
     tets: TetMeshReport,
     step: StepReport,
     layers: LayersReport,
+    stiffness: StiffnessReport,
+    conductivity: ConductivityReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

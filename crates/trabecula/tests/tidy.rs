@@ -25,6 +25,7 @@ const LAYERS: &[&[&str]] = &[
     &["extract", "layers", "voxel_fractions"],
     &["analysis"],
     &["report"],
+    &["effective"],
     &["design"],
 ];
 

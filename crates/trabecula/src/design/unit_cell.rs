@@ -1,0 +1,134 @@
+//! The periodic cell of a design.
+
+use serde_json::json;
+
+use super::data::*;
+use super::{Built, Design, Loader};
+use crate::csg_tree::{CsgSolid, CsgTree};
+use crate::effective::UnitCell;
+use crate::environment::Environment;
+use crate::implicit::{Implicit, Surface};
+use crate::kind::DesignError;
+use crate::lattice::Lattice;
+use crate::map::{Affine, MapKind};
+use crate::region::{Cuboid, Region};
+use crate::truss::Beams;
+use geometry::math::{Aabb, Mat3, Vec3, add, apply, inverse, scale, transpose};
+use std::sync::Arc;
+
+/// Part of a cell by which the box that its beams are laid in is larger on each side.
+const MARGIN: f64 = 0.1;
+
+/// The cell of a design that has been built.
+pub(super) fn of(built: &Built, design: &Design, loader: &dyn Loader) -> Result<UnitCell, DesignError> {
+    if design.blend.is_some() {
+        let message = "a blend has no cell of its own: where the lattices mix, each place has another one. Take the figures of a \
+                       design with one of its lattices, at several fractions if they vary";
+        return Err(DesignError::new("blend", message));
+    }
+    if let [tiled, ..] = &built.tilings[..] {
+        let message = "a lattice over tetrahedra has no periodic cell; mesh a part of it for finite elements instead";
+        return Err(DesignError::new(format!("lattice.{}.map.tets", tiled.name), message));
+    }
+    match (&built.lattices[..], &built.beams[..]) {
+        ([(name, lattice)], []) => of_lattice(name, lattice),
+        ([], [(name, _)]) => of_beams(name, design, loader),
+        _ => Err(DesignError::new("lattice", "give one lattice, or one graph of beams")),
+    }
+}
+
+/// The corner at phase zero and the edges, as columns, of an affine map's cell with these periods along each.
+fn frame(map: &Affine, repeats: [i32; 3]) -> (Vec3, Mat3) {
+    let mut edges = inverse(&map.matrix);
+    let corner = scale(apply(&edges, map.shift), -1.0);
+    for row in &mut edges {
+        for (v, n) in row.iter_mut().zip(repeats) {
+            *v /= f64::from(n);
+        }
+    }
+    (corner, edges)
+}
+
+fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell, DesignError> {
+    let path = format!("lattice.{name}");
+    let Some(map) = lattice.map.affine() else {
+        let message = "cells differ from place to place under this map, and none is periodic; take map.affine with the wavelengths of \
+                       the place in question";
+        return Err(DesignError::new(format!("{path}.map"), message));
+    };
+    let Some(level) = lattice.uniform() else {
+        let message = "the amount varies from place to place, and no cell is periodic; take one number, and several designs (or \
+                       `trabecula law`) for the range";
+        return Err(DesignError::new(format!("{path}.level"), message));
+    };
+    let (corner, edges) = frame(map, lattice.cell.repeats());
+    let wall = match lattice.distance() {
+        Some(_) => Some(2.0 * level),
+        None => lattice.cell.thickness(lattice.part, level, &map.matrix),
+    };
+    let mut cell = pulled(path, lattice.clone(), corner, edges);
+    cell.fraction = Some(lattice.fraction(level));
+    cell.connected = Some(lattice.connected_fraction());
+    cell.wall = wall;
+    Ok(cell)
+}
+
+fn of_beams(name: &str, design: &Design, loader: &dyn Loader) -> Result<UnitCell, DesignError> {
+    let path = format!("beams.{name}");
+    let no = |key: &str, message: &str| Err(DesignError::new(format!("{path}{key}"), message));
+    let Some(spec) = design.beams.0.get(name) else { return no("", "no such beams") };
+    let GraphSpec::Cell(of) = &spec.graph else {
+        return no(
+            "",
+            "these beams are given one by one or by a program of repeats, without a periodic cell; give them by cell = \"octet\" (or \
+             another, see `trabecula cells --beams`) and map.affine",
+        );
+    };
+    for (key, grade) in [(".radius", &spec.radius), (".hub", &spec.hub)] {
+        if let Some(GradeSpec::Kind(_)) = grade {
+            return no(key, "it varies from place to place, and no cell is periodic; give one number");
+        }
+    }
+    if !matches!(of.map, MapKind::Affine(_) | MapKind::Spartan(_)) {
+        return no(".map", "cells differ from place to place under this map, and none is periodic; take map.affine");
+    }
+    let anywhere: Region = Arc::new(Cuboid::new([0.0; 3], [1.0; 3]).map_err(|f| DesignError::fault(&path, f))?);
+    let environment =
+        Environment { path: format!("{path}.map"), region: &anywhere, points: &[], filled: &[], loader };
+    let map = of.map.build(&environment)?;
+    let Some(map) = map.affine() else { return no(".map", "this map is not affine") };
+    let (corner, edges) = frame(map, [1; 3]);
+    // The same beams in a box about the cell, whatever the part.
+    let far = (0..8).map(|i| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 1.0 + MARGIN } else { -MARGIN }));
+    let bounds = far.fold(Aabb::EMPTY, |b, u| b.with(add(corner, apply(&edges, u))));
+    let mut alone = design.to_json();
+    if let Some(top) = alone.as_object_mut() {
+        top.retain(|key, _| ["schema", "units", "beams"].contains(&key.as_str()));
+        top.insert("region".into(), json!({"box": {"min": bounds.min, "max": bounds.max}}));
+    }
+    let built = Design::from_json(&alone.to_string())?.build(loader)?;
+    let Some((_, Beams::Truss(truss))) = built.beams.first() else { return no("", "no beams") };
+    let quadors = truss.quadors.clone();
+    let thin = (0..quadors.beams()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
+    let mut cell = pulled(path, quadors, corner, edges);
+    cell.wall = (thin < f64::INFINITY).then_some(2.0 * thin);
+    Ok(cell)
+}
+
+/// A periodic field in coordinates of its cell.
+fn pulled(path: String, field: Arc<dyn Implicit>, corner: Vec3, edges: Mat3) -> UnitCell {
+    let parts = match field.parts() {
+        parts if parts.is_empty() => vec![field],
+        parts => parts,
+    };
+    let surfaces: Vec<Surface> = parts.into_iter().map(Surface::smooth).collect();
+    let tree = CsgTree::Intersection((0..surfaces.len()).map(CsgTree::Leaf).collect());
+    UnitCell {
+        path,
+        solid: CsgSolid { surfaces, tree }.in_frame(corner, edges),
+        edges: transpose(&edges),
+        fraction: None,
+        connected: None,
+        wall: None,
+    }
+}

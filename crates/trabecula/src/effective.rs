@@ -1,0 +1,297 @@
+//! Effective figures of a periodic cell: its voxels, three grids of them, and what they tend to.
+
+mod limit;
+
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Mat3, Vec3, determinant, norm, transpose};
+use geometry::progress::{Progress, Stage, Stopped};
+use homogenise::{Homogenised, Material, Moduli, VoxelCell, Voigt, bounds, conductivity_bounds};
+use rayon::prelude::*;
+
+use crate::csg_tree::CsgSolid;
+use crate::field::Field;
+use crate::kind::Warning;
+use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
+use crate::voxel_fractions::{VoxelGrid, voxel_fractions};
+use limit::{Limit, limit};
+
+/// A periodic cell.
+pub struct UnitCell {
+    /// Its path in the design.
+    pub path: String,
+    /// The solid in coordinates of the cell, 0 to 1 along each edge.
+    pub solid: CsgSolid,
+    /// The edges, mm, one row each.
+    pub edges: Mat3,
+    /// The solid fraction, if it is known beforehand.
+    pub fraction: Option<f64>,
+    /// The intervals of fraction in which the solid is one piece in space, if they are known.
+    pub connected: Option<Vec<[f64; 2]>>,
+    /// The thinnest wall or neck, mm.
+    pub wall: Option<f64>,
+}
+
+/// How the voxels of a cell are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Voxels along the edge of a cube of the cell's volume.
+    pub n: usize,
+    /// Whether a voxel is solid if its centre is, without fractions.
+    pub plain: bool,
+}
+
+/// Least number of voxels along an edge.
+const LEAST: usize = 8;
+/// Relative residual to which systems are solved.
+const TOLERANCE: f64 = 1e-8;
+/// Voxels across a wall below which the figures are to be doubted.
+const ACROSS: f64 = 3.0;
+
+impl UnitCell {
+    /// The shapes of the grids: n, and a half and a quarter of it where that is enough.
+    fn shapes(&self, n: usize) -> Vec<[usize; 3]> {
+        let lengths = self.edges.map(norm);
+        let mean = lengths.iter().product::<f64>().cbrt();
+        let equal = lengths.iter().all(|l| (l / mean - 1.0).abs() < 1e-9);
+        let first = match equal {
+            true => [n; 3],
+            // Multiples of four, so that the coarser grids have the same proportions.
+            false => lengths.map(|l| 4 * ((n as f64 * l / mean / 4.0).round() as usize).max(2)),
+        };
+        let coarser = [2, 4].map(|by| first.map(|m| m.div_ceil(by)));
+        let mut all = vec![first];
+        all.extend(coarser.into_iter().filter(|s| s.iter().all(|m| *m >= 4)));
+        all
+    }
+
+    /// The voxels of a grid.
+    fn voxels(&self, shape: [usize; 3], plain: bool, progress: &dyn Progress) -> Result<VoxelCell, Stopped> {
+        let step = shape.map(|n| 1.0 / n as f64);
+        let fractions = if plain {
+            self.centres(shape, progress)?
+        } else {
+            voxel_fractions(&self.solid, &VoxelGrid { origin: [0.0; 3], step, shape }, progress)?
+        };
+        VoxelCell::new(shape, transpose(&self.edges), fractions).map_err(Stopped::Refused)
+    }
+
+    /// One where the centre of a voxel is solid.
+    fn centres(&self, shape: [usize; 3], progress: &dyn Progress) -> Result<Vec<f64>, Stopped> {
+        let [nx, ny, nz] = shape;
+        let mut out = vec![0.0; nx * ny * nz];
+        out.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
+            let at = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+            let points: Vec<Vec3> = (0..nx).map(|x| [at(x, nx), at(row % ny, ny), at(row / ny, nz)]).collect();
+            self.solid.values(&points, out);
+            out.iter_mut().for_each(|v| *v = f64::from(u8::from(*v <= 0.0)));
+        });
+        if progress.step(1, 1) { Ok(out) } else { Err(Stopped::Interrupted) }
+    }
+
+    /// Refuses numbers of voxels that are too few.
+    fn check(&self, n: usize) -> Result<(), Stopped> {
+        if n < LEAST {
+            let message = format!("n is {n}; at least {LEAST} voxels along an edge are needed");
+            return Err(Stopped::Refused(Fault::new("n", message)));
+        }
+        Ok(())
+    }
+
+    /// Whether the solid is known to be in pieces, and the fractions at which it is not.
+    fn apart(&self) -> Option<String> {
+        let (fraction, connected) = (self.fraction?, self.connected.as_ref()?);
+        if connected.iter().any(|[a, b]| fraction >= a - 1e-9 && fraction <= b + 1e-9) {
+            return None;
+        }
+        let listed: Vec<String> = connected.iter().map(|[a, b]| format!("from {a:.4} to {b:.4}")).collect();
+        Some(match listed.is_empty() {
+            true => "; it holds together at no fraction".into(),
+            false => format!("; it is one piece {}", listed.join(" and ")),
+        })
+    }
+
+    /// Voxels across the thinnest wall, and a warning if these are few.
+    fn across(&self, shape: [usize; 3], n: usize, warnings: &mut Vec<Warning>) -> Option<f64> {
+        let edges = [0, 1, 2].map(|a| norm(self.edges[a]) / shape[a] as f64);
+        let across = self.wall? / edges.into_iter().fold(0.0, f64::max);
+        if across < ACROSS {
+            let need = 8 * ((n as f64 * ACROSS / across / 8.0).ceil() as usize);
+            let message = format!(
+                "the thinnest wall is {across:.1} voxels across; below {ACROSS} the figures are too high by more than the error says: \
+                 take n = {need}"
+            );
+            warnings.push(Warning { path: self.path.clone(), message });
+        }
+        Some(across)
+    }
+
+    /// The tensor on each grid, the finest first.
+    fn on_grids<T: Copy>(
+        &self,
+        resolution: Resolution,
+        progress: &dyn Progress,
+        solve: &dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, Stopped>,
+    ) -> Result<Vec<(VoxelCell, Homogenised<T>)>, Stopped> {
+        let shapes = self.shapes(resolution.n);
+        let total: f64 = shapes.iter().map(work).sum();
+        let (mut made, mut done) = (Vec::new(), 0.0);
+        // The coarse ones first: a cell that cannot be solved is found out soon.
+        for shape in shapes.iter().rev() {
+            let share = |of: f64| (done + of * work(shape)) / total;
+            let sampling = Stage { whole: progress, from: share(0.0), to: share(0.15) };
+            let voxels = self.voxels(*shape, resolution.plain, &sampling)?;
+            let solving = Stage { whole: progress, from: share(0.15), to: share(1.0) };
+            let found = solve(&voxels, &solving)?;
+            made.push((voxels, found));
+            done += work(shape);
+        }
+        made.reverse();
+        Ok(made)
+    }
+
+    /// The effective stiffness.
+    ///
+    /// # Errors
+    /// A solid that is not connected; too few voxels; an interruption.
+    pub fn stiffness(
+        &self,
+        material: &Material,
+        resolution: Resolution,
+        progress: &dyn Progress,
+    ) -> Result<StiffnessReport, Stopped> {
+        self.check(resolution.n)?;
+        let apart = |why: &str| {
+            let message = format!(
+                "at a solid fraction of {:.4} the cell falls apart and carries no load{why}",
+                self.fraction.unwrap_or_default()
+            );
+            Stopped::Refused(Fault::new(&format!("{}.level", self.path), message))
+        };
+        if let Some(why) = self.apart() {
+            return Err(apart(&why));
+        }
+        let made = self.on_grids(resolution, progress, &|voxels, progress| {
+            if voxels.endless_directions(0.0) == 0 {
+                let message = "the solid is in pieces that do not touch, and carries no load; take thicker beams or a greater fraction";
+                return Err(Stopped::Refused(Fault::new(&self.path, message)));
+            }
+            voxels.stiffness(material, TOLERANCE, progress)
+        })?;
+        let grids: Vec<([usize; 3], Vec<f64>)> =
+            made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
+        let Limit { tensor, error, order } = limit(&grids);
+        let c: Voigt = std::array::from_fn(|i| std::array::from_fn(|j| tensor[6 * i + j]));
+        let (finest, found) = &made[0];
+        let fraction = self.fraction.unwrap_or_else(|| finest.fraction());
+        let mut warnings = Vec::new();
+        let wall_voxels = self.across(finest.shape, resolution.n, &mut warnings);
+        let moduli = Moduli::of(&c);
+        if moduli.is_none() {
+            let message = "the cell resists some strain not at all: no moduli";
+            warnings.push(Warning { path: self.path.clone(), message: message.into() });
+        }
+        let limits = material.isotropic.map(|[k, g]| bounds(k, g, fraction));
+        Ok(StiffnessReport {
+            C: c,
+            C_n: found.tensor,
+            n: resolution.n,
+            error,
+            order,
+            residual: made.iter().map(|m| m.1.residual).fold(0.0, f64::max),
+            iterations: found.iterations,
+            E: moduli.map(|m| m.young),
+            G: moduli.map(|m| m.shear),
+            nu: moduli.map(|m| m.poisson),
+            zener: moduli.map(|m| m.zener),
+            anisotropy: moduli.map(|m| m.universal),
+            bulk: moduli.map(|m| m.bulk),
+            bulk_bounds: limits.map(|[k, _]| [0.0, k]),
+            shear: moduli.map(|m| m.hill_shear),
+            shear_bounds: limits.map(|[_, g]| [0.0, g]),
+            fraction,
+            edges: self.edges,
+            wall_voxels,
+            grids: made.iter().map(|(v, m)| grid(v, &m.tensor)).collect(),
+            warnings,
+        })
+    }
+
+    /// The effective conductivity, where the pore conducts `pore` times as well as the solid.
+    ///
+    /// # Errors
+    /// A ratio that is negative or not finite; too few voxels; an interruption.
+    pub fn conductivity(
+        &self,
+        pore: f64,
+        resolution: Resolution,
+        progress: &dyn Progress,
+    ) -> Result<ConductivityReport, Stopped> {
+        self.check(resolution.n)?;
+        if !(pore >= 0.0 && pore.is_finite()) {
+            let message = format!("pore is {pore}; the pore's conductivity relative to the solid's is a finite number of at least 0");
+            return Err(Stopped::Refused(Fault::new("pore", message)));
+        }
+        let mut warnings = Vec::new();
+        let known = self.apart().filter(|_| pore == 0.0);
+        let made = self.on_grids(resolution, progress, &|voxels, progress| {
+            let least = if known.is_some() { 0.5 } else { 0.0 };
+            if pore == 0.0 && voxels.endless_directions(least) == 0 {
+                return Ok(Homogenised { tensor: [[0.0; 3]; 3], residual: 0.0, iterations: 0, cases: 0 });
+            }
+            voxels.conductivity(pore, TOLERANCE, progress)
+        })?;
+        let grids: Vec<([usize; 3], Vec<f64>)> =
+            made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
+        let Limit { tensor, error, order } = limit(&grids);
+        let (finest, found) = &made[0];
+        if pore == 0.0 && (known.is_some() || tensor.iter().all(|v| *v == 0.0)) {
+            let message = format!(
+                "the solid is not one piece in space, and conducts nothing in directions in which none goes through{}",
+                known.unwrap_or_default()
+            );
+            warnings.push(Warning { path: self.path.clone(), message });
+        }
+        let fraction = self.fraction.unwrap_or_else(|| finest.fraction());
+        Ok(ConductivityReport {
+            k: std::array::from_fn(|i| std::array::from_fn(|j| tensor[3 * i + j])),
+            k_n: found.tensor,
+            n: resolution.n,
+            error,
+            order,
+            residual: made.iter().map(|m| m.1.residual).fold(0.0, f64::max),
+            iterations: found.iterations,
+            bounds: conductivity_bounds(fraction, pore),
+            pore,
+            fraction,
+            edges: self.edges,
+            wall_voxels: self.across(finest.shape, resolution.n, &mut warnings),
+            grids: made.iter().map(|(v, m)| grid(v, &m.tensor)).collect(),
+            warnings,
+        })
+    }
+
+    /// The volume of the cell, mm³.
+    pub fn volume(&self) -> f64 {
+        determinant(&self.edges).abs()
+    }
+
+    /// The bounds of the cell about its own corner, mm.
+    pub fn bounds(&self) -> Aabb {
+        let corner = |i: usize| {
+            (0..3).filter(|a| i >> a & 1 == 1).fold([0.0; 3], |p, a| geometry::math::add(p, self.edges[a]))
+        };
+        (0..8).fold(Aabb::EMPTY, |b, i| b.with(corner(i)))
+    }
+}
+
+fn work(shape: &[usize; 3]) -> f64 {
+    shape.iter().product::<usize>() as f64
+}
+
+fn grid<const N: usize>(voxels: &VoxelCell, tensor: &[[f64; N]; N]) -> CellGrid {
+    CellGrid {
+        shape: voxels.shape,
+        fraction: voxels.fraction(),
+        tensor: tensor.iter().map(|row| row.to_vec()).collect(),
+    }
+}
