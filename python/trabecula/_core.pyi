@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .reports import (
+    ConductivityReport,
     DanglingReport,
     DesignReport,
     EstimateReport,
@@ -17,6 +18,7 @@ from .reports import (
     SimplifyReport,
     SmoothReport,
     StepReport,
+    StiffnessReport,
     SurfaceReport,
     TetMeshReport,
     ThicknessReport,
@@ -90,6 +92,22 @@ class Layers:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> LayersReport: ...
+
+class Cell:
+    @staticmethod
+    def of(solid: Solid, folder: str | PathLike[str]) -> Cell: ...
+    @property
+    def edges(self) -> list[list[float]]: ...
+    @property
+    def volume(self) -> float: ...
+    def stiffness(
+        self,
+        grid: tuple[int, bool],
+        isotropic: tuple[float, float],
+        general: list[list[float]] | None,
+        work: tuple[int | None, Any],
+    ) -> StiffnessReport: ...
+    def conductivity(self, grid: tuple[int, bool], pore: float, work: tuple[int | None, Any]) -> ConductivityReport: ...
 
 class Solid:
     @property

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 
 from .formats import (
+    CONDUCTIVITY_WRITES,
     DESIGNS,
     LAYER_WRITES,
     MESH_READS,
@@ -16,6 +17,7 @@ from .formats import (
     MESHES,
     STDIN,
     STEP_WRITES,
+    STIFFNESS_WRITES,
     SWEEP_WRITES,
     TET_READS,
     TET_WRITES,
@@ -74,6 +76,10 @@ LENGTH = number("a length in mm", lambda v: v > 0, " greater than 0")
 SAMPLES = number("a number", lambda v: v >= 2, " of at least 2")
 ANGLE = number("degrees")
 COUNT = number("a whole number", lambda v: 1 <= v <= 4096, " from 1 to 4096", int)
+MODULUS = number("Young's modulus", lambda v: v > 0, " greater than 0")
+NUMBER = number("a number")
+SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")
+VOXELS = number("a whole number", lambda v: 8 <= v <= 4096, " from 8 to 4096", int)
 #: A closed mesh has at least 4 triangles.
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
@@ -150,6 +156,16 @@ def spacing(word: str = "--edge", *more):
     )
     text = "grid spacing as the smallest wavelength / N"
     return [edge, option("--per-cell", type=SAMPLES, metavar="N", help=text), *more]
+
+
+def of_cell(known: tuple[str, ...]):
+    """The options of what is found of a periodic cell."""
+    return (
+        option("-o", "--output", nargs="+", type=ending(known), metavar="OUT", help=f"files to write ({dotted(known)})"),
+        option("--n", type=VOXELS, default=64, metavar="N", help="voxels along the cell's edge (default: 64)"),
+        option("--voxels", action="store_true", help="plain voxels: solid if the centre is, without fractions"),
+        *(THREADS, PROGRESS, JSON, *NOTICES),
+    )
 
 
 #: The mesh formats that are written, each with what is particular to it.
@@ -391,6 +407,25 @@ COMMANDS = {
         option("--tet", action="store_true", help="the ready tetrahedral cells instead, for maps over tetrahedra"),
         option("--beams", action="store_true", help="the unit cells of beams instead: group, nodes, valence, Maxwell count"),
         JSON,
+    ),
+    "stiffness": (
+        "Find how stiff the periodic cell of a design is, in every direction, and how sure that is.",
+        "The cell is that of one lattice under map.affine at one level, or of beams by a unit cell; the region plays no part.\n"
+        "C is the limit of three grids, n, n/2 and n/4 voxels along the cell, each voxel by its exact solid fraction.\n"
+        "OUT: .csv, all entries; .png, .ply, .vtu, the surface of Young's modulus by direction; .inp (Abaqus, CalculiX),\n"
+        ".bdf (Nastran), .mac (Ansys), material cards. Several may be named.\n\n"
+        "examples:\n  trabecula stiffness part.toml --E 114000 --nu 0.34\n"
+        "  trabecula stiffness part.toml --json --n 96\n  trabecula stiffness part.toml -o cell.inp modulus.png",
+        *(DESIGN, *of_cell(STIFFNESS_WRITES)),
+        option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid (default: 1)"),
+        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
+    ),
+    "conductivity": (
+        "Find how well the periodic cell of a design conducts heat or electricity, relative to its solid.",
+        "As `stiffness`. With --pore the pore conducts too, this many times as well as the solid.\n\n"
+        "examples:\n  trabecula conductivity part.toml\n  trabecula conductivity part.toml --pore 0.026 --json",
+        *(DESIGN, *of_cell(CONDUCTIVITY_WRITES)),
+        option("--pore", type=SHARE, default=0.0, metavar="K", help="conductivity of the pore by the solid's (default: 0)"),
     ),
     "doctor": (
         "Say what is installed, and what is missing: versions, processors, memory, extras.",

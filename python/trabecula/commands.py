@@ -22,19 +22,8 @@ from .terminal import Progress, figure, say, settle, warn, warned
 from .texts import counted, table, voids
 
 __all__ = [
-    "cells",
-    "check",
-    "doctor",
-    "measure",
-    "mesh",
-    "new",
-    "render",
-    "schema",
-    "simplify",
-    "slice",
-    "sweep",
-    "tets",
-    "voxels",
+    *("cells", "check", "conductivity", "doctor", "measure", "mesh", "new"),
+    *("render", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
 ]
 
 
@@ -568,6 +557,28 @@ def cells(args) -> None:
 
 
 # --- what they share -------------------------------------------------------------------------------------------------
+
+
+def stiffness(args) -> None:
+    """``trabecula stiffness``."""
+    of_cell(args)
+
+
+def conductivity(args) -> None:
+    """``trabecula conductivity``."""
+    of_cell(args)
+
+
+def of_cell(args) -> None:
+    """A figure of the periodic cell, by the name of the command."""
+    import numpy  # noqa: F401  wanted later; see `terminal` for why no import waits until then
+
+    from . import effective
+
+    found = getattr(effective, args.command)(args)
+    if args.json:
+        return put_json(found.to_dict())
+    print("\n".join(effective.LINES[args.command](found)))
 
 
 def doctor(args) -> None:

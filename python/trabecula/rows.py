@@ -106,5 +106,19 @@ def named(pattern: str, number: int) -> str:
     return pattern.replace("{design}", f"{number:06d}")
 
 
+def _stiffness(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The 21 constants, Young's moduli, Zener's ratio and the relative error."""
+    found = solid.stiffness(**settings)
+    made = {f"C{i + 1}{j + 1}": found.C[i][j] for i in range(6) for j in range(i, 6)}
+    made |= {f"E{i + 1}": None if found.E is None else found.E[i] for i in range(3)}
+    return made | {"zener": found.zener, "C_error": found.error}
+
+
+def _conductivity(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The six entries and their relative error."""
+    found = solid.conductivity(**settings)
+    return {f"k{i + 1}{j + 1}": found.k[i][j] for i in range(3) for j in range(i, 3)} | {"k_error": found.error}
+
+
 #: Properties that can be asked for: functions of a solid and their settings, to columns.
-PROPERTIES: dict[str, Any] = {}
+PROPERTIES: dict[str, Any] = {"conductivity": _conductivity, "stiffness": _stiffness}

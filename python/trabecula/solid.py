@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from .islands import Islands
     from .reports import (
+        ConductivityReport,
         DanglingReport,
         DesignReport,
         EstimateReport,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
         QualityReport,
         RepairReport,
         StepReport,
+        StiffnessReport,
         SurfaceReport,
     )
 
@@ -54,6 +56,8 @@ MOST_STEPS, MOST_CELLS = 4e6, 2e12
 TRIANGLE = 2 * (12 + 12)
 #: Bytes for each triangle of the temporary files of vertices and triangles.
 SPOOLED = 24
+#: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
+STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
@@ -608,6 +612,55 @@ class Solid(Seen):
         wanted = None if step is None else positive("step", step)
         return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
 
+    @cached_property
+    def _cell(self) -> _core.Cell:
+        """The periodic cell of its lattice or beams. A DesignError where there is none."""
+        return _core.Cell.of(self._core, self._folder or os.getcwd())
+
+    def stiffness(
+        self,
+        n: int = 64,
+        E: float = 1.0,
+        nu: float = 0.3,
+        C: ArrayLike | None = None,
+        voxels: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> StiffnessReport:
+        """The effective stiffness of the periodic cell, of a solid of Young's modulus ``E`` and Poisson's ratio ``nu``, or of a
+        stiffness ``C`` (6, 6): stress = C strain in Voigt's order 11 22 33 23 13 12 with engineering shears, world axes, in
+        the unit of E; with Young's and shear moduli, anisotropy, bounds, and how sure it is.
+
+        The cell is that of one lattice under an affine map at one level, or of beams by a unit cell; the region plays no
+        part. Trilinear finite elements on ``n`` voxels along its edge, weighted by the exact solid fraction of each
+        (``voxels``: solid or not by their centres), on n/2 and n/4 too, and the limit of the three.
+
+        Raises DesignError for a design without such a cell, ValueError for a cell that falls apart, for ``n`` below 8 or beyond
+        the memory there is, and for a solid that is none.
+        """
+        import numpy as np
+
+        given = None if C is None else np.asarray(C, dtype=float)
+        if given is not None and given.shape != (6, 6):
+            raise ValueError(f"expected C of shape (6, 6), found {given.shape}")
+        grid = _voxels(n, STIFFNESS_BYTES), voxels
+        solid = number("E", E), number("nu", nu)
+        return self._cell.stiffness(grid, solid, None if given is None else given.tolist(), (_threads(threads), progress))
+
+    def conductivity(
+        self,
+        n: int = 64,
+        pore: float = 0.0,
+        voxels: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> ConductivityReport:
+        """The effective conductivity of the periodic cell, (3, 3) relative to the solid's, where the ``pore`` conducts this
+        many times as well as the solid; for heat, electricity and diffusion alike. Else as ``stiffness``.
+        """
+        grid = _voxels(n, CONDUCTIVITY_BYTES), voxels
+        return self._cell.conductivity(grid, number("pore", pore), (_threads(threads), progress))
+
     def _picture(self) -> Mesh:
         low, high = self.bounds
         return self.mesh(edge=max(self.wavelength / 20, max(b - a for a, b in zip(low, high, strict=True)) / 160))
@@ -615,6 +668,13 @@ class Solid(Seen):
 
 def _a(word: str) -> str:
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
+
+
+def _voxels(n: int, each: float) -> int:
+    """A number of voxels along an edge that fits the memory, at ``each`` bytes a voxel."""
+    n = whole("n", n, 8, 4096)
+    fits(each * n**3, f"{n} x {n} x {n} voxels")
+    return n
 
 
 def _threads(threads: int | None) -> int | None:

@@ -1,0 +1,143 @@
+"""``trabecula stiffness`` and ``trabecula conductivity``: the figures of a design's periodic cell, printed and written."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+
+from .cards import CARDS
+from .files import check_place, whole_file
+from .formats import kind_of
+from .inputs import build, keep_file
+from .moduli import SURFACE_WRITES, write_surface
+from .reports import ConductivityReport, StiffnessReport
+from .terminal import Progress, figure, say, warn
+
+__all__ = ["LINES", "conductivity", "stiffness"]
+
+#: The pairs of axes in Voigt's order.
+AXES = ("11", "22", "33", "23", "13", "12")
+
+
+def stiffness(args) -> StiffnessReport:
+    """The stiffness that is asked for; written where a file is named."""
+    solid = placed(args)
+    with Progress("stiffness", args.progress) as progress:
+        found = solid.stiffness(args.n, args.E, args.nu, None, args.voxels, args.threads, progress)
+    for name in args.output or ():
+        kind = kind_of(name)
+        if kind in SURFACE_WRITES:
+            write_surface(name, found.C)
+        else:
+            title = (
+                f"effective stiffness of {args.design}, solid E = {args.E:g}, nu = {args.nu:g}, fraction {found.fraction:.6g}"
+            )
+            written(name, CARDS[kind](found, title) if kind in CARDS else table(found.C, AXES, found.C_n))
+    told(found, args)
+    return found
+
+
+def conductivity(args) -> ConductivityReport:
+    """The conductivity that is asked for; written where a file is named."""
+    solid = placed(args)
+    with Progress("conductivity", args.progress) as progress:
+        found = solid.conductivity(args.n, args.pore, args.voxels, args.threads, progress)
+    for name in args.output or ():
+        written(name, table(found.k, "123", found.k_n))
+    told(found, args)
+    return found
+
+
+def placed(args):
+    """The solid of the design, after the outputs' places have been checked."""
+    for name in args.output or ():
+        check_place(name)
+        keep_file(args.design, name)
+    return build(args.design, tell=not args.json)
+
+
+def told(found: StiffnessReport | ConductivityReport, args) -> None:
+    """Says warnings and what was written."""
+    for warning in found.warnings:
+        warn(warning["message"], warning["path"], not args.json)
+    for name in args.output or ():
+        say(f"{name}: written")
+
+
+def written(name: str, text: str) -> None:
+    """Writes a text."""
+    with whole_file(name) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+        out.write(text)
+
+
+def table(limit: Sequence[Sequence[float]], names: Sequence[str], finest: Sequence[Sequence[float]]) -> str:
+    """The tensor and that of the finest grid as CSV: a row for each entry."""
+    import io
+
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["row", "column", "limit", "at_n"])
+    for i, a in enumerate(names):
+        writer.writerows([a, b, limit[i][j], finest[i][j]] for j, b in enumerate(names))
+    return out.getvalue()
+
+
+def matrix(rows: Sequence[Sequence[float]], names: Sequence[str]) -> list[str]:
+    """A matrix in lines, its entries to six digits of the largest."""
+    largest = max(abs(v) for row in rows for v in row) or 1.0
+    texts = [[figure(v) if abs(v) > 1e-6 * largest else "0" for v in row] for row in rows]
+    wide = max(len(text) for row in texts for text in row)
+    return ["    " + " ".join(name.rjust(wide) for name in names)] + [
+        f"{name:>3} " + " ".join(text.rjust(wide) for text in row) for name, row in zip(names, texts, strict=True)
+    ]
+
+
+def ranged(bounds: Sequence[float] | None) -> str:
+    """Bounds in words."""
+    return "" if bounds is None else f" (Hashin-Shtrikman {figure(bounds[0])} to {figure(bounds[1])})"
+
+
+def accuracy(found: StiffnessReport | ConductivityReport, size: str) -> list[str]:
+    """How the figures were found, and how sure they are."""
+    grids = ", ".join(" x ".join(map(str, g.shape)) for g in found.grids)
+    walls = "" if found.wall_voxels is None else f"; {found.wall_voxels:.3g} voxels across the thinnest wall"
+    return [
+        f"fraction   {found.fraction:.6f}",
+        f"accuracy   at n = {found.n} {size} is {100 * found.error:.2g} % off the limit given; grids of {grids}",
+        f"solved     to a relative residual of {found.residual:.1e} in at most {found.iterations} iterations{walls}",
+    ]
+
+
+def lines_of_stiffness(found: StiffnessReport) -> list[str]:
+    """The figures for people."""
+    lines = ["C, Voigt's order 11 22 33 23 13 12, engineering shears:", *matrix(found.C, AXES)]
+
+    def three(word: str, values: Sequence[float] | None, axes: Sequence[str]) -> None:
+        if values is not None:
+            lines.append(f"{word:<11}" + "  ".join(f"{a}: {figure(v)}" for a, v in zip(axes, values, strict=True)))
+
+    three("E", found.E, ("1", "2", "3"))
+    three("G", found.G, AXES[3:])
+    three("nu", found.nu, AXES[3:])
+    rest: list[tuple[str, float | None, str]] = [
+        ("bulk", found.bulk, ranged(found.bulk_bounds)),
+        ("shear", found.shear, ", mean over orientations" + ranged(found.shear_bounds)),
+        ("zener", found.zener, ""),
+        ("anisotropy", found.anisotropy, ", universal; 0 is isotropic"),
+    ]
+    lines += [f"{word:<11}{figure(v)}{more}" for word, v, more in rest if v is not None]
+    return lines + accuracy(found, "C")
+
+
+def lines_of_conductivity(found: ConductivityReport) -> list[str]:
+    """The figures for people."""
+    mean = sum(found.k[i][i] for i in range(3)) / 3
+    lines = ["k, relative to the solid's:", *matrix(found.k, "123")]
+    return [*lines, f"mean       {figure(mean)}{ranged(found.bounds)}", *accuracy(found, "k")]
+
+
+#: What a command prints of a report.
+LINES: dict[str, Callable[..., list[str]]] = {
+    "stiffness": lines_of_stiffness,
+    "conductivity": lines_of_conductivity,
+}
