@@ -9,7 +9,9 @@ from .record import Report
 __all__ = [
     "BeamsReport",
     "BlendReport",
+    "CellGrid",
     "CleanedReport",
+    "ConductivityReport",
     "Creases",
     "DanglingReport",
     "DesignReport",
@@ -40,6 +42,7 @@ __all__ = [
     "SmoothReport",
     "SpecificSurface",
     "StepReport",
+    "StiffnessReport",
     "SurfaceReport",
     "TetMeshReport",
     "TetQualityReport",
@@ -142,6 +145,17 @@ class BlendReport(Report):
     """Width of the narrowest transition, mm."""
 
 
+class CellGrid(Report):
+    """The tensor on one of the grids from which a limit was found."""
+
+    fraction: float
+    """Mean of the solid fractions of the voxels."""
+    shape: list[int]
+    """Voxels along each edge of the cell."""
+    tensor: list[list[float]]
+    """The tensor on this grid."""
+
+
 class CleanedReport(Report):
     """Nodes and struts left out before beams are made."""
 
@@ -155,6 +169,44 @@ class CleanedReport(Report):
     """Nodes merged into another at the same position."""
     zero_length: int
     """Struts of zero length."""
+
+
+class ConductivityReport(Report):
+    """Effective conductivity of a periodic cell, in world axes, relative to the solid's."""
+
+    _parts = {
+        "grids": "CellGrid",
+        "warnings": "WarningReport",
+    }
+
+    bounds: list[float]
+    """Hashin's and Shtrikman's bounds of the mean conductivity."""
+    edges: list[list[float]]
+    """Edges of the cell, mm, one row each."""
+    error: float
+    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm)."""
+    fraction: float
+    """Solid fraction of the cell."""
+    grids: list[CellGrid]
+    """The grids."""
+    iterations: int
+    """Most iterations of a load case."""
+    k: list[list[float]]
+    """Conductivity, extrapolated to infinitely many voxels: 3 × 3."""
+    k_n: list[list[float]]
+    """Conductivity at n voxels."""
+    n: int
+    """Voxels along the edge of the cell, or of a cube of its volume."""
+    order: float
+    """Exponent of the voxel's edge with which the error was taken to fall."""
+    pore: float
+    """Conductivity of the pore relative to the solid's."""
+    residual: float
+    """Greatest relative residual of the load cases."""
+    wall_voxels: float | None
+    """Voxels across the thinnest wall or neck; None if not known."""
+    warnings: list[WarningReport]
+    """Possible mistakes."""
 
 
 class Creases(Report):
@@ -692,6 +744,59 @@ class StepReport(Report):
     """Number of vertices."""
     volume: float
     """Enclosed volume, mm³, to 1e-10."""
+
+
+class StiffnessReport(Report):
+    """Effective stiffness of a periodic cell, in world axes; moduli in the unit of E. Voigt's order 11 22 33 23 13 12,
+    engineering shears."""
+
+    _parts = {
+        "grids": "CellGrid",
+        "warnings": "WarningReport",
+    }
+
+    C: list[list[float]]
+    """Stiffness, extrapolated to infinitely many voxels: stress = C strain, 6 × 6."""
+    C_n: list[list[float]]
+    """Stiffness at n voxels."""
+    E: list[float] | None
+    """Young's moduli along the axes; None where the cell resists some strain not at all."""
+    G: list[float] | None
+    """Shear moduli of the planes 23, 13, 12."""
+    anisotropy: float | None
+    """Universal anisotropy 5 G_V / G_R + K_V / K_R - 6; 0 is isotropic."""
+    bulk: float | None
+    """Bulk modulus: pressure over relative change of volume."""
+    bulk_bounds: list[float] | None
+    """Hashin's and Shtrikman's bounds of the bulk modulus; None unless the solid is isotropic."""
+    edges: list[list[float]]
+    """Edges of the cell, mm, one row each."""
+    error: float
+    """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm)."""
+    fraction: float
+    """Solid fraction of the cell."""
+    grids: list[CellGrid]
+    """The grids."""
+    iterations: int
+    """Most iterations of a load case."""
+    n: int
+    """Voxels along the edge of the cell, or of a cube of its volume."""
+    nu: list[float] | None
+    """Poisson's ratios 23, 13, 12: contraction along the second axis under tension along the first."""
+    order: float
+    """Exponent of the voxel's edge with which the error was taken to fall."""
+    residual: float
+    """Greatest relative residual of the load cases."""
+    shear: float | None
+    """Mean of Voigt's and Reuss's shear moduli over all orientations."""
+    shear_bounds: list[float] | None
+    """Hashin's and Shtrikman's bounds of the shear modulus of an isotropic cell; None unless the solid is isotropic."""
+    wall_voxels: float | None
+    """Voxels across the thinnest wall or neck; None if not known."""
+    warnings: list[WarningReport]
+    """Possible mistakes."""
+    zener: float | None
+    """Zener's ratio 2 C44 / (C11 - C12) of means over the axes; 1 is isotropic."""
 
 
 class SurfaceReport(Report):

@@ -1,0 +1,244 @@
+"""Stiffness and conductivity of cells: published values, another discretisation, closed forms, bounds, files and mistakes."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import trabecula as lt
+from conftest import command, in_process
+from trabecula import level, map, region
+from trabecula.cards import abaqus, ansys, nastran
+from trabecula.moduli import modulus, sphere, surface
+
+#: Homogenised at E = 1, nu = 0.3 by an independent program: C11, C12, C44.
+TABLE = [
+    ("gyroid", "sheet", 0.2, (0.1009, 0.0473, 0.0298)),
+    ("gyroid", "sheet", 0.3, (0.1620, 0.0722, 0.0511)),
+    ("diamond", "sheet", 0.3, (0.1765, 0.0657, 0.0460)),
+    ("primitive", "sheet", 0.3, (0.1462, 0.0819, 0.0651)),
+    ("gyroid", "lower", 0.3, (0.1041, 0.0516, 0.0432)),
+    ("diamond", "lower", 0.4, (0.1658, 0.0774, 0.0829)),
+]
+
+
+def solid(cell: str = "gyroid", part: str = "sheet", fraction: float = 0.3, **more) -> lt.Solid:
+    lattice = lt.Lattice(cell, part, map.affine(**({"wavelength": 4} | more)), level.fraction(fraction))
+    return lt.Design(region.box(size=[8, 8, 8]), lattice).build()
+
+
+@pytest.mark.parametrize(("cell", "part", "fraction", "wanted"), TABLE)
+def test_cells_are_as_stiff_as_an_independent_program_found(cell: str, part: str, fraction: float, wanted: tuple):
+    found = solid(cell, part, fraction).stiffness(n=48)
+    values = found.C[0][0], found.C[0][1], found.C[3][3]
+    # The table has four digits of a computation of its own, good to about a hundredth.
+    assert values == pytest.approx(wanted, rel=0.02)
+    assert found.error < 0.01 and found.fraction == pytest.approx(fraction, abs=2e-5)  # tables of levels
+    assert found.zener == pytest.approx(2 * values[2] / (values[0] - values[1]), rel=1e-6)
+    assert found.bulk_bounds[0] <= found.bulk <= found.bulk_bounds[1]
+
+
+def test_a_sheet_conducts_as_an_independent_program_found():
+    found = solid().conductivity(n=48)
+    assert found.k[0][0] == pytest.approx(0.2078, rel=0.01)
+    assert found.bounds[1] == pytest.approx(2 * 0.3 / 2.7, rel=1e-4) and found.k[0][0] < found.bounds[1]
+    both = solid().conductivity(n=32, pore=1.0)
+    assert np.allclose(both.k, np.eye(3), atol=1e-9)
+
+
+def by_elements(fractions: np.ndarray, conductivity: bool = False) -> np.ndarray:
+    """The effective tensor of a cube of voxels by assembled trilinear elements with 2 x 2 x 2 Gauss points, solved directly."""
+    sparse = pytest.importorskip("scipy.sparse")
+    from scipy.sparse.linalg import spsolve
+
+    n, h = fractions.shape[0], 1 / fractions.shape[0]
+    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    gauss = (np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]) / 3**0.5 + 1) / 2
+    law = np.zeros((6, 6))
+    law[:3, :3] = 0.3 / (1.3 * 0.4)
+    law += np.diag([1 / 1.3] * 3 + [0.5 / 1.3] * 3)
+    parts = 1 if conductivity else 3
+    size = 3 if conductivity else 6
+    law = np.eye(3) if conductivity else law
+    element, load = np.zeros((8 * parts, 8 * parts)), np.zeros((8 * parts, size))
+    for g in gauss:
+        slopes = np.empty((8, 3))
+        for c, corner in enumerate(corners):
+            factors = np.where(corner == 1, g, 1 - g)
+            slopes[c] = [np.prod(np.delete(factors, a)) * (1 if corner[a] else -1) / h for a in range(3)]
+        b = np.zeros((size, 8 * parts))
+        for c, (x, y, z) in enumerate(slopes):
+            if conductivity:
+                b[:, c] = x, y, z
+            else:
+                b[:, 3 * c : 3 * c + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [0, z, y], [z, 0, x], [y, x, 0]]
+        element += b.T @ law @ b * h**3 / 8
+        load += b.T @ law * h**3 / 8
+    places = np.argwhere(fractions > 0)
+    nodes = (places[:, None, :] + corners[None]) % n
+    numbers = nodes @ [n * n, n, 1]
+    used = np.unique(numbers)
+    numbers = np.searchsorted(used, numbers)
+    unknowns = (parts * numbers[:, :, None] + np.arange(parts)).reshape(len(places), -1)
+    weights = fractions[tuple(places.T)]
+    rows, columns = np.repeat(unknowns, 8 * parts, axis=1), np.tile(unknowns, (1, 8 * parts))
+    values = weights[:, None] * element.ravel()
+    stiff = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(parts * len(used),) * 2)
+    force = np.zeros((parts * len(used), size))
+    for column in range(size):
+        np.add.at(force[:, column], unknowns, weights[:, None] * load[:, column])
+    free = slice(parts, None)  # a node held: the mean moves nothing
+    answer = np.zeros_like(force)
+    answer[free] = spsolve(stiff[free, free].tocsc(), -force[free])
+    return law * weights.sum() * h**3 + force.T @ answer
+
+
+def voxels_of(cell: str, part: str, fraction: float, n: int) -> np.ndarray:
+    """Voxels of the cell whose centres are solid, as floats, by the field itself."""
+    middles = (np.arange(n) + 0.5) / n * 4
+    points = np.stack(np.meshgrid(middles, middles, middles, indexing="ij"), axis=-1).reshape(-1, 3)
+    lattice = lt.Lattice(cell, part, map.affine(wavelength=4), level.fraction(fraction))
+    far = lt.Design(region.box(min=[-4, -4, -4], max=[8, 8, 8]), lattice).build()
+    return (far.field(points) <= 0).astype(float).reshape(n, n, n)
+
+
+def test_plain_voxels_are_as_stiff_as_assembled_elements_say():
+    fractions = voxels_of("gyroid", "sheet", 0.4, 12)
+    found = solid("gyroid", "sheet", 0.4).stiffness(n=12, voxels=True)
+    wanted = by_elements(fractions)
+    # Residuals of 1e-8 and energies that are quadratic in them.
+    assert np.allclose(found.C_n, wanted, atol=1e-8)
+    k = solid("gyroid", "sheet", 0.4).conductivity(n=12, voxels=True)
+    assert np.allclose(k.k_n, by_elements(fractions, True), atol=1e-8)
+
+
+def test_thin_struts_and_their_stiffness_tend_to_the_closed_form():
+    # A simple cubic frame of fraction r: E along the axes is r/3 as r goes to 0; joints add a share of the order of its root.
+    ratios = []
+    for radius in (0.24, 0.12):
+        beams = lt.Beams(cell="sc", map=map.affine(wavelength=4), radius=radius, hub=radius * 1.01, profile="cylinder")
+        made = lt.Design(region.box(size=[8, 8, 8]), beams=beams).build()
+        found = made.stiffness(n=96 if radius < 0.2 else 48)
+        ratios.append(found.E[0] / (found.fraction / 3))
+    assert 1.0 < ratios[1] < ratios[0] < 1.15 and ratios[1] < 1.06
+
+
+def test_a_turned_cell_has_the_turned_stiffness_and_a_skewed_one_is_symmetric():
+    plain = np.array(solid(n := "diamond").stiffness(n=32).C)
+    turned = np.array(solid(n, rotate=[0, 0, 90]).stiffness(n=32).C)
+    swap = [1, 0, 2, 4, 3, 5]
+    assert np.allclose(turned, plain[np.ix_(swap, swap)], atol=1e-7)
+    long = np.array(solid("gyroid", wavelength=[4, 4, 8]).stiffness(n=32).C)
+    assert np.allclose(long, long.T, atol=1e-9) and long[2, 2] > long[0, 0]
+
+
+def test_threads_change_no_bit():
+    one, two = (solid().stiffness(n=24, threads=t).to_dict() for t in (1, 2))
+    assert one == two
+
+
+def test_a_material_of_its_own_stiffness_gives_the_same_as_its_constants():
+    isotropic = solid().stiffness(n=24, E=2.0, nu=0.25)
+    c = np.zeros((6, 6))
+    c[:3, :3] = 2.0 * 0.25 / (1.25 * 0.5)
+    c += np.diag([1.6] * 3 + [0.8] * 3)
+    general = solid().stiffness(n=24, C=c)
+    assert np.allclose(general.C, isotropic.C, atol=1e-9) and general.bulk_bounds is None
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_modulus_along_an_axis_is_that_of_the_compliance():
+    found = solid("primitive").stiffness(n=24)
+    assert modulus(found.C, np.eye(3)) == pytest.approx(found.E, rel=1e-12)
+    directions, triangles = sphere(3)
+    assert len(directions) == 10 * 4**3 + 2 and len(triangles) == 20 * 4**3
+    mesh, along = surface(found.C)
+    assert mesh.closed and mesh.volume > 0 and np.allclose(np.linalg.norm(mesh.vertices, axis=1), along)
+    assert along.max() == pytest.approx(modulus(found.C, np.full((1, 3), 3**-0.5))[0], rel=1e-3)  # along the diagonal
+
+
+def test_cards_give_the_stiffness_back_in_each_programs_order():
+    found = solid(rotate=[10, 20, 30]).stiffness(n=16)
+    c = np.array(found.C)
+
+    def numbers(text: str) -> list[float]:
+        return [float(v) for v in re.findall(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?", text)]
+
+    lines = abaqus(found, "x").split("*ELASTIC, TYPE=ANISOTROPIC\n")[1].split("\n")[:3]
+    order = [0, 1, 2, 5, 4, 3]
+    assert [len(line.split(",")) for line in lines] == [8, 8, 5]
+    assert numbers(",".join(lines)) == pytest.approx([c[order[i], order[j]] for j in range(6) for i in range(j + 1)], rel=1e-8)
+    order = [0, 1, 2, 5, 3, 4]
+    rows = [c[order[i], order[j]] for i in range(6) for j in range(i, 6)]
+    card = nastran(found, "x").split("\n")[1:-1]
+    assert all(len(line) <= 72 for line in card)
+    fields = [float(line[8 + 16 * i : 24 + 16 * i]) for line in card for i in range((len(line) - 8) // 16)]
+    assert fields[0] == 1 and fields[1:] == pytest.approx(rows, rel=1e-8)
+    data = [line.split(",", 2)[2] for line in ansys(found, "x").split("\n") if line.startswith("TBDATA")]
+    assert numbers(",".join(data)) == pytest.approx(rows, rel=1e-8)
+
+
+def test_the_commands_print_and_write(cube, tmp_path):
+    names = [tmp_path / f"cell.{suffix}" for suffix in ("csv", "png", "ply", "vtu", "inp", "bdf", "mac")]
+    report = json.loads(in_process("stiffness", cube, "--n", 16, "--json", "--E", 1000, "-o", *names))
+    assert all(name.stat().st_size > 100 for name in names)
+    keys = {"C", "C_n", "n", "error", "residual", "E", "G", "nu", "zener", "anisotropy", "bulk_bounds", "fraction", "warnings"}
+    assert keys <= set(report) and report["n"] == 16
+    first = names[0].read_text().splitlines()[1].split(",")
+    assert first[:2] == ["11", "11"] and float(first[2]) == report["C"][0][0]
+    meshio = pytest.importorskip("meshio")
+    read = meshio.read(tmp_path / "cell.vtu")
+    assert np.allclose(np.linalg.norm(read.points, axis=1), read.point_data["E"], rtol=1e-6)
+    trimesh = pytest.importorskip("trimesh")
+    assert trimesh.load(tmp_path / "cell.ply", process=False).is_watertight
+    text = in_process("stiffness", cube, "--n", 16)
+    assert "Hashin-Shtrikman" in text and "accuracy" in text
+    report = json.loads(in_process("conductivity", cube, "--n", 16, "--json", "--pore", 0.1))
+    assert {"k", "k_n", "error", "bounds"} <= set(report)
+    assert "k, relative to the solid's" in in_process("conductivity", cube, "--n", 16)
+
+
+def test_a_sweep_has_the_properties_that_are_asked_for(cube):
+    study = lt.load(cube).to_dict() | {"sweep": {"lattice.core.level.fraction": [0.2, 0.3]}}
+    columns = lt.sweep(study, per_cell=8, properties={"stiffness": {"n": 16}, "conductivity": {"n": 16}})
+    assert columns["error"] == [None, None]
+    direct = [solid(fraction=f).stiffness(n=16).C[0][0] for f in (0.2, 0.3)]
+    assert columns["C11"] == direct and columns["k11"][1] > columns["k11"][0]
+
+
+# --- mistakes ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "said"),
+    [
+        ("fraction = 0.3", ("--nu", 0.5), "Poisson's ratio must be greater than -1 and less than 0.5"),
+        ('fraction = { linear = { along = [1, 0, 0], stops = [[-4, 0.2], [4, 0.4]] } }', (), "no cell is periodic"),
+        ("fraction = 0.3", ("--n", 4096), "of memory for 4096 x 4096 x 4096 voxels"),
+    ],
+)
+def test_what_has_no_stiffness_is_refused(tmp_path, text: str, words: tuple, said: str):
+    path = tmp_path / "it.toml"
+    cell = '[lattice.a]\ncell = "gyroid"\npart = "sheet"\nmap.affine.wavelength = 4\n'
+    path.write_text(f'schema = 1\nunits = "mm"\nregion.box.size = [8, 8, 8]\n{cell}level.{text}\n')
+    done = command("stiffness", path, *words)
+    assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_network_that_falls_apart_is_refused_with_where_it_holds():
+    with pytest.raises(ValueError, match=r"falls apart and carries no load; it is one piece from 0\.21"):
+        solid("primitive", "lower", 0.15).stiffness(n=16)
+
+
+def test_thin_walls_are_warned_of():
+    found = solid(fraction=0.05).stiffness(n=16)
+    assert any("voxels across" in w["message"] for w in found.warnings)
+
+
+def test_a_stiffness_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="positive definite"):
+        solid().stiffness(n=8, C=-np.eye(6))
+    with pytest.raises(ValueError, match=r"expected C of shape \(6, 6\)"):
+        solid().stiffness(n=8, C=np.eye(3))
