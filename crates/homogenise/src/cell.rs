@@ -66,9 +66,7 @@ impl VoxelCell {
     fn is_cyclic(&self) -> bool {
         let [n, b, c] = self.shape;
         let at = |x: usize, y: usize, z: usize| self.fractions[(z * n + y) * n + x];
-        n == b
-            && n == c
-            && (0..n).all(|z| (0..n).all(|y| (0..n).all(|x| (at(x, y, z) - at(y, z, x)).abs() <= SAME)))
+        n == b && n == c && (0..n).all(|z| (0..n).all(|y| (0..n).all(|x| (at(x, y, z) - at(y, z, x)).abs() <= SAME)))
     }
 
     /// Axes in which the first edge is along x and the second in the plane of x and y, as columns; and the edges of a voxel there.
@@ -131,7 +129,12 @@ impl VoxelCell {
         }
         let c = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])));
         made.tensor.clear();
-        Ok(Homogenised { tensor: turned(&c, &frame), residual: made.residual, iterations: made.iterations, cases: cases.len() })
+        Ok(Homogenised {
+            tensor: turned(&c, &frame),
+            residual: made.residual,
+            iterations: made.iterations,
+            cases: cases.len(),
+        })
     }
 
     /// The effective conductivity of the cell, where the solid conducts 1 and the pore `pore`.

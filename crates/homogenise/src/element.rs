@@ -50,13 +50,8 @@ impl Element {
             }
             inner[i][j] = sum / 64.0;
         }
-        let mut made = Element {
-            linear: inner,
-            bilinear: [[0.0; 9]; 9],
-            trilinear: [[0.0; 3]; 3],
-            components,
-            orthotropic: true,
-        };
+        let mut made =
+            Element { linear: inner, bilinear: [[0.0; 9]; 9], trilinear: [[0.0; 3]; 3], components, orthotropic: true };
         for (i, j) in pairs(size) {
             let ((c, m), (d, n)) = ((i / 3, i % 3), (j / 3, j % 3));
             let shared = (0..3).filter(|b| *b != m && *b != n);
@@ -90,7 +85,8 @@ impl Element {
         let size = 8 * self.components;
         let mut out = vec![vec![0.0; size]; size];
         for (i, j) in pairs(size) {
-            let ((p, c), (q, d)) = ((i / self.components, i % self.components), (j / self.components, j % self.components));
+            let ((p, c), (q, d)) =
+                ((i / self.components, i % self.components), (j / self.components, j % self.components));
             let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
             let pair = |corner: usize, m: usize| sign(corner, (m + 1) % 3) * sign(corner, (m + 2) % 3);
             let all = |corner: usize| sign(corner, 0) * pair(corner, 0);

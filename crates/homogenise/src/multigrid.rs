@@ -215,9 +215,8 @@ mod tests {
     fn restriction_is_the_transpose_of_interpolation() {
         let (shape, half) = ([8, 12, 16], [4, 6, 8]);
         let mut seed = 3u64;
-        let mut random = |n: usize| -> Vec<f32> {
-            (0..n).map(|_| geometry::random::random(&mut seed) as f32).collect()
-        };
+        let mut random =
+            |n: usize| -> Vec<f32> { (0..n).map(|_| geometry::random::random(&mut seed) as f32).collect() };
         let (fine, coarse) = (random(3 * 8 * 12 * 16), random(3 * 4 * 6 * 8));
         let (mut down, mut up) = (vec![0f32; coarse.len()], vec![0f32; fine.len()]);
         restrict::<3>(&fine, shape, &mut down, half);

@@ -125,8 +125,7 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
                     for x in 0..nx {
                         let left = (x + nx - 1) % nx;
                         let w = |i: usize| {
-                            let (x, y, z) =
-                                ([left, x][i & 1], [before, y][i >> 1 & 1], [below, z][i >> 2 & 1]);
+                            let (x, y, z) = ([left, x][i & 1], [before, y][i >> 1 & 1], [below, z][i >> 2 & 1]);
                             self.weights[z * plane + y * nx + x].wide()
                         };
                         let w: [f64; 8] = std::array::from_fn(w);

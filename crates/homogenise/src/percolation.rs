@@ -54,7 +54,9 @@ impl VoxelCell {
 fn independent(of: &[[i32; 3]]) -> Vec<[i32; 3]> {
     let mut kept: Vec<[i32; 3]> = Vec::new();
     for v in of {
-        let cross = |a: &[i32; 3], b: &[i32; 3]| [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+        let cross = |a: &[i32; 3], b: &[i32; 3]| {
+            [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+        };
         let new = match &kept[..] {
             [] => *v != [0; 3],
             [a] => cross(a, v) != [0; 3],

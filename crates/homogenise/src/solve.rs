@@ -61,7 +61,8 @@ impl<const NC: usize> System<NC> {
         residual.iter_mut().for_each(|r| *r = -*r);
         let start = dot(residual, residual).sqrt();
         // Forces that are nothing but rounding: the uniform field is the solution.
-        let scale = operator.weights.iter().fold(0.0f64, |m, w| m.max(w.abs())) * operator.stiffest()
+        let scale = operator.weights.iter().fold(0.0f64, |m, w| m.max(w.abs()))
+            * operator.stiffest()
             * modes.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         if start <= 1e-14 * scale * (operator.len() as f64).sqrt() {
             return Ok(Solved { iterations: 0, residual: 0.0 });

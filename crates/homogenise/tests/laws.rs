@@ -3,7 +3,7 @@
 use geometry::math::{Mat3, product, rotation, transpose};
 use geometry::progress::Silent;
 use geometry::random::random;
-use homogenise::{Material, VoxelCell, Voigt, bounds, conductivity_bounds, turned};
+use homogenise::{Material, Voigt, VoxelCell, bounds, conductivity_bounds, turned};
 
 const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 

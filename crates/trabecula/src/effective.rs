@@ -5,7 +5,7 @@ mod limit;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3, determinant, norm, transpose};
 use geometry::progress::{Progress, Stage, Stopped};
-use homogenise::{Homogenised, Material, Moduli, VoxelCell, Voigt, bounds, conductivity_bounds};
+use homogenise::{Homogenised, Material, Moduli, Voigt, VoxelCell, bounds, conductivity_bounds};
 use rayon::prelude::*;
 
 use crate::csg_tree::CsgSolid;
@@ -46,6 +46,9 @@ const LEAST: usize = 8;
 const TOLERANCE: f64 = 1e-8;
 /// Voxels across a wall below which the figures are to be doubted.
 const ACROSS: f64 = 3.0;
+
+/// A tensor of a cell of voxels.
+type Solve<'a, T> = dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, Stopped> + 'a;
 
 impl UnitCell {
     /// The shapes of the grids: n, and a half and a quarter of it where that is enough.
@@ -130,7 +133,7 @@ impl UnitCell {
         &self,
         resolution: Resolution,
         progress: &dyn Progress,
-        solve: &dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, Stopped>,
+        solve: &Solve<T>,
     ) -> Result<Vec<(VoxelCell, Homogenised<T>)>, Stopped> {
         let shapes = self.shapes(resolution.n);
         let total: f64 = shapes.iter().map(work).sum();
@@ -165,7 +168,7 @@ impl UnitCell {
                 "at a solid fraction of {:.4} the cell falls apart and carries no load{why}",
                 self.fraction.unwrap_or_default()
             );
-            Stopped::Refused(Fault::new(&format!("{}.level", self.path), message))
+            Stopped::Refused(Fault::new(format!("{}.level", self.path), message))
         };
         if let Some(why) = self.apart() {
             return Err(apart(&why));
@@ -228,7 +231,9 @@ impl UnitCell {
     ) -> Result<ConductivityReport, Stopped> {
         self.check(resolution.n)?;
         if !(pore >= 0.0 && pore.is_finite()) {
-            let message = format!("pore is {pore}; the pore's conductivity relative to the solid's is a finite number of at least 0");
+            let message = format!(
+                "pore is {pore}; the pore's conductivity relative to the solid's is a finite number of at least 0"
+            );
             return Err(Stopped::Refused(Fault::new("pore", message)));
         }
         let mut warnings = Vec::new();
@@ -277,9 +282,8 @@ impl UnitCell {
 
     /// The bounds of the cell about its own corner, mm.
     pub fn bounds(&self) -> Aabb {
-        let corner = |i: usize| {
-            (0..3).filter(|a| i >> a & 1 == 1).fold([0.0; 3], |p, a| geometry::math::add(p, self.edges[a]))
-        };
+        let corner =
+            |i: usize| (0..3).filter(|a| i >> a & 1 == 1).fold([0.0; 3], |p, a| geometry::math::add(p, self.edges[a]));
         (0..8).fold(Aabb::EMPTY, |b, i| b.with(corner(i)))
     }
 }

@@ -88,9 +88,8 @@ struct Block<'a> {
 impl Block<'_> {
     /// Fills the voxels from `low` to `high` where the solid is `tree`.
     fn fill(&mut self, low: [usize; 3], high: [usize; 3], tree: &CsgTree) {
-        let corner = |i: [usize; 3]| {
-            [0, 1, 2].map(|a| self.grid.origin[a] + self.grid.step[a] * (self.first[a] + i[a]) as f64)
-        };
+        let corner =
+            |i: [usize; 3]| [0, 1, 2].map(|a| self.grid.origin[a] + self.grid.step[a] * (self.first[a] + i[a]) as f64);
         let bounds = Aabb { min: corner(low), max: corner(high) };
         let tree = known(&self.solid.surfaces, tree, &bounds);
         let single = (0..3).all(|a| high[a] - low[a] == 1);
@@ -137,10 +136,10 @@ fn fraction(surfaces: &[Surface], tree: &CsgTree, bounds: &Aabb, depth: usize) -
     names.dedup();
     let cuts: Vec<Cut> = names.iter().map(|i| Cut::new(&surfaces[*i], bounds)).collect();
     let name = |i: usize| names.binary_search(&i).unwrap_or(0);
-    if depth == DEPTH || cuts.iter().all(|c| !c.is_bent()) {
-        if let Some(sum) = apart(tree, &cuts, &name) {
-            return sum;
-        }
+    if (depth == DEPTH || cuts.iter().all(|c| !c.is_bent()))
+        && let Some(sum) = apart(tree, &cuts, &name)
+    {
+        return sum;
     }
     if depth == DEPTH {
         let planes: Vec<Plane> = cuts.iter().map(|c| c.plane).collect();

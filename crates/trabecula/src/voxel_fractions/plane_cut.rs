@@ -36,10 +36,8 @@ impl Plane {
     /// Whether the two are nowhere in the cube both positive: a positive combination of them is not.
     pub fn excludes(&self, other: &Plane) -> bool {
         let (a, b) = (1.0 / self.steepness().max(f64::MIN_POSITIVE), 1.0 / other.steepness().max(f64::MIN_POSITIVE));
-        let sum = Plane {
-            value: a * self.value + b * other.value,
-            slope: add(scale(self.slope, a), scale(other.slope, b)),
-        };
+        let sum =
+            Plane { value: a * self.value + b * other.value, slope: add(scale(self.slope, a), scale(other.slope, b)) };
         sum.value + sum.rise() <= 0.0
     }
 }

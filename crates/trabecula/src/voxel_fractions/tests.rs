@@ -37,17 +37,15 @@ fn planes_are_exact() {
         let normal = [random(), random(), 1e-3 * random()];
         let point = [0.3 * random(), 0.3 * random(), 0.3 * random()];
         let grid = cube(3, 1.0);
-        let side = |n: Vec3| voxel_fractions(&region(Arc::new(HalfSpace::new(point, n).unwrap())), &grid, &Silent).unwrap();
+        let side =
+            |n: Vec3| voxel_fractions(&region(Arc::new(HalfSpace::new(point, n).unwrap())), &grid, &Silent).unwrap();
         let (a, b) = (side(normal), side(normal.map(|v| -v)));
         for (a, b) in a.iter().zip(b) {
             assert!((a + b - 1.0).abs() < 1e-9);
         }
         // By tetrahedra, which share no formula with the closed form.
         let size = geometry::math::norm(normal);
-        let plane = Plane {
-            value: -geometry::math::dot(normal, point) / size,
-            slope: normal.map(|v| 0.5 * v / size),
-        };
+        let plane = Plane { value: -geometry::math::dot(normal, point) / size, slope: normal.map(|v| 0.5 * v / size) };
         let exact = volume(&[plane], &|s| s[0]);
         assert!((a.iter().sum::<f64>() / 27.0 - exact).abs() < 1e-9);
     }
@@ -95,7 +93,9 @@ fn edges_and_corners_are_cut_by_all_planes() {
 /// The fractions of one period add up to the fraction that the level was made for.
 #[test]
 fn a_cell_sums_to_its_exact_fraction() {
-    for (name, part) in [("gyroid", Part::Sheet), ("diamond", Part::Lower), ("primitive", Part::Upper), ("iwp", Part::Sheet)] {
+    for (name, part) in
+        [("gyroid", Part::Sheet), ("diamond", Part::Lower), ("primitive", Part::Upper), ("iwp", Part::Sheet)]
+    {
         let cell = Arc::new(Cell::new(Series::new(named(name).unwrap().terms()).unwrap()));
         let map = Affine::rigid([4.0; 3], [0.0; 3], [0.0; 3], &[]).unwrap();
         let lattice = Lattice::new(cell, Arc::new(map), part, Level::Fraction(Grade::Constant(0.3)));
