@@ -15,7 +15,7 @@ use crate::report::report;
 use crate::run::{run, run_apart};
 use crate::solid::Solid;
 
-/// Threads, and who is told of progress.
+/// Threads, and the listener to progress.
 type Work = (Option<usize>, Option<Py<PyAny>>);
 
 /// The periodic cell of a solid.
