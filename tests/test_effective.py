@@ -215,7 +215,7 @@ def test_a_sweep_has_the_properties_that_are_asked_for(cube):
     ("text", "words", "said"),
     [
         ("fraction = 0.3", ("--nu", 0.5), "Poisson's ratio must be greater than -1 and less than 0.5"),
-        ('fraction = { linear = { along = [1, 0, 0], stops = [[-4, 0.2], [4, 0.4]] } }', (), "no cell is periodic"),
+        ("fraction = { linear = { along = [1, 0, 0], stops = [[-4, 0.2], [4, 0.4]] } }", (), "no cell is periodic"),
         ("fraction = 0.3", ("--n", 4096), "of memory for 4096 x 4096 x 4096 voxels"),
     ],
 )

@@ -437,6 +437,20 @@ COMMANDS = {
         "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"
         "example:\n  trabecula schema > design.json",
     ),
+    "report": (
+        "Write a report of a design as one HTML page: the part to turn, with sections; figures, wall thickness, warnings.",
+        "The page needs no network. Beside the mesh, which is measured whole, it holds a lighter one to look at.\n\n"
+        "example:\n  trabecula report part.toml -o part.html",
+        *(DESIGN, output(("html",), "the page (.html)")),
+        option("--title", metavar="TEXT", help="title of the page (default: the file's name)"),
+        option(
+            "--thickness",
+            action=argparse.BooleanOptionalAction,
+            default=True,
+            help="distributions of wall thickness and pore size (default: with them)",
+        ),
+        *(spacing(), THREADS, PROGRESS, *NOTICES),
+    ),
     "render": (
         "Draw a design or a mesh file as PNG.",
         "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25",

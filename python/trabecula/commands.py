@@ -10,9 +10,9 @@ from . import _core, cell
 from . import beams as unit_cells
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
-from .files import check_place, whole_file
+from .files import check_place, read_text, whole_file
 from .formats import DESIGNS, MESH_READS, STDIN, STEP_WRITES, is_design, kind_of
-from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, surface
+from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, stdin_text, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
 from .shown import look, towards
@@ -23,7 +23,7 @@ from .texts import counted, table, voids
 
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "measure", "mesh", "new"),
-    *("render", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
+    *("render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
 ]
 
 
@@ -524,6 +524,27 @@ def render(args) -> None:
     settle()
     made.render(args.output, args.size, args.azimuth, args.elevation, **shown)
     say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels")
+
+
+def report(args) -> None:
+    """``trabecula report``."""
+    from .part_page import part_page
+    from .viewer import write_page
+
+    check_place(args.output)
+    keep_inputs(args.design, args.output)
+    solid = build(args.design)
+    made = meshed(solid, args)
+    balls = None
+    if args.thickness:
+        with Progress("fitting balls", args.progress) as progress:
+            balls = made.thickness(None, args.threads, progress)
+    name = os.path.splitext(os.path.basename(args.design))[0] if args.design != STDIN else "part"
+    title = args.title or name.replace("_", " ").capitalize()
+    text = stdin_text() if args.design == STDIN else read_text(args.design)
+    settle()
+    write_page(args.output, part_page(solid, made, text, title, balls, warned()))
+    say(f"{args.output}: {os.path.getsize(args.output) / 1e6:.2g} MB, {made.counts[1]} triangles measured")
 
 
 def schema(args) -> None:

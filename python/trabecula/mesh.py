@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         VoidReport,
     )
     from .solid import Solid
+    from .viewer import View
 
 __all__ = ["Mesh"]
 
@@ -483,6 +484,14 @@ class Mesh(Picture, Transformed):
                 found.append((kind, points.tolist()))
         wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
         return label, list(lines), found, wide / 2
+
+    def view(self, values: ArrayLike | None = None, label: str = "") -> View:
+        """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
+        for each vertex by which it is coloured, ``label`` says what they are, with their unit.
+        """
+        from .viewer import View
+
+        return View(self, values, label)
 
     def render(
         self,

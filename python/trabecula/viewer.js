@@ -1,0 +1,269 @@
+// A viewer of one closed mesh, without any library: turn, move, zoom; a section plane; colours.
+// The page has, for each viewer, <figure class="viewer"> with a canvas and <script type="application/octet-stream"> of the mesh:
+// the DEFLATE stream, in base64, of a header of JSON, a line feed, and arrays (see viewer.py).
+"use strict";
+
+const CREASE = Math.cos((35 * Math.PI) / 180);
+
+const VERTEX = `#version 300 es
+in vec3 position; in vec3 normal; in float cut; in float value;
+uniform mat3 turn; uniform vec3 middle; uniform vec2 shift; uniform vec2 zoom; uniform float depth;
+out vec3 place; out vec3 facing; out float isCut; out float amount;
+void main() {
+  vec3 seen = turn * (position - middle);
+  place = position; facing = normal; isCut = cut; amount = value;
+  gl_Position = vec4((seen.xy + shift) * zoom, -seen.z * depth, 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 place; in vec3 facing; in float isCut; in float amount;
+uniform mat3 turn; uniform vec4 plane; uniform int colours; uniform float steep; uniform vec2 span;
+out vec4 colour;
+vec3 scale(float t) {
+  // Viridis by its polynomial (M. Zucker).
+  t = clamp(t, 0.0, 1.0);
+  vec3 c0 = vec3(0.27773, 0.00541, 0.33410), c1 = vec3(0.10509, 1.40461, 1.38459), c2 = vec3(-0.33086, 0.21485, 0.09510);
+  vec3 c3 = vec3(-4.63423, -5.79910, -19.33244), c4 = vec3(6.22827, 14.17993, 56.69055), c5 = vec3(4.77638, -13.74515, -65.35303);
+  vec3 c6 = vec3(-5.43546, 4.64585, 26.31244);
+  return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))));
+}
+void main() {
+  if (dot(plane.xyz, place) > plane.w) discard;
+  if (!gl_FrontFacing) {
+    // The inside of the solid, seen through the section, is where the section cuts it: drawn flat, hatched.
+    vec2 at = gl_FragCoord.xy;
+    float line = step(0.78, fract((at.x + at.y) / 9.0));
+    colour = vec4(mix(vec3(0.80, 0.36, 0.24), vec3(0.62, 0.25, 0.16), line), 1.0);
+    return;
+  }
+  vec3 n = normalize(facing), seen = turn * n;
+  vec3 base = mix(vec3(0.72, 0.76, 0.80), vec3(0.93, 0.80, 0.58), isCut);
+  if (colours == 1) base = -n.z > steep ? vec3(0.86, 0.28, 0.22) : vec3(0.74, 0.77, 0.80);
+  if (colours == 2) base = scale((amount - span.x) / max(span.y - span.x, 1e-12));
+  float key = max(dot(seen, normalize(vec3(-0.35, 0.55, 0.76))), 0.0);
+  float fill = max(dot(seen, normalize(vec3(0.8, -0.2, 0.5))), 0.0);
+  colour = vec4(base * (0.30 + 0.62 * key + 0.18 * fill), 1.0);
+}`;
+
+async function unpacked(text) {
+  const raw = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+  const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const end = bytes.indexOf(10);
+  const head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  let at = end + 1;
+  const take = (type, count) => {
+    const part = bytes.slice(at, at + count * type.BYTES_PER_ELEMENT);
+    at += part.length;
+    return new type(part.buffer);
+  };
+  const whole = take(Uint16Array, 3 * head.vertices);
+  const vertices = new Float32Array(whole.length);
+  for (let i = 0; i < whole.length; i++) {
+    const a = i % 3;
+    vertices[i] = head.min[a] + (whole[i] / 65535) * (head.max[a] - head.min[a]);
+  }
+  const triangles = take(Uint32Array, 3 * head.triangles);
+  const cut = take(Uint8Array, head.triangles);
+  const values = head.span ? take(Uint16Array, head.vertices) : null;
+  return { head, vertices, triangles, cut, values };
+}
+
+// Arrays by corner: normals are the mean of those of the triangles round a vertex that lie within 35° of the corner's own.
+function corners({ head, vertices, triangles, cut, values }) {
+  const count = head.triangles;
+  const normals = new Float32Array(3 * count);
+  const first = new Uint32Array(head.vertices + 1);
+  for (const v of triangles) first[v + 1]++;
+  for (let v = 0; v < head.vertices; v++) first[v + 1] += first[v];
+  const round = new Uint32Array(3 * count), next = first.slice();
+  for (let t = 0; t < count; t++) {
+    const [a, b, c] = [0, 1, 2].map((k) => 3 * triangles[3 * t + k]);
+    const p = [0, 1, 2].map((i) => vertices[b + i] - vertices[a + i]);
+    const q = [0, 1, 2].map((i) => vertices[c + i] - vertices[a + i]);
+    normals.set([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]], 3 * t);
+    for (let k = 0; k < 3; k++) round[next[triangles[3 * t + k]]++] = t;
+  }
+  const length = (t) => Math.hypot(normals[3 * t], normals[3 * t + 1], normals[3 * t + 2]) || 1e-30;
+  const lengths = Float32Array.from({ length: count }, (_, t) => length(t));
+  const of = { position: new Float32Array(9 * count), normal: new Float32Array(9 * count), cut: new Float32Array(3 * count), value: new Float32Array(3 * count) };
+  for (let t = 0; t < count; t++) {
+    for (let k = 0; k < 3; k++) {
+      const v = triangles[3 * t + k], at = 3 * t + k;
+      const sum = [0, 0, 0];
+      for (let i = first[v]; i < first[v + 1]; i++) {
+        const s = round[i];
+        const along = normals[3 * t] * normals[3 * s] + normals[3 * t + 1] * normals[3 * s + 1] + normals[3 * t + 2] * normals[3 * s + 2];
+        if (along >= CREASE * lengths[t] * lengths[s]) for (let i = 0; i < 3; i++) sum[i] += normals[3 * s + i];
+      }
+      of.position.set(vertices.subarray(3 * v, 3 * v + 3), 3 * at);
+      of.normal.set(sum, 3 * at);
+      of.cut[at] = cut[t];
+      if (values) of.value[at] = head.span[0] + (values[v] / 65535) * (head.span[1] - head.span[0]);
+    }
+  }
+  return of;
+}
+
+function program(gl) {
+  const made = gl.createProgram();
+  for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(made, shader);
+  }
+  gl.linkProgram(made);
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+  gl.useProgram(made);
+  return made;
+}
+
+// A round length of about a fifth of the width for the scale bar: 1, 2 or 5 times a power of ten.
+function roundLength(of) {
+  const power = 10 ** Math.floor(Math.log10(of));
+  return [5, 2, 1].map((m) => m * power).find((v) => v <= of);
+}
+
+async function view(figure) {
+  const canvas = figure.querySelector("canvas");
+  const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
+  if (!gl || !("DecompressionStream" in window)) return figure.classList.add("still");
+  const mesh = await unpacked(figure.querySelector("script").textContent);
+  const { head } = mesh;
+  const of = corners(mesh);
+  const shader = program(gl);
+  for (const [name, width] of [["position", 3], ["normal", 3], ["cut", 1], ["value", 1]]) {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, of[name], gl.STATIC_DRAW);
+    const at = gl.getAttribLocation(shader, name);
+    if (at < 0) continue;
+    gl.enableVertexAttribArray(at);
+    gl.vertexAttribPointer(at, width, gl.FLOAT, false, 0, 0);
+  }
+  const uniform = (name) => gl.getUniformLocation(shader, name);
+  const size = Math.hypot(...[0, 1, 2].map((a) => head.max[a] - head.min[a])) || 1;
+  const middle = [0, 1, 2].map((a) => 0.5 * (head.min[a] + head.max[a]));
+  const home = { azimuth: 30, elevation: 25, zoom: 1, shift: [0, 0] };
+  const state = { ...home, axis: "", share: 0.5, flip: false, colours: +figure.querySelector("[name=colours]").value, steep: 45 };
+
+  // Rows: to the right, up, and towards the eye; azimuth about z, elevation above xy, as in `trabecula render`.
+  const turn = () => {
+    const [a, e] = [state.azimuth, state.elevation].map((v) => (v * Math.PI) / 180);
+    const [ca, sa, ce, se] = [Math.cos(a), Math.sin(a), Math.cos(e), Math.sin(e)];
+    return [[-sa, ca, 0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]];
+  };
+  const reach = () => (0.5 * size) / state.zoom;
+
+  function draw() {
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!width || !height) return;
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    const rows = turn(), side = Math.min(width, height);
+    gl.uniformMatrix3fv(uniform("turn"), false, [0, 1, 2].flatMap((c) => rows.map((r) => r[c])));
+    gl.uniform3fv(uniform("middle"), middle);
+    gl.uniform2fv(uniform("shift"), state.shift);
+    gl.uniform2fv(uniform("zoom"), [side / width / reach(), side / height / reach()]);
+    gl.uniform1f(uniform("depth"), 1 / size);
+    const plane = [0, 0, 0, 1e30];
+    const a = state.axis ? "xyz".indexOf(state.axis) : -1;
+    if (state.axis) {
+      const at = head.min[a] + state.share * (head.max[a] - head.min[a]);
+      plane[a] = state.flip ? -1 : 1;
+      plane[3] = state.flip ? -at : at;
+    }
+    gl.uniform4fv(uniform("plane"), plane);
+    gl.uniform1i(uniform("colours"), state.colours);
+    gl.uniform1f(uniform("steep"), Math.cos((state.steep * Math.PI) / 180));
+    gl.uniform2fv(uniform("span"), head.span || [0, 1]);
+    gl.drawArrays(gl.TRIANGLES, 0, 3 * head.triangles);
+    marks(rows, (2 * reach()) / side, a);
+  }
+
+  const part = (name) => figure.querySelector(`[data-part=${name}]`);
+  function marks(rows, mm, a) {
+    const length = roundLength(0.2 * canvas.clientWidth * mm);
+    part("bar").style.width = `${length / mm}px`;
+    part("length").textContent = `${+length.toPrecision(1)} mm`;
+    rows[0].forEach((_, k) => {
+      const [x, y] = [22 * rows[0][k], -22 * rows[1][k]];
+      const line = part("xyz"[k]);
+      line.querySelector("line").setAttribute("x2", x);
+      line.querySelector("line").setAttribute("y2", y);
+      line.querySelector("text").setAttribute("x", 1.35 * x);
+      line.querySelector("text").setAttribute("y", 1.35 * y);
+    });
+    const at = a < 0 ? "" : `${state.axis} = ${(head.min[a] + state.share * (head.max[a] - head.min[a])).toPrecision(4)} mm`;
+    part("at").textContent = at;
+  }
+
+  let waiting = false;
+  const redraw = () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; draw(); });
+  };
+  const tilt = (right, up) => {
+    state.azimuth -= right;
+    state.elevation = Math.max(-90, Math.min(90, state.elevation + up));
+    redraw();
+  };
+  const move = (x, y) => {
+    const mm = (2 * reach()) / Math.min(canvas.clientWidth, canvas.clientHeight);
+    state.shift = [state.shift[0] + x * mm, state.shift[1] - y * mm];
+    redraw();
+  };
+  const nearer = (by) => { state.zoom = Math.max(0.2, Math.min(200, state.zoom * by)); redraw(); };
+
+  const fingers = new Map();
+  const apart = () => { const [p, q] = [...fingers.values()]; return Math.hypot(p[0] - q[0], p[1] - q[1]); };
+  canvas.addEventListener("pointerdown", (e) => { canvas.setPointerCapture(e.pointerId); fingers.set(e.pointerId, [e.clientX, e.clientY]); });
+  canvas.addEventListener("pointermove", (e) => {
+    const old = fingers.get(e.pointerId);
+    if (!old) return;
+    const before = fingers.size === 2 ? apart() : 0;
+    fingers.set(e.pointerId, [e.clientX, e.clientY]);
+    const [x, y] = [e.clientX - old[0], e.clientY - old[1]];
+    if (fingers.size === 2) { nearer(apart() / before); move(x / 2, y / 2); }
+    else if (e.shiftKey || e.buttons === 4 || e.buttons === 2) move(x, y);
+    else tilt(0.4 * x, 0.4 * y);
+  });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (e) => fingers.delete(e.pointerId));
+  canvas.addEventListener("contextmenu", (e) => e.preventDefault());
+  canvas.addEventListener("wheel", (e) => { e.preventDefault(); nearer(Math.exp(-0.0015 * e.deltaY)); }, { passive: false });
+  canvas.addEventListener("keydown", (e) => {
+    const done = {
+      ArrowLeft: () => tilt(-10, 0), ArrowRight: () => tilt(10, 0), ArrowUp: () => tilt(0, 10), ArrowDown: () => tilt(0, -10),
+      "+": () => nearer(1.2), "=": () => nearer(1.2), "-": () => nearer(1 / 1.2),
+      Home: () => { Object.assign(state, home, { shift: [0, 0] }); redraw(); },
+    }[e.key];
+    if (done) { e.preventDefault(); done(); }
+  });
+  figure.addEventListener("input", (e) => {
+    const { name, value } = e.target;
+    if (name === "axis") { state.axis = value; part("share").disabled = !value; }
+    if (name === "share") state.share = +value;
+    if (name === "flip") state.flip = e.target.checked;
+    if (name === "colours") { state.colours = +value; part("steep").hidden = state.colours !== 1; part("legend").hidden = state.colours !== 2; }
+    if (name === "steep") { state.steep = +value; part("angle").textContent = `${value}°`; }
+    redraw();
+  });
+  new ResizeObserver(redraw).observe(canvas);
+  figure.classList.add("live");
+  draw();
+  figure.dataset.drawn = head.triangles;
+}
+
+for (const figure of document.querySelectorAll("figure.viewer")) {
+  view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
+}
