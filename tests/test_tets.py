@@ -57,7 +57,7 @@ def test_a_ball_is_meshed_face_to_face():
     # Chords leave out some per cent of the ball, which a lattice fills all the same.
     assert not report["warnings"] and mesh.volume < 0.995 * report["region_volume"]
     assert np.isclose(report["region_volume"], 4 / 3 * np.pi * 5**3, rtol=1e-12)
-    assert report["fit"]["deviation"] < 1.5**2 / 8
+    assert report["fit"]["to_part"]["max"] < 1.5**2 / 8
     assert np.isclose(mesh.least_dihedral.min(), report["quality"]["dihedral"]["min"])
     assert np.allclose(mesh.sizes, np.cbrt(72**0.5 * of))
 

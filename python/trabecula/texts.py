@@ -12,6 +12,8 @@ __all__ = ["counted", "intervals", "point", "table", "text", "voids"]
 
 #: Number of hubs listed that cannot have the fillets asked for; the report has all of them.
 FEW = 3
+#: Number of features listed that tetrahedra do not keep; the report has all of them.
+SHOWN = 6
 
 
 def text(report: Report) -> str:
@@ -85,6 +87,8 @@ def _lattice(it: Report) -> Iterator[str]:
         yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"
     if it.tets:
         yield from _tiling(it.tets)
+    if it.fit:
+        yield from (f"  {line}" for line in _fit(it.fit))
     if it.distortion:
         yield from _distortion(it.distortion)
     yield from _singular(it.singular or [])
@@ -223,9 +227,17 @@ def _tet_mesh(it: Report) -> Iterator[str]:
     yield f"aspect      {q.aspect.mean:.2f} on average, {q.aspect.max:.2f} at most (1 is regular)"
     yield f"slivers     {q.slivers} below 10° or above 170°; {q.inverted} inverted"
     if fit:
-        off = f"95 % within {fit.deviation_p95:.2g} mm, {fit.deviation:.2g} mm at most"
-        yield f"fit         {fit.deviation_mean:.2g} mm off the surface on average, {off}"
-        yield f"left out    {100 * fit.lost:.2g} % of the region, up to {fit.lost_depth:.2g} mm deep"
+        yield from _fit(fit)
+
+
+def _fit(it: Report) -> Iterator[str]:
+    for word, off in (("to part", it.to_part), ("from part", it.from_part)):
+        yield f"{word:10} {off.mean:.2g} mm on average, 99 % within {off.p99:.2g} mm, {off.max:.2g} mm at most"
+    yield f"left out   {100 * it.uncovered:.2g} % of the region, up to {it.uncovered_depth:.2g} mm deep"
+    for lost in it.lost[:SHOWN]:
+        yield f"not kept   a {lost.kind} of {lost.size:.2g} mm at {point(lost.at)} mm, {lost.depth:.2g} mm off"
+    if len(it.lost) > SHOWN:
+        yield f"           {len(it.lost) - SHOWN} more in the JSON report"
 
 
 #: Units of the figures of a mesh.

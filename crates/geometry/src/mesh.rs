@@ -8,6 +8,7 @@ mod embedded;
 pub mod exact;
 pub mod samples;
 mod self_intersections;
+pub mod surface_samples;
 
 pub use edge_counts::EdgeCounts;
 pub use embedded::is_embedded;

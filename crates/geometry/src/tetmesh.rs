@@ -5,6 +5,8 @@ use crate::mesh::Mesh;
 use crate::union_find::{find, unite};
 
 pub mod conformity;
+pub mod surface_fit;
+pub mod tet_locator;
 pub mod tet_quality;
 
 pub use conformity::Checked;

@@ -22,7 +22,7 @@ mod smooth;
 mod tet_shape;
 mod work;
 
-pub use region_fit::fit;
+pub use region_fit::{Fit, Uncovered, fit, uncovered};
 pub use tet_shape::ANGLES;
 use work::{Around, Work};
 
@@ -37,37 +37,16 @@ const TRIES: usize = 4;
 /// Maximum relative stretch of the lattice to fit the bounds.
 const FIT: f64 = 0.08;
 
-/// Quality of the fit of a mesh to its region.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
-    /// Mean distance from the centroids and edge midpoints of boundary triangles to the region's surface (mm); at edges
-    /// and corners of the region an upper bound.
-    pub deviation_mean: f64,
-    /// 95th percentile of these distances (mm).
-    pub deviation_p95: f64,
-    /// Maximum of these distances (mm).
-    pub deviation: f64,
-    /// Position of the maximum (mm).
-    pub deviation_at: Vec3,
-    /// Fraction of the region that no tetrahedron covers, by sampling: cut edges and thin walls.
-    pub lost: f64,
-    /// Depth below the region's surface of the deepest uncovered point (mm).
-    pub lost_depth: f64,
-    /// Position of that point (mm).
-    pub lost_at: Vec3,
-    /// Volume removed where the boundary was non-manifold, and of small detached fragments (mm³).
-    pub mended: f64,
-}
-
 /// The tetrahedral mesh of a region, given by its signed distance (1-Lipschitz, negative inside) and bounds: tetrahedra
 /// of the volume of a regular one of edge `size` (mm), boundary nodes on the surface. `inside` are uniformly spread
-/// points in the region, used to sample the size and uncovered parts.
+/// points in the region, used to sample the size. Also the volume (mm³) removed where the boundary was non-manifold, and of small
+/// detached fragments.
 ///
 /// The result does not depend on the number of threads.
 ///
 /// **Errors**: a size that is not positive, a size so large that no tetrahedron fits, or so small that there are more
 /// than twenty million tetrahedra.
-pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, Fit), Fault> {
+pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, f64), Fault> {
     let mut sizes = vec![0.0; inside.len()];
     size.values(inside, &mut sizes);
     let wrong = |v: &&f64| !(v.is_finite() && **v > 0.0);
@@ -92,9 +71,7 @@ pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec
         );
         return Err(Fault::new("size", message));
     }
-    let mesh = shaped(Work::new(region, mesh, on)).compact();
-    let fit = Fit { mended, ..fit(&mesh, region, inside) };
-    Ok((mesh, fit))
+    Ok((shaped(Work::new(region, mesh, on)).compact(), mended))
 }
 
 /// Moves nodes onto edges and corners of the region and improves shapes, in rounds: better shapes allow more features

@@ -11,17 +11,18 @@ use crate::mesher::{self, Fit, background};
 use crate::report::{FitReport, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
+use geometry::tetmesh::surface_fit::LostFeature;
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
 use geometry::transform::Transform;
 use source::{from_file, surface, triangles, wild};
 
-/// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
-/// short by flat ones, which takes much of a coarse mesh but nothing deep.
-const LOST: f64 = 0.02;
 /// Depth above which a loss is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
 const DEEP: f64 = 0.17;
-/// The share that is warned of at any depth.
+/// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
+/// short by flat ones, which takes much of a coarse mesh but nothing deep.
 const MUCH: f64 = 0.1;
+/// Number of lost features that a warning names.
+const NAMED: usize = 3;
 
 /// A tetrahedral mesh of a region, and its report.
 #[derive(Clone, Debug)]
@@ -161,13 +162,13 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let bounds = environment.region.bounds();
     let mut names = Vec::new();
-    let (mut mesh, fit, checked, mesher) = match spec {
+    let (mut mesh, mended, checked, mesher) = match spec {
         TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
             let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsKind>("size")))?;
             if made.mesher == MesherKind::Background {
-                let (mesh, fit) = background(&**environment.region, &bounds, &size, &inside).map_err(wrong)?;
-                (mesh, Some(fit), Checked::default(), "background".to_string())
+                let (mesh, mended) = background(&**environment.region, &bounds, &size, &inside).map_err(wrong)?;
+                (mesh, mended, Checked::default(), "background".to_string())
             } else {
                 let Some(size) = size.constant() else {
                     let message =
@@ -176,38 +177,50 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
                 };
                 let surface = surface(region, environment, size)?;
                 let (mesh, checked) = wild(made, &surface, size, &environment.path, environment.loader)?;
-                (mesh, None, checked, "ftetwild".to_string())
+                (mesh, 0.0, checked, "ftetwild".to_string())
             }
         }
         TetsKind::File(file) => {
             let (mesh, checked, named) = from_file(file, &environment.path, environment.loader)?;
             names = named;
-            (mesh, None, checked, file.path.clone())
+            (mesh, 0.0, checked, file.path.clone())
         }
     };
     let mut notes = crate::region::Notes::default();
     if let TetsKind::Made(made) = spec {
         mesh.zones = zones(&mesh, made, &environment.path, environment.loader, &mut notes)?;
     }
-    let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**environment.region, &inside));
-    let todo = match spec {
-        TetsKind::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
-        TetsKind::File(_) => "is it a mesh of this region, in the right place and unit?",
-    };
-    let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
-    made.warnings.extend(notes.warnings);
     let own = environment.region.volume().unwrap_or_else(|| {
         let (_, share) = sample::inside(environment.region, 25 * sample::COUNT);
         share * bounds.size().iter().product::<f64>()
     });
+    let size = mean_size(&mesh);
+    let surface = surface(region, environment, size)?;
+    let fit = mesher::fit(&mesh, size, &surface, (&**environment.region, own), &inside, mended);
+    let todo = match spec {
+        TetsKind::Made(_) => "take a smaller size",
+        TetsKind::File(_) => "is it a mesh of this region, in the right place and unit?",
+    };
+    let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
+    made.warnings.extend(notes.warnings);
     made.report.region_volume = Some(own);
     made.names = names;
     Ok(made)
 }
 
+/// The edge of a regular tetrahedron of the mean volume (mm).
+fn mean_size(mesh: &TetMesh) -> f64 {
+    (72f64.sqrt() * mesh.volume() / mesh.tets.len().max(1) as f64).cbrt()
+}
+
 /// A number to five digits.
 pub(super) fn five(v: f64) -> f64 {
     format!("{v:.4e}").parse().unwrap_or(v)
+}
+
+/// A number to three digits.
+fn three(v: f64) -> f64 {
+    format!("{v:.2e}").parse().unwrap_or(v)
 }
 
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
@@ -332,19 +345,32 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             number(fit.mended)
         ));
     }
-    if fit.lost > MUCH || (fit.lost > LOST && fit.lost_depth > DEEP * q.size.mean) {
+    let lost: Vec<&LostFeature> = fit.lost.iter().filter(|f| f.depth > DEEP * q.size.mean).collect();
+    if !lost.is_empty() {
+        let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), number(three(f.size)), at(f.at));
+        let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
+        if lost.len() > NAMED {
+            named.push(format!("{} more", lost.len() - NAMED));
+        }
         say(format!(
-            "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
-            100.0 * fit.lost,
-            fit.lost_depth,
-            at(fit.lost_at)
+            "the tetrahedra do not keep {} of the region: {}; {todo}",
+            counted(lost.len(), "feature"),
+            named.join(", ")
         ));
     }
-    if fit.deviation > 0.5 * q.size.mean {
+    if fit.uncovered.share > MUCH && fit.uncovered.depth > DEEP * q.size.mean {
+        say(format!(
+            "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
+            100.0 * fit.uncovered.share,
+            fit.uncovered.depth,
+            at(fit.uncovered.at)
+        ));
+    }
+    if fit.to_part.max > 0.5 * q.size.mean {
         say(format!(
             "the mesh's boundary is {:.3} mm off the region's surface at {}, more than half a tetrahedron",
-            fit.deviation,
-            at(fit.deviation_at)
+            fit.to_part.max,
+            at(fit.to_part.at)
         ));
     }
     out
@@ -390,7 +416,7 @@ mod tests {
     fn meshes_are_made_and_read() {
         let it = made("size = 0.3").unwrap();
         assert!((it.report.quality.volume - 1.0).abs() < 1e-12 && it.warnings.is_empty());
-        assert!(it.report.fit.unwrap().lost == 0.0);
+        assert!(it.report.fit.unwrap().uncovered.share == 0.0);
         let it = made("path = \"tets.vtk\"").unwrap();
         assert_eq!((it.mesh.tets.len(), it.mesh.zones.as_slice()), (6, &[1, 1, 1, 2, 2, 2][..]));
         let it = made("path = \"hex.vtk\"\nsplit = true").unwrap();

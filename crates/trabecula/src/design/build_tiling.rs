@@ -165,7 +165,7 @@ pub(super) fn domain<'a>(
 
 /// What a region and a mesh of something else have in common: the region, if the mesh holds it.
 fn common(region: &Region, mesh: &Tets, report: &TetReport, path: &str) -> Result<Region, DesignError> {
-    if report.fit.as_ref().is_some_and(|f| f.lost == 0.0) {
+    if report.fit.as_ref().is_some_and(|f| f.uncovered.share == 0.0) {
         return Ok(region.clone());
     }
     let both = Intersection::new(vec![region.clone(), enclosed(mesh.boundary(), path)?]);

@@ -149,6 +149,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
         singular: lattice.map.solved().map(|map| singular(&map.distortion().singular)),
         periods: lattice.map.solved().map(|map| periods(map.periods())).filter(|p| !p.is_empty()),
+        fit: None,
         tets: None,
     }
 }
@@ -190,7 +191,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let (_, volume, solid) = sums(None);
     let mesh = TilingReport {
         count: tiling.map.len(),
-        mesh: (&it.mesh).into(),
+        mesh: TetMeshReport { fit: None, ..(&it.mesh).into() },
         edge: tiling.map.mean_edge(),
         volume,
         solid_fraction: solid / volume,
@@ -220,6 +221,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
         distortion: None,
         singular: None,
         periods: None,
+        fit: it.mesh.fit.as_ref().map(FitReport::from),
         tets: None,
     };
     if !it.zones.is_empty() {

@@ -1,79 +1,115 @@
-//! Fit of a mesh to its region: distance of the boundary from the surface, and the uncovered part of the region.
+//! Fit of a mesh to its region: distances both ways, features that are not kept, and the uncovered part of the region.
 
-use std::collections::HashMap;
+use rayon::prelude::*;
 
-use super::Fit;
 use super::isosurface_stuffing::values;
 use crate::field::Field;
-use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
+use geometry::math::{Vec3, dot, scale, sub};
+use geometry::mesh::Mesh;
+use geometry::mesh::surface_samples::SurfaceSample;
 use geometry::tetmesh::TetMesh;
+use geometry::tetmesh::surface_fit::{Distances, LostFeature, distances, lost_features, to_boundary, volume_outside};
+use geometry::tetmesh::tet_locator::TetLocator;
 
-/// The fit of a mesh to a region, given its signed distance (mm) and points inside it.
-pub fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3]) -> Fit {
+/// Spacing of the samples of a surface, in sizes of tetrahedra.
+const STEP: f64 = 1.0 / 8.0;
+/// About the maximum number of samples of a surface.
+const MOST: f64 = 400_000.0;
+
+/// The fit of a mesh to its region.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// From the boundary of the tetrahedra to the region's surface.
+    pub to_part: Distances,
+    /// From the region's surface to the boundary of the tetrahedra.
+    pub from_part: Distances,
+    /// Volume of tetrahedra outside the region (mm³), by samples.
+    pub gained: f64,
+    /// Volume of the region outside the tetrahedra (mm³), by samples.
+    pub missed: f64,
+    /// Features that are not kept, the deepest first.
+    pub lost: Vec<LostFeature>,
+    /// What no tetrahedron covers.
+    pub uncovered: Uncovered,
+    /// Volume removed where the boundary was non-manifold, and of small detached fragments (mm³).
+    pub mended: f64,
+}
+
+/// The part of a region that no tetrahedron covers, by samples: cut edges and thin walls.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Uncovered {
+    /// Fraction of the region.
+    pub share: f64,
+    /// Depth below the region's surface of the deepest uncovered point (mm).
+    pub depth: f64,
+    /// Position of that point (mm).
+    pub at: Vec3,
+}
+
+/// The fit of a mesh of tetrahedra of `size` (mm) to a region of some volume (mm³), given its surface, its signed distance (mm) and
+/// points inside it; `mended` (mm³) is what the mesher left out.
+pub fn fit(
+    mesh: &TetMesh,
+    size: f64,
+    surface: &Mesh,
+    (region, volume): (&dyn Field, f64),
+    inside: &[Vec3],
+    mended: f64,
+) -> Fit {
+    let spacing = |of: &Mesh| (STEP * size).max((of.area() / MOST).sqrt());
     let boundary = mesh.boundary();
-    let mut samples = Vec::with_capacity(4 * boundary.triangles.len());
-    for i in 0..boundary.triangles.len() {
-        let [a, b, c] = boundary.corners(i);
-        samples.push(scale(add(add(a, b), c), 1.0 / 3.0));
-        samples.extend([(a, b), (b, c), (c, a)].map(|(p, q)| scale(add(p, q), 0.5)));
-    }
-    let off = values(region, &samples);
-    let mut sorted: Vec<f64> = off.iter().map(|v| v.abs()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let p95 = (sorted.len().saturating_sub(1) as f64 * 0.95).round() as usize;
-    let far = (0..off.len()).fold(0, |m, i| if off[i].abs() > off[m].abs() { i } else { m });
-    let left = uncovered(mesh, inside);
-    let depths = values(region, &left);
-    let deep = (0..left.len()).fold(0, |m, i| if depths[i] < depths[m] { i } else { m });
+    let own = boundary.samples(spacing(&boundary));
+    let locator = TetLocator::new(mesh);
+    let step = spacing(surface);
+    let samples = on_surface(region, surface.samples(step), step);
+    let off = to_boundary(&samples, mesh, &locator);
+    let uncovered = uncovered(&locator, region, inside);
     Fit {
-        deviation_mean: off.iter().map(|v| v.abs()).sum::<f64>() / off.len().max(1) as f64,
-        deviation_p95: sorted.get(p95).copied().unwrap_or_default(),
-        deviation: off.get(far).map_or(0.0, |v| v.abs()),
-        deviation_at: samples.get(far).copied().unwrap_or_default(),
-        lost: left.len() as f64 / inside.len().max(1) as f64,
-        lost_depth: depths.get(deep).map_or(0.0, |v| -v),
-        lost_at: left.get(deep).copied().unwrap_or_default(),
-        mended: 0.0,
+        to_part: distances(&own, &values(region, &own.iter().map(|s| s.at).collect::<Vec<_>>())),
+        from_part: distances(&samples, &off),
+        gained: volume_outside(mesh, |p| values(region, p)),
+        missed: uncovered.share * volume,
+        lost: lost_features(&samples, &off, size, step),
+        uncovered,
+        mended,
     }
 }
 
-/// The points that are in no tetrahedron.
-fn uncovered(mesh: &TetMesh, points: &[Vec3]) -> Vec<Vec3> {
-    let bounds = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-    // About one point per cell.
-    let [x, y, z] = bounds.size();
-    let cell = (x * y * z / points.len().max(1) as f64).cbrt().max(1e-9 * norm(bounds.size()));
-    let index = |p: Vec3| p.map(|v| (v / cell).floor() as i64);
-    let mut at: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    for (i, p) in points.iter().enumerate() {
-        at.entry(index(*p)).or_default().push(i as u32);
-    }
-    let mut covered = vec![false; points.len()];
-    for i in 0..mesh.tets.len() {
-        let p = mesh.corners(i);
-        let b = p.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)).intersection(bounds);
-        if b.is_empty() {
-            continue;
-        }
-        let (low, high) = (index(b.min), index(b.max));
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                for x in low[0]..=high[0] {
-                    for &k in at.get(&[x, y, z]).into_iter().flatten() {
-                        covered[k as usize] |= holds(p, points[k as usize]);
-                    }
-                }
+/// Samples of a surface that is near the region's, moved onto it by Newton's method; those that do not come to it stay.
+fn on_surface(region: &dyn Field, mut samples: Vec<SurfaceSample>, reach: f64) -> Vec<SurfaceSample> {
+    const STEPS: usize = 4;
+    const BATCH: usize = 256;
+    samples.par_chunks_mut(BATCH).for_each(|samples| {
+        let start: Vec<Vec3> = samples.iter().map(|s| s.at).collect();
+        let mut points = start.clone();
+        let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+        for _ in 0..STEPS {
+            region.gradients(&points, &mut v, &mut g);
+            for ((p, v), g) in points.iter_mut().zip(&v).zip(&g) {
+                *p = sub(*p, scale(*g, v / dot(*g, *g).max(f64::MIN_POSITIVE)));
             }
         }
-    }
-    let left = points.iter().zip(covered).filter(|(_, c)| !c);
-    left.map(|(p, _)| *p).collect()
+        let mut before = vec![0.0; points.len()];
+        region.values(&start, &mut before);
+        region.values(&points, &mut v);
+        for (k, s) in samples.iter_mut().enumerate() {
+            let moved = sub(points[k], s.at);
+            if v[k].abs() < before[k].abs() && dot(moved, moved) < reach * reach {
+                s.at = points[k];
+            }
+        }
+    });
+    samples
 }
 
-/// Whether a point is in a tetrahedron, within rounding.
-fn holds(t: [Vec3; 4], p: Vec3) -> bool {
-    geometry::tetmesh::FACES.iter().all(|&[a, b, c]| {
-        let n = cross(sub(t[b], t[a]), sub(t[c], t[a]));
-        dot(sub(p, t[a]), n) <= 1e-12 * norm(n) * norm(sub(t[b], t[a]))
-    })
+/// The part of a region that no tetrahedron covers, by points inside it.
+pub fn uncovered(mesh: &TetLocator, region: &dyn Field, inside: &[Vec3]) -> Uncovered {
+    let left: Vec<Vec3> = inside.par_iter().filter(|p| !mesh.covers(**p)).copied().collect();
+    let depths = values(region, &left);
+    let deep = (0..left.len()).fold(0, |m, i| if depths[i] < depths[m] { i } else { m });
+    Uncovered {
+        share: left.len() as f64 / inside.len().max(1) as f64,
+        depth: depths.get(deep).map_or(0.0, |v| -v),
+        at: left.get(deep).copied().unwrap_or_default(),
+    }
 }

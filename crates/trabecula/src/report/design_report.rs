@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{BeamsReport, TilingReport, Varying};
+use super::{BeamsReport, FitReport, TilingReport, Varying};
 use crate::kind::Warning;
 
 /// The figures of a design, without meshing it.
@@ -69,6 +69,9 @@ pub struct LatticeReport {
     /// Cells round the holes of the region; None where the phases of a solved map have one value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub periods: Option<Vec<PeriodReport>>,
+    /// How the tetrahedra of a lattice fit the region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<FitReport>,
     /// The tetrahedral mesh of a lattice over tetrahedra, and the cells in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tets: Option<TilingReport>,

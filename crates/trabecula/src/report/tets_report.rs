@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use geometry::tetmesh::surface_fit::{Distances, LostFeature};
 use geometry::tetmesh::{Dihedral, Quality, Spread};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,7 +18,7 @@ pub struct TetMeshReport {
     pub mesher: String,
     /// Shapes and sizes.
     pub quality: TetQualityReport,
-    /// How it fits its region; None without one.
+    /// How it fits its region; None without one, and within the report of a lattice, which has it itself.
     pub fit: Option<FitReport>,
     /// Volume of its region as described, mm³; None without one.
     pub region_volume: Option<f64>,
@@ -86,24 +87,55 @@ pub struct TetQualityReport {
 }
 
 /// How a tetrahedral mesh fits its region.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct FitReport {
-    /// Mean distance between the boundary and the region's surface, mm.
-    pub deviation_mean: f64,
-    /// 95th percentile of that distance, mm.
-    pub deviation_p95: f64,
-    /// Its maximum, mm.
-    pub deviation: f64,
-    /// Position of the maximum, mm.
-    pub deviation_at: [f64; 3],
+    /// Distances from the boundary of the mesh to the region's surface.
+    pub to_part: DistanceReport,
+    /// Distances from the region's surface to the boundary of the mesh.
+    pub from_part: DistanceReport,
+    /// Volume of tetrahedra outside the region, mm³.
+    pub gained: f64,
+    /// Volume of the region outside the tetrahedra, mm³.
+    pub missed: f64,
+    /// Features of the region that the mesh does not keep, the deepest first: where its surface is farther than an eighth of a
+    /// tetrahedron's size from the boundary.
+    pub lost: Vec<LostFeatureReport>,
     /// Share of the region that no tetrahedron covers.
-    pub lost: f64,
+    pub uncovered: f64,
     /// Greatest depth of such a point below the region's surface, mm.
-    pub lost_depth: f64,
+    pub uncovered_depth: f64,
     /// Position of that point, mm.
-    pub lost_at: [f64; 3],
+    pub uncovered_at: [f64; 3],
     /// Volume left out where the boundary would meet itself, and of fragments, mm³.
     pub mended: f64,
+}
+
+/// Distances from one surface to another, by samples an eighth of a tetrahedron's size apart, mm.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct DistanceReport {
+    /// Mean.
+    pub mean: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Maximum.
+    pub max: f64,
+    /// Position of the maximum, mm.
+    pub at: [f64; 3],
+}
+
+/// A feature of a region that a mesh does not keep.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct LostFeatureReport {
+    /// Filled: hole, slot, recess; left out: wall, pin, block.
+    pub kind: &'static str,
+    /// Where it is farthest from the boundary of the mesh, mm.
+    pub at: [f64; 3],
+    /// Its width, mm: of a hole or pin the diameter, of a slot or wall the distance between its faces, else the depth.
+    pub size: f64,
+    /// The greatest distance from the boundary of the mesh, mm.
+    pub depth: f64,
 }
 
 impl From<Spread> for MinMeanMax {
@@ -145,16 +177,29 @@ impl From<&Quality> for TetQualityReport {
     }
 }
 
+impl From<Distances> for DistanceReport {
+    fn from(d: Distances) -> Self {
+        DistanceReport { mean: d.mean, p95: d.p95, p99: d.p99, max: d.max, at: d.at }
+    }
+}
+
+impl From<&LostFeature> for LostFeatureReport {
+    fn from(f: &LostFeature) -> Self {
+        LostFeatureReport { kind: f.kind.word(), at: f.at, size: f.size, depth: f.depth }
+    }
+}
+
 impl From<&Fit> for FitReport {
     fn from(f: &Fit) -> Self {
         FitReport {
-            deviation_mean: f.deviation_mean,
-            deviation_p95: f.deviation_p95,
-            deviation: f.deviation,
-            deviation_at: f.deviation_at,
-            lost: f.lost,
-            lost_depth: f.lost_depth,
-            lost_at: f.lost_at,
+            to_part: f.to_part.into(),
+            from_part: f.from_part.into(),
+            gained: f.gained,
+            missed: f.missed,
+            lost: f.lost.iter().map(LostFeatureReport::from).collect(),
+            uncovered: f.uncovered.share,
+            uncovered_depth: f.uncovered.depth,
+            uncovered_at: f.uncovered.at,
             mended: f.mended,
         }
     }
