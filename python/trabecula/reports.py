@@ -16,6 +16,7 @@ __all__ = [
     "DanglingReport",
     "DesignReport",
     "DihedralReport",
+    "DistanceReport",
     "DistortionReport",
     "EstimateReport",
     "FilletShortfall",
@@ -28,6 +29,7 @@ __all__ = [
     "LatticeReport",
     "LayersReport",
     "LooseBodies",
+    "LostFeatureReport",
     "MapSpread",
     "MeshReport",
     "MinMeanMax",
@@ -289,6 +291,21 @@ class DihedralReport(Report):
     """Median of each tetrahedron's least angle."""
 
 
+class DistanceReport(Report):
+    """Distances from one surface to another, by samples an eighth of a tetrahedron's size apart, mm."""
+
+    at: list[float]
+    """Position of the maximum, mm."""
+    max: float
+    """Maximum."""
+    mean: float
+    """Mean."""
+    p95: float
+    """95th percentile."""
+    p99: float
+    """99th percentile."""
+
+
 class DistortionReport(Report):
     """Deviation of a solved map's gradients ∇Φᵢ from the wanted ones Kᵢ."""
 
@@ -358,22 +375,31 @@ class FilletShortfall(Report):
 class FitReport(Report):
     """How a tetrahedral mesh fits its region."""
 
-    deviation: float
-    """Its maximum, mm."""
-    deviation_at: list[float]
-    """Position of the maximum, mm."""
-    deviation_mean: float
-    """Mean distance between the boundary and the region's surface, mm."""
-    deviation_p95: float
-    """95th percentile of that distance, mm."""
-    lost: float
-    """Share of the region that no tetrahedron covers."""
-    lost_at: list[float]
-    """Position of that point, mm."""
-    lost_depth: float
-    """Greatest depth of such a point below the region's surface, mm."""
+    _parts = {
+        "from_part": "DistanceReport",
+        "lost": "LostFeatureReport",
+        "to_part": "DistanceReport",
+    }
+
+    from_part: DistanceReport
+    """Distances from the region's surface to the boundary of the mesh."""
+    gained: float
+    """Volume of tetrahedra outside the region, mm³."""
+    lost: list[LostFeatureReport]
+    """Features of the region that the mesh does not keep, the deepest first: where its surface is farther than an eighth of
+    a tetrahedron's size from the boundary."""
     mended: float
     """Volume left out where the boundary would meet itself, and of fragments, mm³."""
+    missed: float
+    """Volume of the region outside the tetrahedra, mm³."""
+    to_part: DistanceReport
+    """Distances from the boundary of the mesh to the region's surface."""
+    uncovered: float
+    """Share of the region that no tetrahedron covers."""
+    uncovered_at: list[float]
+    """Position of that point, mm."""
+    uncovered_depth: float
+    """Greatest depth of such a point below the region's surface, mm."""
 
 
 class FractionAlong(Report):
@@ -448,6 +474,7 @@ class LatticeReport(Report):
 
     _parts = {
         "distortion": "DistortionReport",
+        "fit": "FitReport",
         "periods": "PeriodReport",
         "singular": "SingularLineReport",
         "tets": "TilingReport",
@@ -457,6 +484,8 @@ class LatticeReport(Report):
     """Intervals of the fraction in which the periodic solid is one connected component."""
     distortion: DistortionReport | None
     """Deviation of a solved map from the orientation and wavelength asked for."""
+    fit: FitReport | None
+    """How the tetrahedra of a lattice fit the region."""
     folding: float | None
     """The thickness beyond which a wall of given thickness folds, mm; None for other levels."""
     fraction: float | list[float]
@@ -511,6 +540,19 @@ class LooseBodies(Report):
     """Their number."""
     volume: float
     """Their volume, mm³."""
+
+
+class LostFeatureReport(Report):
+    """A feature of a region that a mesh does not keep."""
+
+    at: list[float]
+    """Where it is farthest from the boundary of the mesh, mm."""
+    depth: float
+    """The greatest distance from the boundary of the mesh, mm."""
+    kind: str
+    """Filled: hole, slot, recess; left out: wall, pin, block."""
+    size: float
+    """Its width, mm: of a hole or pin the diameter, of a slot or wall the distance between its faces, else the depth."""
 
 
 class MapSpread(Report):
@@ -838,7 +880,7 @@ class TetMeshReport(Report):
     }
 
     fit: FitReport | None
-    """How it fits its region; None without one."""
+    """How it fits its region; None without one, and within the report of a lattice, which has it itself."""
     mesher: str
     """What made it: background, ftetwild, or the file's name."""
     quality: TetQualityReport

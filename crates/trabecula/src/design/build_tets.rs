@@ -11,7 +11,7 @@ use crate::mesher::{self, Fit, background};
 use crate::report::{FitReport, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
-use geometry::tetmesh::surface_fit::LostFeature;
+use geometry::tetmesh::surface_fit::{LostFeature, LostKind};
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
 use geometry::transform::Transform;
 use source::{from_file, surface, triangles, wild};
@@ -21,6 +21,8 @@ const DEEP: f64 = 0.17;
 /// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
 /// short by flat ones, which takes much of a coarse mesh but nothing deep.
 const MUCH: f64 = 0.1;
+/// Distance above which the boundary is far off, in sizes; cells at cut edges are stretched to there.
+const FAR: f64 = 0.5;
 /// Number of lost features that a warning names.
 const NAMED: usize = 3;
 
@@ -345,7 +347,11 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             number(fit.mended)
         ));
     }
-    let lost: Vec<&LostFeature> = fit.lost.iter().filter(|f| f.depth > DEEP * q.size.mean).collect();
+    let matters = |f: &&LostFeature| {
+        let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
+        f.depth > if one_way { FAR } else { DEEP } * q.size.mean
+    };
+    let lost: Vec<&LostFeature> = fit.lost.iter().filter(matters).collect();
     if !lost.is_empty() {
         let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), number(three(f.size)), at(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
@@ -353,7 +359,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             named.push(format!("{} more", lost.len() - NAMED));
         }
         say(format!(
-            "the tetrahedra do not keep {} of the region: {}; {todo}",
+            "the tetrahedra do not follow {} of the region: {}; cells are cut or stretched there; {todo}",
             counted(lost.len(), "feature"),
             named.join(", ")
         ));
@@ -366,7 +372,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             at(fit.uncovered.at)
         ));
     }
-    if fit.to_part.max > 0.5 * q.size.mean {
+    if fit.to_part.max > FAR * q.size.mean {
         say(format!(
             "the mesh's boundary is {:.3} mm off the region's surface at {}, more than half a tetrahedron",
             fit.to_part.max,
