@@ -101,13 +101,13 @@ impl Tets {
     /// The tetrahedral mesh in a file, of no region.
     pub fn in_file(file: &TetFileKind, loader: &dyn Loader) -> Result<Tets, DesignError> {
         let (mesh, checked, names) = from_file(file, "", loader)?;
-        Ok(Tets { names, ..checked_mesh(mesh, &checked, file.path.clone(), None, "", "")? })
+        Ok(Tets { names, ..checked_mesh(mesh, &checked, file.path.clone(), None, "", false)? })
     }
 
     /// The image of the mesh, of no region.
     pub fn transformed(&self, by: &Transform) -> Result<Tets, DesignError> {
         let mesh = self.mesh.transformed(by).map_err(|f| DesignError::fault("", f))?;
-        let made = checked_mesh(mesh, &Checked::default(), self.report.mesher.clone(), None, "", "")?;
+        let made = checked_mesh(mesh, &Checked::default(), self.report.mesher.clone(), None, "", false)?;
         Ok(Tets { names: self.names.clone(), ..made })
     }
 
@@ -199,11 +199,8 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     let size = mean_size(&mesh);
     let surface = surface(region, environment, size)?;
     let fit = mesher::fit(&mesh, size, &surface, (&**environment.region, own), &inside, mended);
-    let todo = match spec {
-        TetsKind::Made(_) => "take a smaller size",
-        TetsKind::File(_) => "is it a mesh of this region, in the right place and unit?",
-    };
-    let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
+    let is_made = matches!(spec, TetsKind::Made(_));
+    let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, is_made)?;
     made.warnings.extend(notes.warnings);
     made.report.region_volume = Some(own);
     made.names = names;
@@ -261,20 +258,20 @@ fn zones(
     Ok(of.into_iter().map(|z| z.unwrap_or(0)).collect())
 }
 
-/// The mesh with its figures, and warnings at `path`; `todo` against what is lost.
+/// The mesh with its figures, and warnings at `path`; whether it was made for its region.
 fn checked_mesh(
     mesh: TetMesh,
     checked: &Checked,
     mesher: String,
     fit: Option<Fit>,
     path: &str,
-    todo: &str,
+    is_made: bool,
 ) -> Result<Tets, DesignError> {
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
     let report = TetReport { mesher, quality, fit, region_volume: None };
-    let warnings = warnings(&report, checked, path, todo);
+    let warnings = warnings(&report, checked, path, is_made);
     Ok(Tets { mesh, names: Vec::new(), report, warnings })
 }
 
@@ -306,7 +303,7 @@ pub(super) fn of_soup(
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
     let mut notes = crate::region::Notes::default();
     mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
-    let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, "")?;
+    let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, true)?;
     made.warnings.extend(notes.warnings);
     let message = format!("no region, so the boundary of the tetrahedra is taken for one: {}", why.message);
     let path = "region.mesh".into();
@@ -315,7 +312,7 @@ pub(super) fn of_soup(
 }
 
 /// Warnings of likely mistakes.
-fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Vec<Warning> {
+fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut say = |message: String| {
         out.push(Warning { path: path.to_string(), message });
@@ -347,12 +344,16 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             number(fit.mended)
         ));
     }
+    let todo =
+        if is_made { "take a smaller size" } else { "is it a mesh of this region, in the right place and unit?" };
+    // A mesh of something else has no features of the region to keep.
+    let strange = !is_made && fit.to_part.max > FAR * q.size.mean;
     let matters = |f: &&LostFeature| {
         let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
         f.depth > if one_way { FAR } else { DEEP } * q.size.mean
     };
     let lost: Vec<&LostFeature> = fit.lost.iter().filter(matters).collect();
-    if !lost.is_empty() {
+    if !lost.is_empty() && !strange {
         let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), number(three(f.size)), at(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
         if lost.len() > NAMED {
