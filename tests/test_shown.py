@@ -5,7 +5,8 @@ import zlib
 import numpy as np
 import pytest
 import trabecula as lt
-from trabecula.shown import SHOWN, look, towards
+from trabecula.camera import towards
+from trabecula.shown import SHOWN, look
 from trabecula.trajectories import trajectories
 
 EYE = (30, 40)

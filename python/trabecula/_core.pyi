@@ -304,4 +304,5 @@ class Mesh:
         tint: tuple[str, Sequence[float], tuple[float, float]] | None = None,
         shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
         lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
+        section: tuple[tuple[float, float, float], float] | None = None,
     ) -> bytes: ...

@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 
+from .camera import VIEWS
 from .formats import (
     CONDUCTIVITY_WRITES,
     DESIGNS,
@@ -80,6 +81,8 @@ MODULUS = number("Young's modulus", lambda v: v > 0, " greater than 0")
 NUMBER = number("a number")
 SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")
 VOXELS = number("a whole number", lambda v: 8 <= v <= 4096, " from 8 to 4096", int)
+FRAMES = number("a whole number", lambda v: 2 <= v <= 720, " from 2 to 720", int)
+SECONDS = number("a time in s", lambda v: v > 0, " greater than 0")
 #: A closed mesh has at least 4 triangles.
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
@@ -456,8 +459,16 @@ COMMANDS = {
         "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25",
         *(DESIGN_OR_MESH, output(("png",), "the picture (.png)")),
         option("--size", type=size, default=(1600, 1200), metavar="WxH", help="pixels (default: 1600x1200)"),
-        option("--azimuth", type=ANGLE, default=30.0, metavar="DEG", help="camera about +z (default: 30)"),
-        option("--elevation", type=ANGLE, default=25.0, metavar="DEG", help="camera above xy (default: 25)"),
+        option("--azimuth", type=ANGLE, metavar="DEG", help="camera about +z (default: 30)"),
+        option("--elevation", type=ANGLE, metavar="DEG", help="camera above xy (default: 25)"),
+        option("--view", choices=VIEWS, help="camera by name, in place of its angles"),
+        option(
+            "--section",
+            metavar="PLANE",
+            help='"z=10": without what is before this plane (mm), what it cuts hatched; "z<10", "z>10": what is kept',
+        ),
+        option("--turn", type=FRAMES, metavar="N", help="an animated PNG: N pictures from all round"),
+        option("--seconds", type=SECONDS, default=6.0, metavar="S", help="time of one turn (default: 6)"),
         option(
             "--show",
             choices=SHOWN,

@@ -7,6 +7,7 @@ import os
 from functools import cached_property
 
 from . import _core
+from .camera import section_plane, towards
 from .files import extension, read_text, whole_file
 from .formats import DESIGNS, MESH_READS, MESH_WRITES
 from .given import fixed, number, positive, whole
@@ -424,6 +425,7 @@ class Mesh(Picture, Transformed):
         shares: Mapping[str, ArrayLike] | None = None,
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
+        section: str | None = None,
     ) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
@@ -431,7 +433,8 @@ class Mesh(Picture, Transformed):
         to the greatest. ``shares`` are instead numbers from 0 to 1 for each vertex by a name: each name has a colour, shares
         mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they are ``width`` mm wide (1/100 of the diagonal
         unless given) and are seen through the surface, which is pale unless it has colours. ``label`` is what colours say, or
-        else lines.
+        else lines. ``section`` is what is kept of a closed surface, ``"z<10"``, ``"z>10"`` (mm), or by ``"z=10"`` what is
+        farther from the eye; the solid that is cut is hatched.
         """
         pixels = tuple(whole("size", v, 1, 16384) for v in size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
@@ -442,7 +445,8 @@ class Mesh(Picture, Transformed):
         tint = None if color is None else self._tint(color, label, span)
         mixed = None if shares is None else self._shares(shares, label)
         drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
-        return self._core.png(*pixels, *angles, tint, mixed, drawn)
+        plane = None if section is None else section_plane(section, towards(azimuth, elevation))
+        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane)
 
     def _tint(self, color: ArrayLike, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
@@ -505,11 +509,12 @@ class Mesh(Picture, Transformed):
         shares: Mapping[str, ArrayLike] | None = None,
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
+        section: str | None = None,
     ) -> None:
         """Writes a picture to a .png file; see ``png``."""
         extension(path, ("png",))
         with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png(size, azimuth, elevation, color, label, span, shares, lines, width))
+            out.write(self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section))
 
     def _picture(self) -> Mesh:
         return self

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 
+from .camera import towards
 from .mesh import Mesh, Picture
-from .shown import look, towards
+from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ class Seen(Picture):
         edge: float | None = None,
         per_cell: float | None = None,
         threads: int | None = None,
+        section: str | None = None,
     ) -> None:
         """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file; the camera as for ``Mesh.png``.
 
@@ -77,7 +79,8 @@ class Seen(Picture):
         """
         seen = None if show is None else look(self, show)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
-        made.render(path, size, azimuth, elevation, **(seen(made, towards(azimuth, elevation)) if seen else {}))
+        shown = seen(made, towards(azimuth, elevation)) if seen else {}
+        made.render(path, size, azimuth, elevation, section=section, **shown)
 
     def _solved(self, lattice: str | None) -> str:
         """The lattice of that name, or else the first whose map was solved for."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     #: Of a mesh of the solid and the direction to the eye: the arguments of ``Mesh.png`` that show it.
     Look = Callable[[Mesh, tuple[float, float, float]], dict[str, Any]]
 
-__all__ = ["SHOWN", "look", "towards"]
+__all__ = ["SHOWN", "look"]
 
 #: Places of axes, and trajectories, along the diagonal of the part.
 PLACES, LINES = 24, 30
@@ -103,12 +103,6 @@ def look(solid: Solid, show: str) -> Look:
     if show not in SHOWN:
         raise ValueError(f'show is "{show}"; it must be one of {", ".join(SHOWN)}')
     return SHOWN[show](solid)
-
-
-def towards(azimuth: float, elevation: float) -> tuple[float, float, float]:
-    """The direction to the eye of a picture, a unit vector."""
-    az, el = math.radians(azimuth), math.radians(max(-90.0, min(elevation, 90.0)))
-    return math.cos(az) * math.cos(el), math.sin(az) * math.cos(el), math.sin(el)
 
 
 def _diagonal(solid: Solid) -> float:

@@ -12,6 +12,7 @@ mod occlusion;
 mod paper;
 mod png;
 mod raster;
+mod section;
 mod shade;
 mod shares;
 mod tint;
@@ -21,6 +22,8 @@ use lines::Tubes;
 use paper::Paper;
 pub use png::png;
 use raster::{BAND, Projected, Raster};
+pub use section::Section;
+use section::SeenSection;
 use shade::{Finish, Shader};
 pub use shares::{Colours, Shares};
 pub use tint::Tint;
@@ -43,6 +46,8 @@ pub struct Look {
     pub colours: Option<Colours>,
     /// Lines, seen through the surface too. A surface without colours is pale then.
     pub lines: Option<Lines>,
+    /// What is left out, of a closed surface; what the plane cuts is hatched.
+    pub section: Option<Section>,
 }
 
 /// The largest picture, in pixels.
@@ -148,9 +153,10 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let body = Layer::new(surface, &camera, size, finish);
+        let section = look.section.as_ref();
+        let body = Layer::new(surface, &camera, size, finish, section);
         let tubes = look.lines.as_ref().map(Tubes::of);
-        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t)));
+        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
         for (i, part) in paper.rgb.chunks_mut(rows / OVER * w * 3).enumerate() {
@@ -178,9 +184,15 @@ struct Layer<'a> {
 }
 
 impl<'a> Layer<'a> {
-    fn new(surface: &'a SurfaceMesh, camera: &'a Camera, size: [usize; 2], finish: Finish<'a>) -> Layer<'a> {
-        let projected = Projected::of(surface, camera, size);
-        Layer { surface, projected, shader: Shader::new(surface, camera, size, finish) }
+    fn new(
+        surface: &'a SurfaceMesh,
+        camera: &'a Camera,
+        size: [usize; 2],
+        finish: Finish<'a>,
+        section: Option<&'a Section>,
+    ) -> Layer<'a> {
+        let projected = Projected::of(surface, camera, size, section);
+        Layer { surface, projected, shader: Shader::new(surface, camera, size, finish, section) }
     }
 
     /// What samples see, and their colours, for `rows` rows from a band on.

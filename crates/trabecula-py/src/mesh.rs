@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
-use geometry::render::{Colours, Lines, Look, Shares, Tint, View, png, render};
+use geometry::render::{Colours, Lines, Look, Section, Shares, Tint, View, png, render};
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
@@ -322,8 +322,8 @@ impl Mesh {
     }
 
     /// A picture as PNG bytes: with a number at each vertex to be seen as a colour, between the two ends of a scale, or with shares of
-    /// named parts at each vertex; with named lines.
-    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None))]
+    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset.
+    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None, section=None))]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn png<'py>(
         &self,
@@ -335,12 +335,14 @@ impl Mesh {
         tint: Option<(String, Vec<f64>, [f64; 2])>,
         shares: Option<(String, Vec<String>, Vec<f64>)>,
         lines: Option<NamedLines>,
+        section: Option<([f64; 3], f64)>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let size = [width, height];
         let scale = tint.map(|(title, values, span)| Colours::Scale(Tint { title, values, span }));
         let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
         let lines = lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius });
-        let look = Look { colours: scale.or(parts), lines };
+        let section = section.map(|(normal, offset)| Section { normal, offset });
+        let look = Look { colours: scale.or(parts), lines, section };
         let bytes = run(py, None, None, |_| {
             let view = View { size, azimuth, elevation };
             png(&render(&self.surface, &view, &look), size)

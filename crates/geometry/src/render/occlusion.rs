@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::raster::Projected;
-use super::{Camera, SAMPLES};
+use super::{Camera, SAMPLES, Section};
 use crate::math::{Vec3, cross, dot, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -27,13 +27,13 @@ pub(super) struct Occlusion {
 
 impl Occlusion {
     /// Of a picture of `size` samples across and down.
-    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Occlusion {
+    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2], section: Option<&Section>) -> Occlusion {
         let samples = (size[0] * size[1]) as f64;
         let most = SAMPLES as f64 / (STRIDE * STRIDE);
         let factor = (1.0 / STRIDE).min((most / samples).sqrt());
         let camera = camera.scaled(factor);
         let size = size.map(|n| ((n as f64 * factor).ceil() as usize).max(1));
-        let raster = Projected::of(surface, &camera, size).draw(surface, 0, size[1]);
+        let raster = Projected::of(surface, &camera, size, section).draw(surface, 0, size[1]);
         let raw = estimated(&camera, &raster.near, size);
         let open = smoothed(&raw, size, |x, y| raster.near[y * size[0] + x]);
         Occlusion { size, factor, near: raster.near, open }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Camera;
+use super::{Camera, Section, SeenSection};
 use crate::math::sub;
 use crate::surface_mesh::SurfaceMesh;
 
@@ -10,6 +10,9 @@ use crate::surface_mesh::SurfaceMesh;
 pub(super) const NONE: u32 = u32::MAX;
 /// Rows drawn by one thread at a time: whole rows of pixels.
 pub(super) const BAND: usize = 16 * super::OVER;
+
+/// Of the number of a triangle whose inside is seen: a section cuts the solid there.
+pub(super) const INSIDE: u32 = 1 << 31;
 
 /// Depth and triangle of each sample of some rows.
 pub(super) struct Raster {
@@ -19,7 +22,7 @@ pub(super) struct Raster {
     pub width: usize,
     /// Inverse distance, 0 where nothing is seen.
     pub near: Vec<f32>,
-    /// The triangle seen.
+    /// The triangle seen; with `INSIDE` the one behind the section there, in whose plane the depth is.
     pub triangle: Vec<u32>,
 }
 
@@ -27,13 +30,14 @@ pub(super) struct Raster {
 pub(super) struct Projected {
     points: Vec<[f32; 3]>,
     width: usize,
+    section: Option<SeenSection>,
     /// By chunks of triangles, then by bands: a band's triangles are in their own order.
     binned: Vec<Vec<Vec<u32>>>,
 }
 
 impl Projected {
     /// Projects into a picture of `size` samples across and down.
-    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Projected {
+    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2], section: Option<&Section>) -> Projected {
         const CHUNK: usize = 1 << 16;
         let mesh = &surface.mesh;
         let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();
@@ -55,7 +59,8 @@ impl Projected {
             bins
         });
         let binned = chunks.collect();
-        Projected { points, width: size[0], binned }
+        let section = section.map(|s| SeenSection::new(s, camera));
+        Projected { points, width: size[0], section, binned }
     }
 
     /// Draws `rows` rows from a band on. Bands are independent, and within one the triangles come in their own order, so
@@ -68,7 +73,10 @@ impl Projected {
             |(i, (near, triangle))| {
                 for t in self.binned.iter().flat_map(|bins| &bins[band + i]) {
                     let corners = surface.mesh.triangles[*t as usize].map(|v| self.points[v as usize]);
-                    fill(corners, *t, width, first + i * BAND, near, triangle);
+                    fill(corners, *t, self.section.as_ref(), width, first + i * BAND, near, triangle);
+                }
+                if let Some(section) = &self.section {
+                    close(section, width, first + i * BAND, near, triangle);
                 }
             },
         );
@@ -77,7 +85,15 @@ impl Projected {
 }
 
 /// Draws one triangle into rows that begin at `first`.
-fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32], triangle: &mut [u32]) {
+fn fill(
+    p: [[f32; 3]; 3],
+    id: u32,
+    section: Option<&SeenSection>,
+    width: usize,
+    first: usize,
+    near: &mut [f32],
+    triangle: &mut [u32],
+) {
     let p = p.map(|c| [c[0], c[1] - first as f32, c[2]]);
     let [a, b, c] = p;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -106,10 +122,24 @@ fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32],
             // The inverse distance is linear over the screen.
             let z = u * a[2] + v * b[2] + w * c[2];
             let at = y * width + x;
-            if z > near[at] {
+            if z > near[at] && !section.is_some_and(|s| s.removes(f64::from(fx), f64::from(fy) + first as f64, z)) {
                 near[at] = z;
-                triangle[at] = id;
+                // Rows go down, so triangles that face the eye are clockwise.
+                triangle[at] = if section.is_some() && area > 0.0 { id | INSIDE } else { id };
             }
+        }
+    }
+}
+
+/// Brings samples that see the inside of the solid to the section, where the solid is cut.
+fn close(section: &SeenSection, width: usize, first: usize, near: &mut [f32], triangle: &mut [u32]) {
+    for (at, (near, triangle)) in near.iter_mut().zip(triangle).enumerate() {
+        if *triangle == NONE || *triangle & INSIDE == 0 {
+            continue;
+        }
+        match section.near((at % width) as f64 + 0.5, (first + at / width) as f64 + 0.5) {
+            Some(plane) => *near = plane,
+            None => *triangle &= !INSIDE,
         }
     }
 }

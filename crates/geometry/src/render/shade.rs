@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::lines::Tubes;
 use super::occlusion::Occlusion;
-use super::raster::{NONE, Projected, Raster, weights};
-use super::{Camera, Colours, View};
+use super::raster::{INSIDE, NONE, Projected, Raster, weights};
+use super::{Camera, Colours, Section, View};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -16,6 +16,11 @@ const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];
 const CUT: [f32; 3] = [0.27, 0.38, 0.52];
 /// Of lattice and of cuts where there are lines.
 const PALE: [[f32; 3]; 2] = [[0.80, 0.79, 0.77], [0.66, 0.68, 0.70]];
+
+/// Of a section, and its hatching.
+const SECTION: [[f32; 3]; 2] = [[0.66, 0.16, 0.09], [0.40, 0.08, 0.05]];
+/// Samples from one line of the hatching to the next, along a row, and the share of a line.
+const HATCH: (usize, usize) = (21, 5);
 
 /// What a surface is made of.
 #[derive(Clone, Copy)]
@@ -46,6 +51,7 @@ pub(super) struct Shader<'a> {
     /// The direction to the key light.
     key: Vec3,
     shade: Option<(Shadows, Occlusion)>,
+    section: Option<&'a Section>,
 }
 
 impl<'a> Shader<'a> {
@@ -55,13 +61,14 @@ impl<'a> Shader<'a> {
         camera: &'a Camera,
         size: [usize; 2],
         finish: Finish<'a>,
+        section: Option<&'a Section>,
     ) -> Shader<'a> {
         let key = towards(camera, -0.55, 0.75, 0.60);
         let shade = match finish {
             Finish::Lines(_) => None,
-            _ => Some((Shadows::cast(surface, key), Occlusion::of(surface, camera, size))),
+            _ => Some((Shadows::cast(surface, key, section), Occlusion::of(surface, camera, size, section))),
         };
-        Shader { surface, camera, finish, normals: Normals::of(surface), key, shade }
+        Shader { surface, camera, finish, normals: Normals::of(surface), key, shade, section }
     }
 
     /// Premultiplied colour and cover of each sample.
@@ -85,6 +92,11 @@ impl<'a> Shader<'a> {
         let (surface, camera) = (self.surface, self.camera);
         let p = camera.unproject(x as f64 + 0.5, y as f64 + 0.5, f64::from(near));
         let eye = camera.towards(p);
+        if triangle & INSIDE != 0
+            && let Some(section) = self.section
+        {
+            return self.cut_through(section, [x, y], near, p, eye);
+        }
         let cut = surface.cut.get(triangle as usize).copied().unwrap_or(false);
         let flat = unit(area(surface, triangle as usize));
         let t = surface.mesh.triangles[triangle as usize].map(|v| v as usize);
@@ -102,11 +114,26 @@ impl<'a> Shader<'a> {
             Finish::Plain if cut => CUT,
             Finish::Plain => LATTICE,
         };
-        let (sun, open) = match &self.shade {
+        let (sun, open) = self.light([x, y], near, p, flat);
+        lit([n, eye, self.key], sun, camera, colour, open, cut)
+    }
+
+    /// The light from the solid that a section cuts.
+    fn cut_through(&self, section: &Section, [x, y]: [usize; 2], near: f32, p: Vec3, eye: Vec3) -> [f32; 3] {
+        let colour = match self.finish {
+            Finish::Lines(_) => SECTION[1],
+            _ => SECTION[usize::from((x + y) % HATCH.0 < HATCH.1)],
+        };
+        let (sun, open) = self.light([x, y], near, p, section.normal);
+        lit([section.normal, eye, self.key], sun, self.camera, colour, open, true)
+    }
+
+    /// The shares of the key light and of the sky that reach a point of a face of normal `flat`.
+    fn light(&self, [x, y]: [usize; 2], near: f32, p: Vec3, flat: Vec3) -> (f32, f32) {
+        match &self.shade {
             Some((shadows, occlusion)) => (shadows.light(p, flat), occlusion.open(x, y, near)),
             None => (1.0, 1.0),
-        };
-        lit([n, eye, self.key], sun, camera, colour, open, cut)
+        }
     }
 }
 
@@ -129,12 +156,12 @@ impl Shadows {
     const SIZE: usize = 2048;
 
     /// Draws the surface as seen along the light.
-    fn cast(surface: &SurfaceMesh, key: Vec3) -> Shadows {
+    fn cast(surface: &SurfaceMesh, key: Vec3, section: Option<&Section>) -> Shadows {
         let size = [Self::SIZE; 2];
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
         let eye = Camera::new(&surface.mesh.bounds(), &surface.mesh.vertices, &View { size, azimuth, elevation }, size);
-        let raster = Projected::of(surface, &eye, size).draw(surface, 0, Self::SIZE);
+        let raster = Projected::of(surface, &eye, size, section).draw(surface, 0, Self::SIZE);
         let texel = eye.distance / eye.focal;
         Shadows { eye, raster, texel }
     }

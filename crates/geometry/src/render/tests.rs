@@ -210,7 +210,7 @@ fn shares_are_mixtures() {
         let values = s.mesh.vertices.iter().flat_map(|p| [1.0 - of(*p), of(*p)]).collect();
         let names = vec!["first".into(), "second".into()];
         let colours = Some(Colours::Shares(Shares { title: String::new(), names, values }));
-        render(&s, &VIEW, &Look { colours, lines: None })
+        render(&s, &VIEW, &Look { colours, ..Look::default() })
     };
     let empty = render(&SurfaceMesh::default(), &VIEW, &Look::default());
     let [first, second, half] = [0.0, 1.0, 0.5].map(|share| shares(&|_| share));
@@ -244,6 +244,41 @@ fn legends_have_room() {
     let foot = (VIEW.size[1] - 56) * VIEW.size[0] * 3;
     assert!(with[foot..] == without[foot..] && with[..foot] != without[..foot]);
     assert_ne!(render(&block(), &VIEW, &look("three")), with);
+}
+
+/// A section seen from the side that is left out shows the solid cut, in the area that it has; from the other side it shows the
+/// outside alone; one that leaves out nothing changes nothing.
+#[test]
+fn a_section_is_as_large_as_the_solid_there() {
+    let ball = contour(24, |p| norm(sub(p, [0.5; 3])) - 0.4);
+    let view = View { size: [200, 200], azimuth: 20.0, elevation: 90.0 };
+    let look = |offset: f64, side: f64| Look {
+        section: Some(Section { normal: [0.0, 0.0, side], offset: side * offset }),
+        ..Look::default()
+    };
+    let camera = Camera::new(&ball.mesh.bounds(), &ball.mesh.vertices, &view, view.size);
+    let red = |rgb: &[u8]| rgb.chunks(3).filter(|c| i32::from(c[0]) > i32::from(c[1]) + 60).count() as f64;
+    let whole = render(&ball, &view, &Look::default());
+    for height in [0.3, 0.5, 0.75] {
+        let seen = render(&ball, &view, &look(height, 1.0));
+        let near = camera.project([0.5, 0.5, height])[2];
+        let radius = (0.16 - (height - 0.5) * (height - 0.5)).sqrt() * camera.focal * near;
+        // The boundary within a pixel, and the sag of the ball's facets: an eighth of the square of their edge over its radius.
+        let band = core::f64::consts::TAU * radius * (1.0 + camera.focal * near / 24.0 / 24.0);
+        let area = core::f64::consts::PI * radius * radius;
+        assert!((red(&seen) - area).abs() < band, "{height}: {} of {area} within {band}", red(&seen));
+        // Lighter than the whole ball, which is seen from the side that is kept.
+        assert_eq!(red(&render(&ball, &view, &look(height, -1.0))), 0.0);
+    }
+    assert_eq!(red(&whole), 0.0);
+    assert!(render(&ball, &view, &look(2.0, 1.0)) == whole);
+    assert!(render(&ball, &view, &look(-2.0, 1.0)) == render(&SurfaceMesh::default(), &view, &Look::default()));
+    // The same with any number of threads, and whatever is drawn at once.
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool");
+    let slanted = look(0.5, 1.0);
+    let slanted = Look { section: slanted.section.map(|s| Section { normal: unit([1.0, 2.0, 2.0]), ..s }), ..slanted };
+    let one = alone.install(|| render(&ball, &VIEW, &slanted));
+    assert!(one == render(&ball, &VIEW, &slanted) && one == render_in_bands(&ball, &VIEW, &slanted, 1));
 }
 
 #[test]
