@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from .camera import VIEWS
 from .formats import (
+    BEAM_WRITES,
     CONDUCTIVITY_WRITES,
     DESIGNS,
     LAYER_WRITES,
@@ -217,7 +218,8 @@ COMMANDS = {
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
         f"The name of OUT decides the format: {WRITTEN}; or .step, the exact surface of uncut beams\n"
-        "alone, for CAD systems. A mesh is written while it is made, in bounded memory, unless the design has a skin, whose\n"
+        "alone, for CAD systems. With --beams it has the beams themselves: .3mf with the beam lattice extension.\n"
+        "A mesh is written while it is made, in bounded memory, unless the design has a skin, whose\n"
         "closed voids are looked for.\n"
         "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. With\n"
         "--smooth it is held in memory too, and the smallest angle of 19 in 20 triangles is then 15 degrees or more; all\n"
@@ -229,8 +231,9 @@ COMMANDS = {
         "  trabecula mesh part.toml -o part.stl --smooth\n"
         "  trabecula mesh exchanger.toml -o exchanger.3mf --parts wall,lower,upper\n"
         "  trabecula mesh beams.toml -o beams.stl --chord 0.01\n"
-        "  trabecula mesh beams.toml -o beams.step",
-        *(DESIGN, output((*MESH_WRITES, *STEP_WRITES), "the file to write")),
+        "  trabecula mesh beams.toml -o beams.step\n"
+        "  trabecula mesh beams.toml -o beams.3mf --beams",
+        *(DESIGN, output(tuple(dict.fromkeys((*MESH_WRITES, *STEP_WRITES, *BEAM_WRITES))), "the file to write")),
         spacing(
             "--edge",
             option(
@@ -264,6 +267,13 @@ COMMANDS = {
             "on each side); objects of one .3mf, else files OUT-wall.stl …",
         ),
         option("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary"),
+        option(
+            "--beams",
+            action="store_true",
+            help="write the beams themselves, not their surface; in a .3mf as frusta within --chord of them, clipped by the "
+            "region",
+        ),
+        option("--no-mesh", action="store_true", help="with --beams, no coarse mesh for programs that cannot show beams"),
         *(JSON, *NOTICES),
     ),
     "simplify": (

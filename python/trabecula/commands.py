@@ -84,6 +84,10 @@ def check(args) -> None:
 
 def mesh(args) -> None:
     """``trabecula mesh``."""
+    if args.beams:
+        return mesh_beams(args)
+    if args.no_mesh:
+        raise Refused("--no-mesh belongs to --beams; add it")
     if kind_of(args.output) in STEP_WRITES:
         return mesh_step(args)
     if args.parts:
@@ -137,6 +141,31 @@ def mesh_step(args) -> None:
     say(
         f"{args.output}: {made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, "
         f"{counted(made['solids'], 'solid')}; exact, {made['seconds']:.2f} s"
+    )
+
+
+def mesh_beams(args) -> None:
+    """``trabecula mesh --beams``."""
+    kind = kind_of(args.output)
+    names = ["parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles"]
+    names += [] if kind == "3mf" else ["chord", "no_mesh"]
+    given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
+    given += [f"--islands {args.islands}"] if args.islands != "drop-small" else []
+    if given:
+        raise Refused(f"{given[0]} does not go with --beams and a .{kind}: it has beams, not their surface; leave it out")
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    settle()
+    made = solid.save_beams(args.output, args.chord, not args.no_mesh, args.threads).to_dict()
+    made |= {"bytes": os.path.getsize(args.output), "seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    within = "" if made["error"] is None else f"; radii within {made['error']:.2g} mm"
+    balls = f", {counted(made['balls'], 'ball')}" if made["balls"] else ""
+    say(
+        f"{args.output}: {counted(made['beams'], 'beam')}{balls}, {counted(made['nodes'], 'node')}{within}, "
+        f"{made['bytes']} bytes, {made['seconds']:.2f} s"
     )
 
 

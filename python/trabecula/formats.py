@@ -8,7 +8,7 @@ from typing import NamedTuple
 from . import _core
 
 __all__ = [
-    *("CONDUCTIVITY_WRITES", "STIFFNESS_WRITES"),
+    *("BEAM_WRITES", "CONDUCTIVITY_WRITES", "STIFFNESS_WRITES"),
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
     *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES"),
     *("dotted", "is_design", "kind_of"),
@@ -23,6 +23,8 @@ MESH_READS = tuple(MESHES)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
 #: The exact surface of beams alone, for CAD systems.
 STEP_WRITES = ("step", "stp")
+#: Beams as such, not their surface.
+BEAM_WRITES = ("3mf",)
 #: What is found of a periodic cell: tables, the surface of Young's modulus, material cards.
 STIFFNESS_WRITES = ("csv", "png", "ply", "vtu", "inp", "bdf", "mac")
 CONDUCTIVITY_WRITES = ("csv",)

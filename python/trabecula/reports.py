@@ -7,6 +7,7 @@ from .record import Report
 # ruff: noqa: RUF012  the parts of a class are declared by its base
 
 __all__ = [
+    "BeamsFileReport",
     "BeamsReport",
     "BlendReport",
     "CellGrid",
@@ -59,6 +60,25 @@ __all__ = [
     "ZoneJoin",
     "ZoneReport",
 ]
+
+
+class BeamsFileReport(Report):
+    """What a file of beams contains."""
+
+    balls: int
+    """Number of balls at nodes, where a hub is larger than its beams are there."""
+    beams: int
+    """Number of beams; of a 3MF the frusta of cones."""
+    clipped: bool
+    """Whether the file has the mesh of the region that cuts the beams."""
+    error: float | None
+    """Greatest difference between the radius of a beam and that of its frusta, mm; None for a graph."""
+    filleted: int
+    """Number of hubs whose fillets are left out."""
+    nodes: int
+    """Number of nodes."""
+    split: int
+    """Number of beams that are several frusta."""
 
 
 class BeamsReport(Report):

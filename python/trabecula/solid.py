@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
+from .beam_files import save_beams
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from .islands import Islands
     from .reports import (
+        BeamsFileReport,
         ConductivityReport,
         DanglingReport,
         DesignReport,
@@ -502,6 +504,20 @@ class Solid(Seen):
         name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         with whole_file(path) as temporary:
             return self._core.write_step(temporary, name)
+
+    def save_beams(
+        self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None
+    ) -> BeamsFileReport:
+        """Writes the beams themselves rather than their surface, and gives the file's figures. A ValueError for whatever else a
+        design has: lattices, a skin, keep zones.
+
+        A .3mf has the beam lattice extension 1.2.0: frusta of cones whose radii are within ``chord`` (mm; default: a fiftieth
+        of the thinnest beam's radius) of those of the beams, so that cylinders are one each and beams with a waist several;
+        hubs larger than their beams as balls; the region's mesh, by which readers clip, where it cuts beams; sets of all beams
+        and of those that are cut. Fillets are left out, with a warning. With ``mesh``, a coarse mesh goes with them for
+        programs that do not know the extension.
+        """
+        return save_beams(self, path, None if chord is None else positive("chord", chord), mesh, _threads(threads))
 
     def _save(
         self,

@@ -11,7 +11,8 @@
 //! - volume, area, centroid and inertia to a relative error of 1e-10 ([`MassProperties`]);
 //! - the boundary of every hub as faces, conic arcs and vertices, and as exact rational Bézier patches;
 //! - watertight triangle meshes to a chord error, without a grid ([`Tessellation`]);
-//! - STEP files of the exact boundary ([`write_step`]).
+//! - STEP files of the exact boundary ([`write_step`]);
+//! - frusta of cones within a tolerance ([`Frusta`]), for formats such as the 3MF beam lattice.
 //!
 //! Graphs come from a catalogue of unit cells ([`graph::catalogue`]) repeated in space, from tables
 //! ([`graph::nodes`], [`graph::struts`]), or from a [`Wireframe`] with radii assigned by [`graph::with_radii`]; wireframes
@@ -45,11 +46,13 @@
 
 #![warn(unreachable_pub)]
 
+mod frusta;
 pub mod graph;
 pub mod pattern;
 pub mod quador;
 mod step;
 
+pub use frusta::Frusta;
 pub use graph::{Beam, Graph, Hub, Profile, Wireframe};
 pub use pattern::{Pattern, PatternField};
 pub use quador::slice::{Plane, Slice};

@@ -344,6 +344,11 @@ impl Quadors {
         self.ends.len()
     }
 
+    /// The two hubs of a beam.
+    pub fn ends(&self, beam: usize) -> [u32; 2] {
+        self.ends[beam]
+    }
+
     /// The quadric of a beam.
     pub fn pencil(&self, beam: usize) -> &Pencil {
         &self.pencils[beam]

@@ -32,6 +32,7 @@ pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, 
 pub use npy::{read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
+pub use threemf::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
 pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;

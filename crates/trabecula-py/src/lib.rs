@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 
 mod arrays;
+mod beam_files;
 mod design;
 mod effective;
 mod error;
@@ -44,6 +45,8 @@ mod _core {
 
     use crate::{BeamCell, Connected, Operations};
 
+    #[pymodule_export]
+    use crate::beam_files::write_beam_lattice;
     #[pymodule_export]
     use crate::design::Design;
     #[pymodule_export]

@@ -72,8 +72,13 @@ impl Mesh {
         Mesh { surface, split: true, design }
     }
 
+    /// The triangles.
+    pub fn mesh(&self) -> &geometry::mesh::Mesh {
+        &self.surface.mesh
+    }
+
     /// A mesh of which nothing more is known.
-    fn bare(mesh: geometry::mesh::Mesh) -> Self {
+    pub fn bare(mesh: geometry::mesh::Mesh) -> Self {
         let cut = vec![false; mesh.triangles.len()];
         Mesh { surface: SurfaceMesh { mesh, cut }, split: false, design: String::new() }
     }

@@ -11,6 +11,7 @@ use trabecula::field::Field;
 use crate::arrays::{points, values};
 use crate::error;
 use crate::folder::Folder;
+use crate::mesh::Mesh;
 use crate::node::node;
 use crate::run::{run, run_apart};
 
@@ -65,5 +66,15 @@ impl Region {
         let full = trabecula::solid::Solid::new(self.region.clone(), None, edge);
         let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
         Ok(surface.map_err(error::stopped)?.mesh.volume())
+    }
+
+    /// The boundary as a mesh: that of a region that is a mesh as it is, of others at grid spacing `edge` (mm).
+    fn mesh(&self, py: Python<'_>, edge: f64) -> PyResult<Mesh> {
+        if let Some(of) = self.region.as_mesh() {
+            return Ok(Mesh::bare(of.mesh().clone()));
+        }
+        let full = trabecula::solid::Solid::new(self.region.clone(), None, edge);
+        let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
+        Ok(Mesh::bare(surface.map_err(error::stopped)?.mesh))
     }
 }

@@ -197,6 +197,11 @@ impl Solid {
         self.built.whole_beams(name)
     }
 
+    /// Whether the region cuts beams of a design that is made of beams alone; a ValueError for others.
+    fn cuts_beams(slf: Py<Self>, py: Python<'_>) -> PyResult<bool> {
+        run_apart(py, None, move || slf.get().built.cuts_beams())?.map_err(error::fault)
+    }
+
     /// The beams of a name as quadrics.
     fn quadors(&self, py: Python<'_>, name: &str) -> PyResult<Quadors> {
         match self.built.beams.iter().find(|b| b.0 == name) {

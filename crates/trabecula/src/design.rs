@@ -3,6 +3,7 @@
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
+mod beam_files;
 mod build;
 mod build_beams;
 mod build_blend;

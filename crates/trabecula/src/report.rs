@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 pub use beams_report::{
-    BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
+    BeamsFileReport, BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
 };
 pub use cell_report::{CellGrid, ConductivityReport, StiffnessReport};
 pub use design_report::{
@@ -67,6 +67,7 @@ struct Reports {
     estimate: EstimateReport,
     tets: TetMeshReport,
     step: StepReport,
+    beams_file: BeamsFileReport,
     layers: LayersReport,
     stiffness: StiffnessReport,
     conductivity: ConductivityReport,

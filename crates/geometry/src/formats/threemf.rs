@@ -7,11 +7,14 @@ use std::io::{self, Write};
 use super::number::{push_f32, push_u32};
 use super::xml::escaped;
 use super::{Aside, Indexed, Metadata, in_order, invalid};
+use crate::math::Vec3;
 
+mod beam_lattice;
 mod deflate;
 mod package;
 mod read;
 
+pub use beam_lattice::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
 use package::Entry;
 pub use package::Piece;
 pub use read::read;
@@ -50,14 +53,11 @@ pub fn write_objects(
     }
     let mut model = Model::new(aside);
     let mut head = Model::head(" xmlns:trabecula=\"urn:trabecula:design\"");
-    let facts = [("Title", &meta.title), ("Application", &meta.application), ("trabecula:Design", &meta.design)];
-    for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
-        head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text)));
-    }
+    head.push_str(&meta.elements());
     head.push_str("<resources>\n");
     let mut tail = String::from("</resources>\n<build>\n");
     for (id, (name, mesh)) in (1..).zip(objects) {
-        let name = if name.is_empty() { String::new() } else { format!(" name=\"{}\"", escaped(name)) };
+        let name = if name.is_empty() { String::new() } else { format!(" name=\"{}\"", quoted(name)) };
         head.push_str(&format!("<object id=\"{id}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n"));
         model.push(Piece::of(head.as_bytes()))?;
         push_mesh(&mut model, *mesh)?;
@@ -100,12 +100,29 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Adds the vertices and triangles of a mesh.
-fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
-    let [vertices, triangles] = mesh.counts();
-    let points = |r: std::ops::Range<usize>| {
+impl Metadata {
+    /// The facts as elements of a model; empty ones are left out.
+    fn elements(&self) -> String {
+        let facts = [("Title", &self.title), ("Application", &self.application), ("trabecula:Design", &self.design)];
+        let given = facts.iter().filter(|(_, text)| !text.is_empty());
+        given.map(|(name, text)| format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text))).collect()
+    }
+}
+
+/// Text as it may stand in an attribute.
+fn quoted(text: &str) -> String {
+    escaped(text).replace('"', "&quot;")
+}
+
+/// Adds rows of vertices.
+fn push_vertices<'a>(
+    model: &mut Model,
+    count: usize,
+    positions: impl Fn(std::ops::Range<usize>) -> io::Result<std::borrow::Cow<'a, [Vec3]>> + Sync,
+) -> io::Result<()> {
+    let rows = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
-        for p in mesh.positions(r)?.iter() {
+        for p in positions(r)?.iter() {
             let [x, y, z] = p.map(|v| v as f32);
             text.extend_from_slice(b"<vertex x=\"");
             push_f32(&mut text, x);
@@ -117,8 +134,14 @@ fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
         }
         Ok(Piece::of(&text))
     };
+    in_order(count, 1 << 14, rows, |piece| model.push(piece))
+}
+
+/// Adds the vertices and triangles of a mesh.
+fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
+    let [vertices, triangles] = mesh.counts();
+    push_vertices(model, vertices, |r| mesh.positions(r))?;
     let mut put = |piece| model.push(piece);
-    in_order(vertices, 1 << 14, points, &mut put)?;
     put(Piece::of(b"</vertices>\n<triangles>\n"))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 56);

@@ -141,17 +141,23 @@ pub(super) fn exact(built: &Built) -> Result<Arc<Quadors>, Fault> {
     })
 }
 
-fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quadors>, Fault> {
-    let refuse = |why: &str| Err(fault(why));
-    let [(_, beams)] = &built.beams[..] else {
-        return refuse("this design is not one graph of beams");
+/// The only beams of a design that is made of nothing else, though its region may cut them; or why it is not.
+pub(super) fn only(built: &Built) -> Result<&(String, Beams), &'static str> {
+    let [beams] = &built.beams[..] else {
+        return Err("this design is not one graph of beams");
     };
     if !built.lattices.is_empty() || !built.tilings.is_empty() {
-        return refuse("this design has a lattice too");
+        return Err("this design has a lattice too");
     }
     if !built.solid.filled.is_empty() {
-        return refuse("a skin or a kept zone of this design would cut them");
+        return Err("a skin or a kept zone of this design would cut them");
     }
+    Ok(beams)
+}
+
+fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quadors>, Fault> {
+    let refuse = |why: &str| Err(fault(why));
+    let (_, beams) = only(built).map_err(&fault)?;
     let (quadors, apart, whole) = match beams {
         Beams::Truss(t) => (t.quadors.clone(), t.collisions.is_empty(), t.whole),
         Beams::Pattern(laid) => {

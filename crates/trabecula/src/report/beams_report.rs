@@ -149,3 +149,22 @@ pub struct StepReport {
     /// Enclosed volume, mm³, to 1e-10.
     pub volume: f64,
 }
+
+/// What a file of beams contains.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct BeamsFileReport {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of beams; of a 3MF the frusta of cones.
+    pub beams: usize,
+    /// Number of balls at nodes, where a hub is larger than its beams are there.
+    pub balls: usize,
+    /// Number of beams that are several frusta.
+    pub split: usize,
+    /// Greatest difference between the radius of a beam and that of its frusta, mm; None for a graph.
+    pub error: Option<f64>,
+    /// Number of hubs whose fillets are left out.
+    pub filleted: usize,
+    /// Whether the file has the mesh of the region that cuts the beams.
+    pub clipped: bool,
+}

@@ -1,0 +1,78 @@
+"""Files of beams: 3MF beam lattices with the meshes that go with them, graphs."""
+
+from __future__ import annotations
+
+import os
+import warnings
+
+from . import _core
+from .errors import DesignWarning
+from .files import extension, whole_file
+from .formats import BEAM_WRITES
+
+__all__ = ["save_beams"]
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .reports import BeamsFileReport
+    from .solid import Solid
+
+#: Most triangles of the mesh that stands for beams in programs that cannot show them.
+MOST_SHOWN = 300_000
+#: Chord errors of that mesh in the one of a usual mesh, a fiftieth of the thinnest beam's radius.
+COARSER = (5, 10, 20)
+#: Steps of the grid on which the region's mesh is made, along its diagonal, and its greatest error in diagonals.
+CLIP_STEPS, CLIP_ERROR = 64, 2e-5
+
+
+def save_beams(
+    solid: Solid, path: str | os.PathLike[str], chord: float | None, mesh: bool, threads: int | None
+) -> BeamsFileReport:
+    """As ``Solid.save_beams``."""
+    extension(path, BEAM_WRITES)
+    core = solid._core
+    cut = core.cuts_beams()
+    title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
+    clip = region_mesh(core) if cut else None
+    shown = shown_mesh(core, threads) if mesh else None
+    if mesh and shown is None:
+        warnings.warn(
+            f"there are too many beams for a mesh of {MOST_SHOWN} triangles: programs that do not know the beam lattice "
+            "extension show nothing of the file",
+            DesignWarning,
+            stacklevel=3,
+        )
+    with whole_file(path) as temporary:
+        made = _core.write_beam_lattice(core, temporary, title, chord, clip, shown, threads)
+    if made.filleted:
+        warnings.warn(
+            f"{made.filleted} hubs have fillets, which a beam lattice cannot hold: they are left out; STEP files and "
+            "meshes have them",
+            DesignWarning,
+            stacklevel=3,
+        )
+    return made
+
+
+def region_mesh(core: _core.Solid) -> _core.Mesh:
+    """The region's boundary, flat faces with few triangles."""
+    low, high = core.bounds
+    size = sum((b - a) ** 2 for a, b in zip(low, high, strict=True)) ** 0.5
+    made = core.region.mesh(size / CLIP_STEPS)
+    return made.simplified(tolerance=CLIP_ERROR * size)[0]
+
+
+def shown_mesh(core: _core.Solid, threads: int | None) -> _core.Mesh | None:
+    """A coarse mesh of the solid, if one of at most ``MOST_SHOWN`` triangles shows all beams."""
+    usual = core.default_chord
+    if usual is not None:
+        for times in COARSER:
+            if core.expected_beams(times * usual)[0] <= MOST_SHOWN:
+                return core.mesh_beams(times * usual, threads)[0]
+        return None
+    report = core.report()
+    thin = min(beams.thickness for beams in report.beams.values())
+    edge = thin / 2.5
+    if core.estimate(edge, edge).triangles > MOST_SHOWN:
+        return None
+    return core.mesh(edge, threads, None, "keep")[0]
