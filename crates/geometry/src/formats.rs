@@ -9,6 +9,7 @@ use crate::mesh::Mesh;
 
 mod elements;
 mod frd;
+mod graphs;
 mod indexed;
 mod join;
 mod layer_files;
@@ -27,6 +28,7 @@ mod vtu;
 mod xml;
 
 pub use elements::Elements;
+pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};
 pub use indexed::{Aside, Indexed};
 pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, Stack, Target};
 pub use npy::{read_npy, write_npy};

@@ -10,11 +10,13 @@ use super::{Aside, Indexed, Metadata, in_order, invalid};
 use crate::math::Vec3;
 
 mod beam_lattice;
+mod beam_lattice_read;
 mod deflate;
 mod package;
 mod read;
 
 pub use beam_lattice::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
+pub use beam_lattice_read::read_beam_lattice;
 use package::Entry;
 pub use package::Piece;
 pub use read::read;

@@ -10,6 +10,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::MODEL;
+use super::beam_lattice_read::{self, Lattice};
 use crate::fault::{Fault, counted};
 use crate::formats::join::Joiner;
 use crate::formats::text::{parse, shown};
@@ -41,25 +42,50 @@ impl Placement {
 }
 
 /// A use of an object: which file it is in (empty: the same), its number, and where it goes.
-struct Use {
+pub(super) struct Use {
     path: String,
     id: u32,
     placement: Placement,
 }
 
 #[derive(Default)]
-struct Object {
-    vertices: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    components: Vec<Use>,
-    support: bool,
+pub(super) struct Object {
+    pub vertices: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    pub components: Vec<Use>,
+    pub lattice: Option<Lattice>,
+    /// The type: model, support and so on.
+    pub kind: String,
+    /// Whether it has properties for what has none of its own.
+    pub properties: bool,
+}
+
+impl Object {
+    fn beams(&self) -> usize {
+        self.lattice.as_ref().map_or(0, |l| l.beams.len())
+    }
+
+    fn is_support(&self) -> bool {
+        matches!(self.kind.as_str(), "support" | "solidsupport")
+    }
 }
 
 #[derive(Default)]
-struct Model {
+pub(super) struct Model {
     unit: f64,
-    objects: HashMap<u32, Object>,
+    pub objects: HashMap<u32, Object>,
     items: Vec<Use>,
+}
+
+/// An object where the build has it.
+pub(super) struct Placed<'a> {
+    pub object: &'a Object,
+    /// The linear part of its placement.
+    pub matrix: Mat3,
+    /// Its vertices, mm.
+    pub vertices: Vec<Vec3>,
+    /// The file's unit, mm.
+    pub unit: f64,
 }
 
 /// What all files of an archive may inflate to: a multiple of the archive's size, and a constant. Meshes come to ten times.
@@ -128,6 +154,24 @@ impl<'a> Package<'a> {
 
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
+    let mut joiner = Joiner::default();
+    let lattices = place_all(bytes, &mut |placed| {
+        let mirrored = determinant(&placed.matrix) < 0.0;
+        for &[a, b, c] in &placed.object.triangles {
+            let t = if mirrored { [a, c, b] } else { [a, b, c] };
+            joiner.triangle(t.map(|v| placed.vertices[v as usize]))?;
+        }
+        Ok(())
+    })?;
+    let mesh = joiner.finish();
+    if mesh.triangles.is_empty() && lattices > 0 {
+        return Err(Fault::new("", "the file holds beams and no triangle; beams are read with [beams.NAME] and path"));
+    }
+    Ok(mesh)
+}
+
+/// Gives each object that the build places (supports left out) where it is, and the number of beam lattices in the file.
+pub(super) fn place_all(bytes: &[u8], take: &mut dyn FnMut(&Placed) -> Result<(), Fault>) -> Result<usize, Fault> {
     let mut package = Package::open(bytes)?;
     let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
     let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
@@ -152,11 +196,12 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     }
     // Instances multiply what the file holds; a small file that asks for billions is refused.
     let held: usize = files.values().flat_map(|f| f.objects.values()).map(|o| o.triangles.len()).sum();
-    let mut placing = Placing { files: &files, unit, joiner: Joiner::default(), left: 10_000_000 + 64 * held, uses: 0 };
+    let held = held + files.values().flat_map(|f| f.objects.values()).map(Object::beams).sum::<usize>();
+    let mut placing = Placing { files: &files, unit, take, left: 10_000_000 + 64 * held, uses: 0 };
     for i in 0..items {
         placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
-    Ok(placing.joiner.finish())
+    Ok(files.values().map(beam_lattice_read::count).sum())
 }
 
 /// The path of the model from the package's relationships.
@@ -184,7 +229,7 @@ fn outside(model: &Model) -> impl Iterator<Item = String> {
 struct Placing<'a> {
     files: &'a HashMap<String, Model>,
     unit: f64,
-    joiner: Joiner,
+    take: &'a mut dyn FnMut(&Placed) -> Result<(), Fault>,
     left: usize,
     uses: usize,
 }
@@ -200,11 +245,12 @@ impl Placing<'_> {
             return Err(Fault::new("", format!("object {} holds itself, or nests deeper than {DEPTH}", of.id)));
         }
         self.uses += 1;
-        if object.triangles.len() > self.left || self.uses > 1_000_000 {
+        let size = object.triangles.len() + object.beams();
+        if size > self.left || self.uses > 1_000_000 {
             return Err(Fault::new("", "the components multiply to more triangles than the file can mean"));
         }
-        self.left -= object.triangles.len();
-        if object.support {
+        self.left -= size;
+        if object.is_support() {
             return Ok(());
         }
         let placement = outer.after(&of.placement);
@@ -212,11 +258,7 @@ impl Placing<'_> {
         if vertices.iter().flatten().any(|x| !x.is_finite()) {
             return Err(Fault::new("", format!("object {} is placed at coordinates that are not finite", of.id)));
         }
-        let mirrored = determinant(&placement.m) < 0.0;
-        for &[a, b, c] in &object.triangles {
-            let t = if mirrored { [a, c, b] } else { [a, b, c] };
-            self.joiner.triangle(t.map(|v| vertices[v as usize]))?;
-        }
+        (self.take)(&Placed { object, matrix: placement.m, vertices, unit: self.unit })?;
         object.components.iter().try_for_each(|c| self.place(path, c, &placement, depth + 1))
     }
 }
@@ -230,7 +272,7 @@ struct Parsing {
     object: Option<(u32, Object)>,
 }
 
-type Source<'a> = Scanner<&'a mut dyn BufRead>;
+pub(super) type Source<'a> = Scanner<&'a mut dyn BufRead>;
 
 /// Parses one model file.
 fn model(text: &mut dyn BufRead) -> Result<Model, Fault> {
@@ -262,17 +304,21 @@ impl Parsing {
             self.model.unit = unit(s, tag)?;
             return Ok(());
         };
+        let local = name.rsplit(':').next().unwrap_or(name);
         match (name.strip_prefix(prefix.as_str()), &mut self.object) {
             (Some("object"), None) => {
-                let support = attribute(tag, "type").is_some_and(|t| matches!(&*t, "support" | "solidsupport"));
-                self.object = Some((s.required(tag, "id")?, Object { support, ..Object::default() }));
+                let kind = attribute(tag, "type").map_or("model".into(), Cow::into_owned);
+                let properties = attribute(tag, "pid").is_some() && attribute(tag, "pindex").is_some();
+                self.object = Some((s.required(tag, "id")?, Object { kind, properties, ..Object::default() }));
             }
+            (_, Some((_, o))) if local == "beamlattice" => o.lattice = Some(Lattice::begin(s, tag)?),
             (Some("vertex"), Some((_, o))) => o.vertices.push(vertex(s, tag)?),
             (Some("triangle"), Some((_, o))) => {
                 o.triangles.push([s.required(tag, "v1")?, s.required(tag, "v2")?, s.required(tag, "v3")?]);
             }
             (Some("component"), Some((_, o))) => o.components.push(using(s, tag)?),
             (Some("item"), None) => self.model.items.push(using(s, tag)?),
+            (_, Some((_, Object { lattice: Some(lattice), .. }))) => lattice.element(s, tag, local)?,
             _ => {}
         }
         Ok(())
@@ -284,6 +330,9 @@ impl Parsing {
             && let Some((id, o)) = self.object.take()
         {
             check(s, id, &o)?;
+            if let Some(lattice) = &o.lattice {
+                lattice.check(s, id, &o, &self.model.objects)?;
+            }
             self.model.objects.insert(id, o);
         }
         Ok(())

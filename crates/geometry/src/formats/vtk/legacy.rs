@@ -147,7 +147,7 @@ struct File<'a> {
     arrays: Vec<Array>,
 }
 
-/// Reads a file of STRUCTURED_POINTS or an UNSTRUCTURED_GRID.
+/// Reads a file of STRUCTURED_POINTS, an UNSTRUCTURED_GRID or POLYDATA.
 pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
     let mut file = File::open(bytes)?;
     while let Some(word) = file.reader.word() {
@@ -192,10 +192,10 @@ impl<'a> File<'a> {
         match word {
             "DATASET" => {
                 self.kind = r.text().to_ascii_uppercase();
-                if self.kind != "STRUCTURED_POINTS" && self.kind != "UNSTRUCTURED_GRID" {
+                if !["STRUCTURED_POINTS", "UNSTRUCTURED_GRID", "POLYDATA"].contains(&self.kind.as_str()) {
                     let kind = &self.kind;
                     return Err(fault(format!(
-                        "a data set of {kind}; STRUCTURED_POINTS and UNSTRUCTURED_GRID are read"
+                        "a data set of {kind}; STRUCTURED_POINTS, UNSTRUCTURED_GRID and POLYDATA are read"
                     )));
                 }
             }
@@ -208,6 +208,17 @@ impl<'a> File<'a> {
                 self.points = r.array(n, 3, &of)?;
             }
             "CELLS" => self.cells()?,
+            "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" if self.kind == "POLYDATA" => {
+                // VTK's numbers of the kinds that may have any number of points.
+                let kind = match word {
+                    "VERTICES" => 2.0,
+                    "LINES" => 4.0,
+                    "POLYGONS" => 7.0,
+                    _ => 6.0,
+                };
+                self.cells()?;
+                self.types.resize(self.ends.len(), kind);
+            }
             "CELL_TYPES" => {
                 let n = r.count("the number of cell types")?;
                 self.types = r.numbers(n, "int")?;
@@ -240,10 +251,11 @@ impl<'a> File<'a> {
             let of = r.text();
             let offsets = r.numbers(n, &of)?;
             // The first is zero; the last cell ends with the list.
-            self.ends = offsets.get(1..).unwrap_or_default().to_vec();
+            let before = self.connectivity.len() as f64;
+            self.ends.extend(offsets.get(1..).unwrap_or_default().iter().map(|end| before + end));
             r.text();
             let of = r.text();
-            self.connectivity = r.numbers(size, &of)?;
+            self.connectivity.extend(r.numbers(size, &of)?);
             return Ok(());
         }
         let all = r.numbers(size, "int")?;
@@ -310,7 +322,7 @@ impl<'a> File<'a> {
                 let cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).fold(1usize, usize::saturating_mul);
                 (Shape::Image { origin, step, nodes }, points, cells)
             }
-            "UNSTRUCTURED_GRID" => {
+            "UNSTRUCTURED_GRID" | "POLYDATA" => {
                 if self.ends.len() + 1 == self.types.len() {
                     self.ends.push(self.connectivity.len() as f64);
                 }
