@@ -1,7 +1,9 @@
 """Files of beams, judged by lib3mf, the consortium's own reader, and by parsers written from the formats' specifications."""
 
+import json
 import xml.etree.ElementTree as ET
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -126,6 +128,151 @@ def test_what_no_file_of_beams_holds_is_refused(tmp_path):
 
 
 def test_fillets_are_left_out_with_a_warning(tmp_path):
-    with pytest.warns(lt.DesignWarning, match="hubs have fillets"):
+    with pytest.warns(lt.DesignWarning, match="hubs with fillets"):
         made = built(CUT.replace("radius = 0.6", 'radius = 0.6\nfillet = "auto"')).save_beams(tmp_path / "a.3mf")
-    assert made.filleted > 0
+    assert len(made.lost) == 1
+
+
+#: Samples of the 3MF Consortium, from 3mf-samples and the tests of lib3mf; see LICENSE there.
+SAMPLES = Path(__file__).parent / "consortium"
+
+
+@pytest.mark.parametrize("name", ["pyramid", "variable-voronoi", "Box_Simple", "Box_Attributes_Positive", "BeamSet_Unique"])
+def test_samples_that_must_pass_are_read_as_another_parser_reads_them(name):
+    file = SAMPLES / f"{name}.3mf"
+    made = lt.beams.read(file)
+    _, _, nodes, rows, _ = lattice(file)
+    ends = made["nodes"][made["beams"]]
+    assert len(ends) == len(rows)
+    # The order of beams stays; vertices without beams are left out. Positions are held in single precision.
+    assert np.allclose(ends, nodes[rows[:, :2].astype(int)], rtol=1e-7, atol=0)
+    assert np.array_equal(made["beam_radii"], rows[:, 2:])
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("Box_Attributes_Negative_1", "clippingmesh is 2; no object before this one has that id"),
+        ("Box_Attributes_Negative_2", 'the object\'s type is "support"; it must be model or solidsupport'),
+        ("BeamSet_Not_Unique", 'two beam sets have the identifier "ASDF"'),
+    ],
+)
+def test_samples_that_must_fail_are_refused(name, expected):
+    with pytest.raises(ValueError, match=f"byte .*{expected}"):
+        lt.beams.read(SAMPLES / f"{name}.3mf")
+
+
+MODEL = """<?xml version="1.0"?><model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" unit="inch"
+xmlns:b="http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
+xmlns:b2="http://schemas.microsoft.com/3dmanufacturing/beamlattice/balls/2020/07" requiredextensions="b b2"><resources>
+<object id="1"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="2" z="0"/></vertices>
+<b:beamlattice radius="0.1" minlength="0.01" b2:ballmode="mixed" b2:ballradius="0.3"><b:beams><b:beam v1="0" v2="1"/>
+<b:beam v1="1" v2="2" r1="0.2" r2="0.25"/></b:beams><b:beamsets><b:beamset identifier="a"><b:ref index="1"/></b:beamset>
+</b:beamsets><b2:balls><b2:ball vindex="0"/></b2:balls></b:beamlattice></mesh></object></resources>
+<build><item objectid="1" transform="0 2 0 -2 0 0 0 0 2 10 0 0"/></build></model>"""
+
+#: What the specification forbids, by what is replaced in a model that is right.
+WRONG = [
+    ('radius="0.1" ', "", "radius of beamlattice is missing"),
+    ('minlength="0.01" ', "", "minlength of beamlattice is missing"),
+    ('radius="0.1"', 'radius="0"', "radius = 0; it must be greater than 0"),
+    ('radius="0.1"', 'radius="-1"', "radius = -1"),
+    ('v1="1" v2="2"', 'v1="1" v2="3"', "beam 1 joins vertices .1, 3., but there are 3"),
+    ('v1="1" v2="2"', 'v1="1" v2="1"', "both ends of beam 1 are vertex 1"),
+    ('r1="0.2" r2', "r2", "beam 1 has r2 and no r1"),
+    ('r1="0.2"', 'r1="x"', "r1 = .*not a number"),
+    (' b2:ballradius="0.3"', "", "ballradius is needed"),
+    ('"mixed"', '"some"', "it must be one of none, mixed, all"),
+    ('vindex="0"', 'vindex="3"', "ball 0 is at vertex 3, at which no beam ends"),
+    ('ref index="1"', 'ref index="2"', "a set names beam 2"),
+    ("<b:beam v1", '<b:beam cap1="round" v1', "it must be sphere, hemisphere or butt"),
+    ("<b:beam v1", '<b:beam p1="0" v1', "needs pid and pindex"),
+    ('radius="0.1"', 'radius="0.1" clippingmode="inside"', "clippingmesh is needed"),
+    ('radius="0.1"', 'radius="0.1" clippingmesh="1"', "clippingmesh is 1; no object before"),
+    ('radius="0.1"', 'radius="0.1" representationmesh="7"', "representationmesh is 7; no object"),
+    ('<object id="1">', '<object id="1" type="other">', "type is .other."),
+    ("0 2 0 -2 0 0", "0 2 0 -3 0 0", "no similarity"),
+    ("</b:beamlattice>", "", "damaged"),
+]
+
+
+def packed(path, model):
+    with zipfile.ZipFile(path, "w") as out:
+        out.writestr("3D/3dmodel.model", model)
+    return path
+
+
+def test_a_placed_lattice_is_read_in_mm(tmp_path):
+    made = lt.beams.read(packed(tmp_path / "a.3mf", MODEL))
+    # Twice as large, turned by 90 degrees about z, moved by 10 inches.
+    assert np.allclose(made["nodes"], 25.4 * np.array([[10, 0, 0], [10, 2, 0], [6, 0, 0]]), rtol=1e-12)
+    assert np.allclose(made["beam_radii"], 50.8 * np.array([[0.1, 0.1], [0.2, 0.25]]), rtol=1e-12)
+    assert np.allclose(made["radii"], [15.24, np.nan, np.nan], equal_nan=True, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), WRONG)
+def test_what_the_extension_forbids_is_refused(tmp_path, old, new, expected):
+    assert old in MODEL
+    with pytest.raises(ValueError, match=expected):
+        lt.beams.read(packed(tmp_path / "a.3mf", MODEL.replace(old, new, 1)))
+
+
+TAPERED = """
+[region.box]
+size = [60, 60, 60]
+[beams.rods]
+nodes = [[-10.1, 0, 0.3, 1.25], [10, 0.7, 0, 1], [0, 15, 0, 0.75], [0, 3, 13.0, 1.0]]
+struts = [[0, 1], [1, 2], [2, 3], [3, 0], [1, 3]]
+profile = "cone"
+"""
+
+
+@pytest.mark.parametrize("suffix", ["3mf", "ltcx", "json", "vtu"])
+def test_a_graph_comes_back_as_the_same_solid(tmp_path, suffix):
+    solid = built(TAPERED)
+    solid.save_beams(tmp_path / f"a.{suffix}", chord=1)
+    back = parsed(
+        f'schema = 1\n[region.box]\nsize = [60, 60, 60]\n[beams.rods]\npath = "a.{suffix}"\n', False, "test", str(tmp_path)
+    ).build()
+    points = np.random.default_rng(2).uniform(-12, 16, (3000, 3))
+    # A 3MF has numbers in single precision, the others the same decimals.
+    assert np.allclose(solid.field(points), back.field(points), rtol=0, atol=1e-5 if suffix == "3mf" else 0)
+
+
+def test_graphs_are_what_other_programs_read(tmp_path):
+    solid = built(CUT)
+    with pytest.warns(lt.DesignWarning, match="the region cuts some beams"):
+        made = solid.save_beams(tmp_path / "a.csv")
+    table = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
+    graph = solid.beams["core"]
+    nodes, ends = (np.asarray(graph[k]) for k in ("centers", "struts"))
+    assert len(table) == made.beams == len(ends)
+    assert np.array_equal(table[:, :6].reshape(-1, 2, 3), nodes[ends]) and (table[:, 6:] == 0.6).all()
+    for suffix in ("json", "obj", "inp", "bdf", "vtu", "ltcx"):
+        with pytest.warns(lt.DesignWarning):
+            solid.save_beams(tmp_path / f"a.{suffix}")
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert np.array_equal(np.array(found["nodes"])[:, :3], nodes) and len(found["beams"]) == len(ends)
+    root = ET.parse(tmp_path / "a.ltcx").getroot()
+    assert [[int(b.get("n1")), int(b.get("n2"))] for b in root.iter("beam")] == ends.tolist()
+    meshio = pytest.importorskip("meshio")
+    for suffix in ("vtu", "inp", "bdf"):
+        other = meshio.read(tmp_path / f"a.{suffix}")
+        lines = np.concatenate([c.data for c in other.cells if c.type == "line"])
+        assert np.allclose(other.points[lines], nodes[ends], rtol=0, atol=1e-12), suffix
+
+
+def test_what_a_format_cannot_hold_is_warned_of(tmp_path):
+    solid = built(WAISTED)
+    for suffix, expected in [("ltcx", "2 beams unlike the hubs"), ("csv", "the balls of 3 hubs"), ("obj", "no radii")]:
+        with pytest.warns(lt.DesignWarning, match=expected):
+            solid.save_beams(tmp_path / f"a.{suffix}")
+    with pytest.warns(lt.DesignWarning, match="the taper of 4 beams"):
+        built(TAPERED).save_beams(tmp_path / "a.inp")
+
+
+def test_beams_of_a_file_that_cross_without_a_node_are_named(tmp_path):
+    (tmp_path / "a.csv").write_text("-3,0,0,3,0,0,0.4\n0,-3,0,0,3,0,0.4\n")
+    text = 'schema = 1\nregion.box.size = [8, 8, 8]\n[beams.core]\npath = "a.csv"'
+    warned = parsed(text, False, "test", str(tmp_path)).build().warnings
+    assert any("1 pair of beams run into" in w["message"] and "(0.000, 0.000, 0.000) mm" in w["message"] for w in warned)

@@ -32,6 +32,18 @@ Progress = Callable[[int, int], Any]
 
 def mesh_formats() -> list[MeshFormat]: ...
 def layer_formats() -> list[tuple[str, str, bool, bool]]: ...
+def graph_formats() -> list[tuple[str, str, bool]]: ...
+def write_graph(solid: Solid, path: str, suffix: str) -> BeamsFileReport: ...
+def read_graph(
+    bytes: bytes, suffix: str
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64] | None,
+    NDArray[np.uint32],
+    NDArray[np.float64] | None,
+    bool,
+    list[str],
+]: ...
 def write_beam_lattice(
     solid: Solid,
     path: str,

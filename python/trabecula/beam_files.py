@@ -29,11 +29,13 @@ def save_beams(
     solid: Solid, path: str | os.PathLike[str], chord: float | None, mesh: bool, threads: int | None
 ) -> BeamsFileReport:
     """As ``Solid.save_beams``."""
-    extension(path, BEAM_WRITES)
+    kind = extension(path, BEAM_WRITES)
     core = solid._core
-    cut = core.cuts_beams()
-    title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
-    clip = region_mesh(core) if cut else None
+    if kind != "3mf":
+        with whole_file(path) as temporary:
+            made = _core.write_graph(core, temporary, kind)
+        return warned(made)
+    clip = region_mesh(core) if core.cuts_beams() else None
     shown = shown_mesh(core, threads) if mesh else None
     if mesh and shown is None:
         warnings.warn(
@@ -42,15 +44,16 @@ def save_beams(
             DesignWarning,
             stacklevel=3,
         )
+    title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
     with whole_file(path) as temporary:
         made = _core.write_beam_lattice(core, temporary, title, chord, clip, shown, threads)
-    if made.filleted:
-        warnings.warn(
-            f"{made.filleted} hubs have fillets, which a beam lattice cannot hold: they are left out; STEP files and "
-            "meshes have them",
-            DesignWarning,
-            stacklevel=3,
-        )
+    return warned(made)
+
+
+def warned(made: BeamsFileReport) -> BeamsFileReport:
+    """Warns of what the format cannot hold."""
+    for sentence in made.lost:
+        warnings.warn(sentence, DesignWarning, stacklevel=4)
     return made
 
 

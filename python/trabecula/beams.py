@@ -9,9 +9,12 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    import os
     from typing import Any
 
-__all__ = ["cell", "cells", "names"]
+    from numpy.typing import NDArray
+
+__all__ = ["cell", "cells", "names", "read"]
 
 
 def names() -> list[str]:
@@ -47,3 +50,26 @@ def cell(name: str) -> dict[str, Any]:
         hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
         raise KeyError(f"no cell of beams is named {name}{hint}")
     return known[name]
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, NDArray]:
+    """The graph in a file of another program: ``nodes`` (n, 3) and ``beams`` (m, 2), numbers of nodes; where the file has radii,
+    ``radii`` (n,) of nodes and ``beam_radii`` (m, 2) of beams at their two ends, NaN where none is given. Lengths are mm if the
+    file names its unit (3MF, most LTCX), else in the file's own. The suffix decides the format: 3mf, ltcx, csv, json, obj, vtu,
+    vtk, inp, bdf, nas, txt.
+
+    Raises OSError if it cannot be read, ValueError with line or element for what the format does not allow.
+    """
+    import os
+
+    from . import _core
+    from .files import extension
+    from .formats import BEAM_READS
+
+    kind = extension(path, BEAM_READS)
+    try:
+        nodes, radii, beams, beam_radii, _, _ = _core.read_graph(_core.read_file(os.fsdecode(path)), kind)
+    except ValueError as error:
+        raise ValueError(f"{os.fsdecode(path)}: {error}") from None
+    found = {"nodes": nodes, "beams": beams, "radii": radii, "beam_radii": beam_radii}
+    return {name: values for name, values in found.items() if values is not None}

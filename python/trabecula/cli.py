@@ -218,7 +218,8 @@ COMMANDS = {
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
         f"The name of OUT decides the format: {WRITTEN}; or .step, the exact surface of uncut beams\n"
-        "alone, for CAD systems. With --beams it has the beams themselves: .3mf with the beam lattice extension.\n"
+        "alone, for CAD systems. With --beams it has the beams themselves: .3mf with the beam lattice extension, or a graph:\n"
+        ".ltcx, .csv, .json, .obj, .vtu, .inp (Abaqus B31), .bdf (Nastran CBAR).\n"
         "A mesh is written while it is made, in bounded memory, unless the design has a skin, whose\n"
         "closed voids are looked for.\n"
         "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. With\n"
@@ -232,7 +233,8 @@ COMMANDS = {
         "  trabecula mesh exchanger.toml -o exchanger.3mf --parts wall,lower,upper\n"
         "  trabecula mesh beams.toml -o beams.stl --chord 0.01\n"
         "  trabecula mesh beams.toml -o beams.step\n"
-        "  trabecula mesh beams.toml -o beams.3mf --beams",
+        "  trabecula mesh beams.toml -o beams.3mf --beams\n"
+        "  trabecula mesh beams.toml -o beams.inp --beams",
         *(DESIGN, output(tuple(dict.fromkeys((*MESH_WRITES, *STEP_WRITES, *BEAM_WRITES))), "the file to write")),
         spacing(
             "--edge",
@@ -272,6 +274,11 @@ COMMANDS = {
             action="store_true",
             help="write the beams themselves, not their surface; in a .3mf as frusta within --chord of them, clipped by the "
             "region",
+        ),
+        option(
+            "--implicit",
+            action="store_true",
+            help="write the part as a function of position: .3mf with the volumetric and implicit extensions, which are drafts",
         ),
         option("--no-mesh", action="store_true", help="with --beams, no coarse mesh for programs that cannot show beams"),
         *(JSON, *NOTICES),

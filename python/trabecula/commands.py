@@ -12,7 +12,7 @@ from .camera import VIEWS, section_plane, towards
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, STDIN, STEP_WRITES, is_design, kind_of
+from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, is_design, kind_of
 from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, stdin_text, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -86,10 +86,14 @@ def mesh(args) -> None:
     """``trabecula mesh``."""
     if args.beams:
         return mesh_beams(args)
+    if args.implicit:
+        return mesh_implicit(args)
     if args.no_mesh:
         raise Refused("--no-mesh belongs to --beams; add it")
     if kind_of(args.output) in STEP_WRITES:
         return mesh_step(args)
+    if kind_of(args.output) not in MESH_WRITES:
+        raise Refused(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
     if args.parts:
         return mesh_parts(args)
     check_place(args.output)
@@ -147,7 +151,7 @@ def mesh_step(args) -> None:
 def mesh_beams(args) -> None:
     """``trabecula mesh --beams``."""
     kind = kind_of(args.output)
-    names = ["parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles"]
+    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles"]
     names += [] if kind == "3mf" else ["chord", "no_mesh"]
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
     given += [f"--islands {args.islands}"] if args.islands != "drop-small" else []
@@ -167,6 +171,23 @@ def mesh_beams(args) -> None:
         f"{args.output}: {counted(made['beams'], 'beam')}{balls}, {counted(made['nodes'], 'node')}{within}, "
         f"{made['bytes']} bytes, {made['seconds']:.2f} s"
     )
+
+
+def mesh_implicit(args) -> None:
+    """``trabecula mesh --implicit``."""
+    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord")
+    given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
+    given += [f"--islands {args.islands}"] if args.islands != "drop-small" else []
+    if given:
+        raise Refused(f"{given[0]} does not go with --implicit: the file has a function, and no triangles; leave it out")
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    settle()
+    made = solid.save_implicit(args.output) | {"seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    say(f"{args.output}: a function of {counted(made['nodes'], 'node')}, {made['bytes']} bytes, {made['seconds']:.2f} s")
 
 
 def mesh_parts(args) -> None:

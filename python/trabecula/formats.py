@@ -8,7 +8,7 @@ from typing import NamedTuple
 from . import _core
 
 __all__ = [
-    *("BEAM_WRITES", "CONDUCTIVITY_WRITES", "STIFFNESS_WRITES"),
+    *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "STIFFNESS_WRITES"),
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
     *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES"),
     *("dotted", "is_design", "kind_of"),
@@ -23,8 +23,11 @@ MESH_READS = tuple(MESHES)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
 #: The exact surface of beams alone, for CAD systems.
 STEP_WRITES = ("step", "stp")
-#: Beams as such, not their surface.
-BEAM_WRITES = ("3mf",)
+#: The formats of beams as such, not their surface, by suffix: what each is and whether it is written. 3MF is, by a writer of
+#: its own.
+BEAMS = {suffix: (title, writes or suffix == "3mf") for suffix, title, writes in _core.graph_formats()}
+BEAM_READS = tuple(BEAMS)
+BEAM_WRITES = tuple(suffix for suffix, row in BEAMS.items() if row[1])
 #: What is found of a periodic cell: tables, the surface of Young's modulus, material cards.
 STIFFNESS_WRITES = ("csv", "png", "ply", "vtu", "inp", "bdf", "mac")
 CONDUCTIVITY_WRITES = ("csv",)

@@ -73,8 +73,8 @@ class BeamsFileReport(Report):
     """Whether the file has the mesh of the region that cuts the beams."""
     error: float | None
     """Greatest difference between the radius of a beam and that of its frusta, mm; None for a graph."""
-    filleted: int
-    """Number of hubs whose fillets are left out."""
+    lost: list[str]
+    """What of the beams the format cannot hold, a sentence each."""
     nodes: int
     """Number of nodes."""
     split: int

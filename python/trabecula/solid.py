@@ -15,6 +15,7 @@ from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES
 from .given import number, positive, whole
+from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
 from .layers import Layers
 from .machine import file_size, fits, rounded_up
@@ -509,15 +510,32 @@ class Solid(Seen):
         self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None
     ) -> BeamsFileReport:
         """Writes the beams themselves rather than their surface, and gives the file's figures. A ValueError for whatever else a
-        design has: lattices, a skin, keep zones.
+        design has: lattices, a skin, keep zones. What the format cannot hold is warned of, and stands in ``lost``.
 
         A .3mf has the beam lattice extension 1.2.0: frusta of cones whose radii are within ``chord`` (mm; default: a fiftieth
         of the thinnest beam's radius) of those of the beams, so that cylinders are one each and beams with a waist several;
         hubs larger than their beams as balls; the region's mesh, by which readers clip, where it cuts beams; sets of all beams
-        and of those that are cut. Fillets are left out, with a warning. With ``mesh``, a coarse mesh goes with them for
-        programs that do not know the extension.
+        and of those that are cut. Fillets are left out. With ``mesh``, a coarse mesh goes with them for programs that do not
+        know the extension.
+
+        Others are graphs of nodes and beams, whole where the region cuts them, in decimals that read back to the same numbers:
+        .ltcx (nTopology, radii at nodes), .csv (a row of end points and radii for each beam), .json, .vtu, .obj (lines without
+        radii), .inp (Abaqus B31) and .bdf (Nastran CBAR, numbers of sixteen characters), these two with a circular section for
+        each radius.
         """
         return save_beams(self, path, None if chord is None else positive("chord", chord), mesh, _threads(threads))
+
+    def save_implicit(self, path: str | os.PathLike[str]) -> dict[str, Any]:
+        """Writes the part as a function of position to a .3mf with the volumetric and implicit extensions (0.8.0, a draft): exact,
+        and a few kilobytes in addition to a region's mesh. Gives ``nodes`` of the function, ``triangles`` of the mesh in the file
+        (the bounds, unless the region is a mesh) and ``bytes``.
+
+        The function is ``field``, in mm. A lattice may be of any series, with an affine or Spartan map; its level an iso,
+        fraction or pore that does not vary, or an iso that is a linear grade or a formula; the region a box, ball, cylinder,
+        half-space, their combinations and offsets, or a mesh. A ValueError for all else: blends, skins, keep zones, solved
+        maps, thicknesses, beams.
+        """
+        return save_implicit(self, path)
 
     def _save(
         self,

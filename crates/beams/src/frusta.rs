@@ -27,8 +27,6 @@ pub struct Frusta {
     pub split: usize,
     /// Greatest difference of radii of beams and frusta, mm.
     pub error: f64,
-    /// Number of hubs with fillets, which frusta cannot represent.
-    pub filleted: usize,
 }
 
 /// A frustum or a chain of frusta of one beam.
@@ -45,7 +43,6 @@ impl Quadors {
         let shapes: Vec<(Shape, f64)> =
             (0..self.beams()).into_par_iter().map(|b| approximate(self.pencil(b), tolerance)).collect();
         let mut out = Frusta { hubs: self.len(), ..Frusta::default() };
-        out.filleted = (0..self.len()).into_par_iter().filter(|i| self.has_fillets(*i)).count();
         let lattice = &mut out.lattice;
         lattice.nodes = (0..self.len()).map(|i| self.center(i)).collect();
         // The hubs whose ball no frustum has as its cap.
@@ -83,12 +80,6 @@ impl Quadors {
         let balls = (0..self.len()).filter(|i| bare[*i] && met[*i]);
         lattice.balls = balls.map(|i| (i as u32, self.hub(i).radius)).collect();
         out
-    }
-
-    /// Whether a hub has fillets.
-    fn has_fillets(&self, hub: usize) -> bool {
-        let radius = self.fillet_radius(hub);
-        radius > 0.0 && radius.is_finite()
     }
 }
 

@@ -14,7 +14,7 @@ pub use radii::position_text;
 pub use radii::{Radii, with_radii};
 pub use tables::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
-pub use wireframe::{Wireframe, WireframeReport};
+pub use wireframe::{GivenRadii, Wireframe, WireframeReport};
 
 use geometry::math::Vec3;
 

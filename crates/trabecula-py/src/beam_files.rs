@@ -3,8 +3,10 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use geometry::formats::{Companions, Indexed};
+use geometry::formats::{Companions, GRAPH_FORMATS, Indexed};
 use geometry::progress::Stopped;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error;
@@ -13,6 +15,54 @@ use crate::mesh::{Mesh, metadata};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
+
+/// The formats of graphs, in the order in which texts name them: suffix, what it is, whether it is written.
+#[pyfunction]
+pub fn graph_formats() -> Vec<(&'static str, &'static str, bool)> {
+    GRAPH_FORMATS.iter().map(|f| (f.suffix, f.title, f.writes())).collect()
+}
+
+/// Writes the beams of a solid as a graph in the format of a suffix. Gives its `reports.BeamsFileReport`.
+#[pyfunction]
+pub fn write_graph<'py>(py: Python<'py>, solid: &Solid, path: PathBuf, suffix: &str) -> PyResult<Bound<'py, PyAny>> {
+    let made = run(py, None, None, |_| {
+        let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path).map_err(Stopped::Io)?);
+        let made = solid.built().write_graph(suffix, &mut out)?;
+        out.flush().map_err(Stopped::Io)?;
+        Ok(made)
+    })?;
+    report(py, "BeamsFileReport", &made.map_err(error::stopped)?)
+}
+
+/// Nodes (n, 3), their radii (n,) or none, beams (m, 2), their radii (m, 2) or none, whether lengths are in mm, remarks.
+type Graph<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Option<Bound<'py, PyArray1<f64>>>,
+    Bound<'py, PyArray2<u32>>,
+    Option<Bound<'py, PyArray2<f64>>>,
+    bool,
+    Vec<String>,
+);
+
+/// The graph in the bytes of a file whose name ends in `suffix`.
+#[pyfunction]
+pub fn read_graph<'py>(py: Python<'py>, bytes: &[u8], suffix: &str) -> PyResult<Graph<'py>> {
+    let read = run(py, None, None, |_| geometry::formats::read_graph(bytes, suffix))?;
+    let graph = read.map_err(|f| PyValueError::new_err(f.to_string()))?;
+    let (n, m) = (graph.nodes.len(), graph.beams.len());
+    let radii = (!graph.radii.is_empty()).then(|| graph.radii.into_pyarray(py));
+    let of_beams = (!graph.beam_radii.is_empty())
+        .then(|| graph.beam_radii.into_flattened().into_pyarray(py).reshape([m, 2]))
+        .transpose()?;
+    Ok((
+        graph.nodes.into_flattened().into_pyarray(py).reshape([n, 3])?,
+        radii,
+        graph.beams.into_flattened().into_pyarray(py).reshape([m, 2])?,
+        of_beams,
+        graph.in_mm,
+        graph.remarks,
+    ))
+}
 
 /// Writes the beams of a solid as 3MF with the beam lattice extension: frusta whose radii are within `tolerance` (mm) of those of the
 /// beams, with the mesh by which they are cut and the one that is shown. Gives its `reports.BeamsFileReport`.

@@ -9,6 +9,7 @@ mod effective;
 mod error;
 mod file;
 mod folder;
+mod lattice_terms;
 mod layers;
 mod machine;
 mod mesh;
@@ -46,11 +47,13 @@ mod _core {
     use crate::{BeamCell, Connected, Operations};
 
     #[pymodule_export]
-    use crate::beam_files::write_beam_lattice;
+    use crate::beam_files::{graph_formats, read_graph, write_beam_lattice, write_graph};
     #[pymodule_export]
     use crate::design::Design;
     #[pymodule_export]
     use crate::effective::Cell;
+    #[pymodule_export]
+    use crate::lattice_terms::{LatticeTerms, lattice_terms};
     #[pymodule_export]
     use crate::layers::Layers;
     #[pymodule_export]

@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use super::wireframe::{Incidence, Wireframe};
+use super::wireframe::{GivenRadii, Incidence, Wireframe};
 use geometry::math::{Vec3, norm, sub};
 use geometry::union_find::{find, singles, unite};
 use geometry::weld::PointHash;
@@ -25,23 +25,22 @@ pub struct Cleaned {
 
 impl Wireframe {
     /// Merges nodes at most `within` (mm) apart, each into the lowest-numbered node near it, and removes zero-length
-    /// struts, duplicate struts and isolated nodes. `radii`, unless empty, is reduced with the nodes.
-    pub fn clean(&mut self, within: f64, radii: &mut Vec<f64>) -> Cleaned {
+    /// struts, duplicate struts and isolated nodes. `radii` are reduced with the nodes and struts.
+    pub fn clean(&mut self, within: f64, radii: &mut GivenRadii) -> Cleaned {
         let mut counts = Cleaned::default();
         let root = self.merged(within);
         counts.merged = (root.iter().enumerate()).filter(|(n, r)| *n != **r as usize).count();
         let mut joined = HashSet::with_capacity(self.struts.len());
-        self.struts.retain_mut(|strut| {
+        let mut kept = Vec::with_capacity(self.struts.len());
+        for strut in &mut self.struts {
             *strut = strut.map(|n| root[n as usize]);
             let [a, b] = *strut;
-            if a == b {
-                counts.short += 1;
-                return false;
-            }
-            let new = joined.insert([a.min(b), a.max(b)]);
-            counts.duplicates += usize::from(!new);
-            new
-        });
+            let new = a != b && joined.insert([a.min(b), a.max(b)]);
+            counts.short += usize::from(a == b);
+            counts.duplicates += usize::from(a != b && !new);
+            kept.push(new);
+        }
+        self.keep(&kept, radii);
         let before = self.nodes.len();
         self.drop_isolated(radii);
         counts.isolated = before - counts.merged - self.nodes.len();
@@ -50,7 +49,7 @@ impl Wireframe {
 
     /// Removes struts that have an end of valence 1, repeatedly, until none is left; nodes for which `held` holds are
     /// not free ends. Returns the number removed.
-    pub fn drop_dangling(&mut self, held: &impl Fn(Vec3) -> bool, radii: &mut Vec<f64>) -> usize {
+    pub fn drop_dangling(&mut self, held: &impl Fn(Vec3) -> bool, radii: &mut GivenRadii) -> usize {
         let incidence = Incidence::of(self);
         let mut valence: Vec<usize> = (0..self.nodes.len()).map(|n| incidence.at(n).len()).collect();
         let mut gone = vec![false; self.struts.len()];
@@ -68,10 +67,18 @@ impl Wireframe {
                 }
             }
         }
-        let mut left = gone.iter();
-        self.struts.retain(|_| left.next() == Some(&false));
+        let kept: Vec<bool> = gone.iter().map(|g| !g).collect();
+        self.keep(&kept, radii);
         self.drop_isolated(radii);
         gone.iter().filter(|g| **g).count()
+    }
+
+    /// Keeps some of the struts with their radii.
+    fn keep(&mut self, kept: &[bool], radii: &mut GivenRadii) {
+        let mut left = kept.iter();
+        self.struts.retain(|_| left.next() == Some(&true));
+        let mut left = kept.iter();
+        radii.struts.retain(|_| left.next() == Some(&true));
     }
 
     /// Number of nodes of valence 1, `held` nodes excepted.
@@ -107,11 +114,13 @@ mod tests {
             nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-7, 0.0], [0.0, 1.0, 0.0], [5.0; 3], [-1e-9, 0.0, 0.0]],
             struts: vec![[0, 1], [2, 5], [1, 2], [1, 3], [3, 0]],
         };
-        let mut radii = vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+        let struts = (1..6).map(|i| [f64::from(i), 0.0]).collect();
+        let mut radii = GivenRadii { nodes: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6], struts };
         let counts = wireframe.clean(1e-6, &mut radii);
         assert_eq!(counts, Cleaned { merged: 2, short: 1, duplicates: 1, isolated: 1, dangling: 0 });
         assert_eq!(wireframe.struts, [[0, 1], [1, 2], [2, 0]]);
-        assert_eq!(radii, [0.1, 0.2, 0.4]);
+        assert_eq!(radii.nodes, [0.1, 0.2, 0.4]);
+        assert_eq!(radii.struts, [[1.0, 0.0], [4.0, 0.0], [5.0, 0.0]]);
     }
 
     #[test]
@@ -123,10 +132,10 @@ mod tests {
         let mut loose = line(5);
         loose.struts.push([0, 2]);
         assert_eq!(loose.dangling(&|_| false), 1);
-        assert_eq!(loose.drop_dangling(&|_| false, &mut Vec::new()), 3);
+        assert_eq!(loose.drop_dangling(&|_| false, &mut GivenRadii::default()), 3);
         assert_eq!((loose.nodes.len(), loose.struts.len()), (3, 3));
         let mut held = line(5);
-        assert_eq!(held.drop_dangling(&|p| p[0] == 0.0 || p[0] == 5.0, &mut Vec::new()), 0);
-        assert_eq!(line(5).drop_dangling(&|_| false, &mut Vec::new()), 5);
+        assert_eq!(held.drop_dangling(&|p| p[0] == 0.0 || p[0] == 5.0, &mut GivenRadii::default()), 0);
+        assert_eq!(line(5).drop_dangling(&|_| false, &mut GivenRadii::default()), 5);
     }
 }

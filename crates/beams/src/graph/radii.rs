@@ -1,7 +1,8 @@
 //! Radii for a wireframe: beam radii and hub radii.
 
-use super::wireframe::Wireframe;
+use super::wireframe::{GivenRadii, Wireframe};
 use super::{Beam, Graph, Hub, Profile};
+use crate::quador::Pencil;
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, add, scale};
 
@@ -16,14 +17,15 @@ pub struct Radii<V> {
     pub profile: Option<Profile>,
 }
 
-/// The graph of a wireframe. `values` evaluates a varying length at points (mm); `own` are node radii that take
-/// precedence (NaN where none is given, empty if none at all).
+/// The graph of a wireframe. `values` evaluates a varying length at points (mm); `own` radii of nodes take precedence, and those of
+/// beams hold where no radius of beams is given: a beam is the cone where it has the radii of its hubs, and otherwise the quadric
+/// with their mean at mid length, or the nearest that there is.
 ///
 /// # Errors
 /// A node without any radius; a radius that is not positive and finite, with its position.
 pub fn with_radii<V>(
     wireframe: &Wireframe,
-    own: &[f64],
+    own: &GivenRadii,
     radii: &Radii<V>,
     values: impl Fn(&V, &[Vec3], &mut [f64]),
 ) -> Result<Graph, Fault> {
@@ -39,15 +41,19 @@ pub fn with_radii<V>(
         Some(v) => lengths(v, &wireframe.nodes, "hub")?,
         None => {
             let mut most = vec![f64::NAN; wireframe.nodes.len()];
-            for (s, r) in wireframe.struts.iter().zip(beam_radii.iter().flatten()) {
-                for n in s {
-                    most[*n as usize] = most[*n as usize].max(*r);
+            let ends = |i: usize| match &beam_radii {
+                Some(of) => [of[i]; 2],
+                None => own.struts.get(i).copied().unwrap_or([f64::NAN; 2]),
+            };
+            for (i, s) in wireframe.struts.iter().enumerate() {
+                for (n, r) in s.iter().zip(ends(i)) {
+                    most[*n as usize] = most[*n as usize].max(r);
                 }
             }
             most
         }
     };
-    for (size, own) in sizes.iter_mut().zip(own).filter(|(_, own)| !own.is_nan()) {
+    for (size, own) in sizes.iter_mut().zip(&own.nodes).filter(|(_, own)| !own.is_nan()) {
         *size = *own;
     }
     if let Some(n) = sizes.iter().position(|r| r.is_nan()) {
@@ -59,19 +65,40 @@ pub fn with_radii<V>(
             ),
         ));
     }
+    let given = |i: usize, ends: &[u32; 2]| {
+        let hubs = ends.map(|n| sizes[n as usize]);
+        let length = wireframe.length(*ends);
+        own.struts.get(i).map_or(Profile::Cone, |r| given_profile(*r, hubs, length))
+    };
     let hub = |(center, radius): (&Vec3, f64)| Hub { center: *center, radius };
     let beam = |(i, ends): (usize, &[u32; 2])| Beam {
         ends: *ends,
         profile: match (radii.profile, &beam_radii) {
             (Some(profile), _) => profile,
             (None, Some(beam_radii)) => Profile::Mid(beam_radii[i]),
-            (None, None) => Profile::Cone,
+            (None, None) => given(i, ends),
         },
     };
-    Ok(Graph {
-        hubs: wireframe.nodes.iter().zip(sizes).map(hub).collect(),
-        beams: wireframe.struts.iter().enumerate().map(beam).collect(),
-    })
+    let beams = wireframe.struts.iter().enumerate().map(beam).collect();
+    Ok(Graph { hubs: wireframe.nodes.iter().zip(sizes).map(hub).collect(), beams })
+}
+
+/// Share of the range of radii at mid length that a beam keeps from its ends, at which quadrics degenerate.
+const KEPT: f64 = 1e-3;
+
+/// The profile of a beam with radii of its own at its ends, between hubs.
+fn given_profile(radii: [f64; 2], hubs: [f64; 2], length: f64) -> Profile {
+    let same = |k: usize| (radii[k] - hubs[k]).abs() <= 1e-9 * hubs[k];
+    if radii[0].is_nan() || same(0) && same(1) {
+        return Profile::Cone;
+    }
+    let mean = 0.5 * (radii[0] + radii[1]);
+    // A beam that cannot be is refused later, with its place.
+    let Ok(pencil) = Pencil::new(length, hubs, Profile::Cone) else { return Profile::Mid(mean) };
+    let (least, most) = pencil.mid_radius_range();
+    let most = most.min(1e3 * mean.max(least));
+    let margin = KEPT * (most - least);
+    Profile::Mid(mean.clamp(least + margin, most - margin))
 }
 
 /// A position as text for messages.

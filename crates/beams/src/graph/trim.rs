@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::wireframe::Wireframe;
+use super::wireframe::{GivenRadii, Wireframe};
 use crate::Values;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
@@ -47,15 +47,15 @@ const TOLERANCE: f64 = 1e-10;
 
 impl Trim {
     /// Trims a wireframe to a region given by its signed distance (Lipschitz bound 1). Struts within `reach` (mm, the
-    /// largest hub radius) of the region are not outside. Ends up to `slack` (mm) outside count as inside. `radii` of
-    /// the nodes, unless empty, is kept parallel.
+    /// largest hub radius) of the region are not outside. Ends up to `slack` (mm) outside count as inside. `radii` stay
+    /// in the order of nodes and struts.
     pub fn apply(
         self,
         wireframe: &mut Wireframe,
         region: Values,
         reach: f64,
         slack: f64,
-        radii: &mut Vec<f64>,
+        radii: &mut GivenRadii,
     ) -> Trimmed {
         let mut depth = vec![0.0; wireframe.nodes.len()];
         let pieces = depth.par_chunks_mut(BATCH).zip(wireframe.nodes.par_chunks(BATCH));
@@ -84,18 +84,26 @@ impl Trim {
         let outcomes: Vec<Outcome> = wireframe.struts.par_iter().map(outcome).collect();
         let mut done = Trimmed::default();
         let mut struts = Vec::with_capacity(wireframe.struts.len());
-        for (s, outcome) in wireframe.struts.iter().zip(outcomes) {
+        let own = std::mem::take(&mut radii.struts);
+        for (i, (s, outcome)) in wireframe.struts.iter().zip(outcomes).enumerate() {
             match outcome {
-                Outcome::Kept => struts.push(*s),
+                Outcome::Kept => {
+                    struts.push(*s);
+                    radii.struts.extend(own.get(i));
+                }
                 Outcome::Outside => done.outside += 1,
                 Outcome::Dropped => done.dropped += 1,
                 Outcome::Shortened([from, to], t) => {
                     let [a, b] = [from, to].map(|n| wireframe.nodes[n as usize]);
                     struts.push([from, wireframe.nodes.len() as u32]);
                     wireframe.nodes.push(add(a, scale(sub(b, a), t)));
-                    if !radii.is_empty() {
-                        let [a, b] = [from, to].map(|n| radii[n as usize]);
-                        radii.push(a + t * (b - a));
+                    if !radii.nodes.is_empty() {
+                        let [a, b] = [from, to].map(|n| radii.nodes[n as usize]);
+                        radii.nodes.push(a + t * (b - a));
+                    }
+                    if let Some([r1, r2]) = own.get(i) {
+                        let [a, b] = if from == s[0] { [*r1, *r2] } else { [*r2, *r1] };
+                        radii.struts.push([a, a + t * (b - a)]);
                     }
                     done.snapped += 1;
                 }
@@ -168,13 +176,13 @@ mod tests {
     fn struts_are_cut_dropped_or_end_on_the_surface() {
         let ball: Values = &|p, out| out.iter_mut().zip(p).for_each(|(o, p)| *o = norm(*p) - 3.6);
         let mut cut = comb();
-        let done = Trim::Cut.apply(&mut cut, ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Cut.apply(&mut cut, ball, 0.3, 0.0, &mut GivenRadii::default());
         assert_eq!((cut.struts.len(), done.outside), (8, 4));
         let mut dropped = comb();
-        let done = Trim::Drop.apply(&mut dropped, ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Drop.apply(&mut dropped, ball, 0.3, 0.0, &mut GivenRadii::default());
         assert_eq!((dropped.struts.len(), done.dropped), (6, 6));
         let mut snapped = comb();
-        let done = Trim::Snap.apply(&mut snapped, ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Snap.apply(&mut snapped, ball, 0.3, 0.0, &mut GivenRadii::default());
         assert_eq!((snapped.struts.len(), done.snapped, done.outside), (8, 2, 4));
         let on = snapped.nodes.iter().filter(|p| (norm(**p) - 3.6).abs() < 1e-9);
         assert_eq!(on.count(), 2);

@@ -16,6 +16,22 @@ pub struct Wireframe {
     pub struts: Vec<[u32; 2]>,
 }
 
+/// Radii given for the nodes and struts of a wireframe, in their order, mm; NaN where none is given, empty if none at all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GivenRadii {
+    /// Radii of hubs.
+    pub nodes: Vec<f64>,
+    /// Radii of beams at their two ends.
+    pub struts: Vec<[f64; 2]>,
+}
+
+impl GivenRadii {
+    /// Whether none is given.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty() && self.struts.is_empty()
+    }
+}
+
 /// Statistics of a wireframe.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WireframeReport {
@@ -97,11 +113,11 @@ impl Wireframe {
     }
 
     /// Removes nodes without struts, and their radii.
-    pub(super) fn drop_isolated(&mut self, radii: &mut Vec<f64>) {
+    pub(super) fn drop_isolated(&mut self, radii: &mut GivenRadii) {
         let numbers = self.compact();
-        if !radii.is_empty() {
+        if !radii.nodes.is_empty() {
             let mut kept = numbers.iter();
-            radii.retain(|_| kept.next().is_some_and(Option::is_some));
+            radii.nodes.retain(|_| kept.next().is_some_and(Option::is_some));
         }
     }
 

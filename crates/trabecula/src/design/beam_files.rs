@@ -1,45 +1,119 @@
 //! Files of a design's beams, as a graph or as frusta rather than as a surface.
 
+use std::borrow::Cow;
 use std::io;
+use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use super::{Built, build_beams};
 use crate::report::BeamsFileReport;
 use crate::truss::Beams;
-use beams::{Frusta, Quadors};
-use geometry::fault::Fault;
-use geometry::formats::{Aside, Companions, Metadata, write_beam_lattice};
+use beams::{Frusta, Graph, Profile, Quadors};
+use geometry::fault::{Fault, counted};
+use geometry::formats::{Aside, BeamGraph, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph};
 use geometry::progress::{Stopped, checkpoint};
 
 /// Errors of radii in the radius of the thinnest beam, unless another one is asked for.
 const PER_RADIUS: f64 = 50.0;
 
 /// The only beams of a design, and whether its region cuts some.
-pub(super) struct Written {
-    /// Their name.
-    pub name: String,
-    /// Their solid.
-    pub quadors: std::sync::Arc<Quadors>,
-    /// Whether the region cuts some.
-    pub cut: bool,
+struct Written<'a> {
+    name: &'a str,
+    graph: Cow<'a, Graph>,
+    quadors: Arc<Quadors>,
+    cut: bool,
 }
 
 /// The beams of a design for a file.
 ///
 /// # Errors
 /// What else the design has: lattices, a blend, a skin or kept zones.
-pub(super) fn written(built: &Built) -> Result<Written, Fault> {
+fn written(built: &Built) -> Result<Written<'_>, Fault> {
     let refuse = |why: &str| {
         let message =
             format!("a file of beams has beams alone, and {why}; write a mesh (3mf, stl) without --beams instead");
         Fault::new("", message)
     };
     let (name, beams) = build_beams::only(built).map_err(refuse)?;
-    let quadors = match beams {
-        Beams::Truss(t) => t.quadors.clone(),
-        Beams::Pattern(laid) => std::sync::Arc::new(laid.expand()?),
+    let (graph, quadors) = match beams {
+        Beams::Truss(t) => (Cow::Borrowed(&t.graph), t.quadors.clone()),
+        Beams::Pattern(laid) => (Cow::Owned(laid.pattern().expanded()?), Arc::new(laid.expand()?)),
     };
     checkpoint();
-    Ok(Written { name: name.clone(), quadors, cut: !build_beams::held(beams, built) })
+    Ok(Written { name, graph, quadors, cut: !build_beams::held(beams, built) })
+}
+
+impl Written<'_> {
+    /// The graph for a file: a beam that is no cone between its hubs has its radius at mid length at both ends.
+    fn graph(&self) -> BeamGraph {
+        let radii = |b: usize| {
+            let pencil = self.quadors.pencil(b);
+            match self.graph.beams[b].profile {
+                Profile::Cone | Profile::Cylinder => pencil.radii,
+                Profile::Mid(r) => [r; 2],
+                _ => [pencil.radius_squared(0.5 * pencil.length).max(0.0).sqrt(); 2],
+            }
+        };
+        BeamGraph {
+            nodes: self.graph.hubs.iter().map(|h| h.center).collect(),
+            radii: self.graph.hubs.iter().map(|h| h.radius).collect(),
+            beams: self.graph.beams.iter().map(|b| b.ends).collect(),
+            beam_radii: (0..self.graph.beams.len()).into_par_iter().map(radii).collect(),
+            in_mm: true,
+            remarks: Vec::new(),
+        }
+    }
+
+    /// What any file of beams loses, unless it has the region's mesh and fillets.
+    fn lost(&self, clipped: bool) -> Vec<String> {
+        let fillets = |i: usize| {
+            let radius = self.quadors.fillet_radius(i);
+            radius > 0.0 && radius.is_finite()
+        };
+        let filleted = (0..self.quadors.len()).into_par_iter().filter(|i| fillets(*i)).count();
+        let mut lost = Vec::new();
+        if filleted > 0 {
+            lost.push(format!(
+                "{} with fillets, which a file of beams cannot hold: they are left out; STEP files and meshes have them",
+                counted(filleted, "hub")
+            ));
+        }
+        if self.cut && !clipped {
+            lost.push("the region cuts some beams: the file has them whole; a 3mf has the region too".into());
+        }
+        lost
+    }
+}
+
+/// What a format cannot hold of the radii of a graph.
+fn lost_radii(graph: &BeamGraph, format: &GraphFormat) -> Option<String> {
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a;
+    let pairs = || graph.beams.iter().zip(&graph.beam_radii);
+    let node = |n: u32| graph.radii[n as usize];
+    let suffix = format.suffix;
+    match format.lost {
+        Lost::Radii => Some(format!("a .{suffix} has no radii: they are left out")),
+        Lost::Beams => {
+            let odd = pairs().filter(|(e, r)| !(same(r[0], node(e[0])) && same(r[1], node(e[1])))).count();
+            let beams = counted(odd, "beam");
+            (odd > 0)
+                .then(|| format!("{beams} unlike the hubs: a .{suffix} has the radii of hubs alone, json has both"))
+        }
+        Lost::Balls => {
+            let mut most = vec![0.0_f64; graph.nodes.len()];
+            for (n, r) in pairs().flat_map(|(e, r)| e.iter().zip(r)) {
+                most[*n as usize] = most[*n as usize].max(*r);
+            }
+            let odd = most.iter().zip(&graph.radii).filter(|(m, r)| **m > 0.0 && !same(**r, **m)).count();
+            let tapered = if suffix == "csv" { 0 } else { pairs().filter(|(_, r)| !same(r[0], r[1])).count() };
+            let hubs = (odd > 0).then(|| format!("the balls of {}", counted(odd, "hub")));
+            let taper = (tapered > 0).then(|| format!("the taper of {}", counted(tapered, "beam")));
+            let all: Vec<String> = hubs.into_iter().chain(taper).collect();
+            (!all.is_empty()).then(|| format!("a .{suffix} cannot hold {}; 3mf, json and vtu do", all.join(" and ")))
+        }
+        Lost::Nothing => None,
+    }
 }
 
 impl Built {
@@ -49,6 +123,21 @@ impl Built {
     /// What else the design has.
     pub fn cuts_beams(&self) -> Result<bool, Fault> {
         Ok(written(self)?.cut)
+    }
+
+    /// Writes the beams as a graph in the format of a suffix, one of [`geometry::formats::GRAPH_FORMATS`] that is written.
+    ///
+    /// # Errors
+    /// What else the design has; failures of the output.
+    pub fn write_graph(&self, suffix: &str, out: &mut dyn io::Write) -> Result<BeamsFileReport, Stopped> {
+        let written = written(self).map_err(Stopped::Refused)?;
+        let graph = written.graph();
+        checkpoint();
+        write_graph(&graph, suffix, out).map_err(Stopped::Io)?;
+        let mut lost = written.lost(false);
+        lost.extend(GraphFormat::of(suffix).and_then(|f| lost_radii(&graph, f)));
+        let (nodes, beams) = (graph.nodes.len(), graph.beams.len());
+        Ok(BeamsFileReport { nodes, beams, balls: 0, split: 0, error: None, clipped: false, lost })
     }
 
     /// Writes the beams as 3MF with the beam lattice extension: frusta whose radii are within `tolerance` (mm; `None` for a fiftieth
@@ -65,38 +154,38 @@ impl Built {
         aside: &mut dyn Aside,
         out: &mut dyn io::Write,
     ) -> Result<BeamsFileReport, Stopped> {
-        let Written { name, quadors, cut } = written(self).map_err(Stopped::Refused)?;
+        let written = written(self).map_err(Stopped::Refused)?;
+        let quadors = &written.quadors;
         let thin = (0..quadors.beams()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
         let mut made = quadors.frusta(tolerance.unwrap_or(thin / PER_RADIUS));
         checkpoint();
-        self.add_sets(&name, cut, &mut made);
+        self.add_sets(&written, &mut made);
         write_beam_lattice(&made.lattice, meshes, meta, aside, out).map_err(Stopped::Io)?;
+        let clipped = written.cut && meshes.clip.is_some();
         Ok(BeamsFileReport {
             nodes: made.lattice.nodes.len(),
             beams: made.lattice.beams.len(),
             balls: made.lattice.balls.len(),
             split: made.split,
             error: Some(made.error),
-            filleted: made.filleted,
-            clipped: cut && meshes.clip.is_some(),
+            clipped,
+            lost: written.lost(clipped),
         })
     }
 
-    /// All beams as a set of the design's name for them, and those that the region cuts as another.
-    fn add_sets(&self, name: &str, cut: bool, made: &mut Frusta) {
+    /// All beams as a set of the design's name for them, and those that reach out of the region as another.
+    fn add_sets(&self, written: &Written, made: &mut Frusta) {
         let lattice = &made.lattice;
-        let mut sets = vec![(name.to_string(), (0..lattice.beams.len() as u32).collect())];
-        if cut {
+        let all = 0..lattice.beams.len() as u32;
+        let mut sets = vec![(written.name.to_string(), all.clone().collect())];
+        if written.cut {
             let region = &*self.solid.region;
+            let inside = |at: u32, r: f64| region.value(lattice.nodes[at as usize]) + r <= 0.0;
             let crosses = |b: &u32| {
                 let beam = &lattice.beams[*b as usize];
-                let inside = |k: usize| {
-                    let (at, r) = (lattice.nodes[beam.ends[k] as usize], beam.radii[k]);
-                    region.value(at) + r <= 0.0
-                };
-                !(inside(0) && inside(1))
+                !(inside(beam.ends[0], beam.radii[0]) && inside(beam.ends[1], beam.radii[1]))
             };
-            sets.push((format!("{name} cut"), (0..lattice.beams.len() as u32).filter(crosses).collect()));
+            sets.push((format!("{} cut", written.name), all.into_par_iter().filter(crosses).collect()));
         }
         made.lattice.sets = sets;
     }

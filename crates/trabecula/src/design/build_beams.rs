@@ -1,6 +1,7 @@
 //! Beams: data to a graph and its field.
 
 mod beam_report;
+mod graph_file;
 mod radius_for_fraction;
 mod wire;
 
@@ -18,7 +19,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use crate::kind::DesignError;
 use crate::truss::{Beams, Truss, fill};
-use ::beams::graph::{self, Radii, Trim, Wireframe, with_radii};
+use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
@@ -52,7 +53,12 @@ pub(super) fn beams(
         GraphSpec::Cell(of) => graph::named(&of.cell.0),
         _ => None,
     };
-    check_left(&wire, if cell.is_some() { "map" } else { "struts" }, environment)?;
+    let source = match &spec.graph {
+        GraphSpec::Cell(_) => "map",
+        GraphSpec::File(_) => "path",
+        _ => "struts",
+    };
+    check_left(&wire, source, environment)?;
     if cell.is_none() {
         warn_cleaned(&cleaned, &environment.path, warnings);
     }
@@ -197,8 +203,8 @@ pub(super) fn default_chord(built: &Built) -> Option<f64> {
 /// A frame before it is cleaned and trimmed.
 struct Frame {
     wire: Wireframe,
-    /// Radii given at nodes (mm), NaN where none is given; empty if there are none.
-    own: Vec<f64>,
+    /// Radii given at nodes and for struts, mm.
+    own: GivenRadii,
     wavelength: f64,
     /// Greatest distance from the region, mm, of a beam's axis of which a part of the beam may be in the region.
     reach: f64,
@@ -217,14 +223,16 @@ fn frame(
         (FilletSpec::None, Some(_)) => thickest(radii, &bounds, environment),
         _ => thickest(radii, &bounds, environment).max(0.5 * longest),
     };
+    let explicit = |(wire, own): (Wireframe, GivenRadii), radii: &Radii<Grade>| {
+        let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
+        let all = own.nodes.iter().chain(own.struts.iter().flatten());
+        let largest = all.copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
+        Frame { wavelength: mean_length(&wire), reach: reach(radii, longest).max(largest), wire, own }
+    };
     let (cell, map) = match &spec.graph {
         GraphSpec::Cell(of) => (&of.cell.0, &of.map),
-        GraphSpec::Nodes(of) => {
-            let (wire, own) = tables(of, spec, environment)?;
-            let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
-            let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
-            return Ok(Frame { wavelength: mean_length(&wire), reach: reach(radii, longest).max(largest), wire, own });
-        }
+        GraphSpec::Nodes(of) => return Ok(explicit(tables(of, spec, environment)?, radii)),
+        GraphSpec::File(of) => return Ok(explicit(graph_file::read(of, spec, environment, warnings)?, radii)),
         GraphSpec::Pattern(_) => return Err(DesignError::new(&environment.path, "a pattern is no frame")),
     };
     let unit = graph::named(cell).ok_or_else(|| DesignError::new(below("cell"), "no such cell"))?;
@@ -250,7 +258,7 @@ fn frame(
     let longest = net.lengths([made.longest(); 3]).into_iter().fold(0.0, f64::max);
     let reach = reach(radii, longest);
     let wire = fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
-    Ok(Frame { wire, own: Vec::new(), wavelength: made.wavelength(), reach })
+    Ok(Frame { wire, own: GivenRadii::default(), wavelength: made.wavelength(), reach })
 }
 
 pub(super) fn fillet(spec: FilletSpec) -> Fillet {

@@ -151,7 +151,7 @@ pub struct StepReport {
 }
 
 /// What a file of beams contains.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct BeamsFileReport {
     /// Number of nodes.
     pub nodes: usize,
@@ -163,8 +163,8 @@ pub struct BeamsFileReport {
     pub split: usize,
     /// Greatest difference between the radius of a beam and that of its frusta, mm; None for a graph.
     pub error: Option<f64>,
-    /// Number of hubs whose fillets are left out.
-    pub filleted: usize,
     /// Whether the file has the mesh of the region that cuts the beams.
     pub clipped: bool,
+    /// What of the beams the format cannot hold, a sentence each.
+    pub lost: Vec<String>,
 }

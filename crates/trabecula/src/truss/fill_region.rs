@@ -76,7 +76,7 @@ pub fn fill(graph: &PeriodicGraph, map: &Map, bounds: &Aabb, reach: f64) -> Resu
 mod tests {
     use super::*;
     use crate::map::{Affine, Round};
-    use beams::graph::{catalogue, named};
+    use beams::graph::{GivenRadii, catalogue, named};
     use geometry::math::{norm, sub};
     use std::sync::Arc;
 
@@ -90,7 +90,7 @@ mod tests {
         for unit in catalogue() {
             let graph = unit.graph().expect("a graph");
             let mut wireframe = fill(&graph, &affine(4.0), &bounds, 0.0).expect("a wireframe");
-            let done = wireframe.clean(1e-9, &mut Vec::new());
+            let done = wireframe.clean(1e-9, &mut GivenRadii::default());
             assert_eq!(done, Default::default(), "{}", unit.name);
             let report = wireframe.report(&|_| true);
             let mut lengths = graph.lengths([4.0; 3]);
@@ -119,7 +119,7 @@ mod tests {
         let map: Map = Arc::new(round.expect("map"));
         let bounds = Aabb { min: [-6.0, -6.0, -0.5], max: [6.0, 6.0, 1.5] };
         let mut wireframe = fill(&graph, &map, &bounds, 0.0).expect("a wireframe");
-        let done = wireframe.clean(1e-6, &mut Vec::new());
+        let done = wireframe.clean(1e-6, &mut GivenRadii::default());
         // On the axis twelve nodes coincide, and the struts between them have zero length.
         assert_eq!((done.merged, done.short, done.duplicates), (33, 12, 22));
         for s in &wireframe.struts {

@@ -9,7 +9,7 @@ use std::io::BufRead;
 use quick_xml::events::BytesStart;
 
 use super::beam_lattice::{Cap, Frustum};
-use super::read::{Model, Object, Placed, Source, place_all};
+use super::read::{Model, Object, Placed, Source, Which, place_all};
 use crate::fault::{Fault, counted};
 use crate::formats::graphs::BeamGraph;
 use crate::formats::text::shown;
@@ -201,11 +201,29 @@ impl Lattice {
     }
 }
 
-/// Reads the beams that the build places, in mm; their meshes are left out.
+/// Reads the beams that the build places, in mm; if it places none, all where they are defined. Meshes are left out.
 pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
+    match lattices(bytes, Which::Placed) {
+        Ok(graph) if !graph.beams.is_empty() => Ok(graph),
+        placed => match lattices(bytes, Which::Lattices) {
+            Ok(mut graph) if !graph.beams.is_empty() => {
+                graph.remarks.push("the build places no beams: read where they are defined".into());
+                Ok(graph)
+            }
+            _ => {
+                placed?;
+                let message = "the file has no beam lattice; a mesh is read as a region ([region.mesh])";
+                Err(Fault::new("", message))
+            }
+        },
+    }
+}
+
+/// The beams of some of the objects.
+fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
     let mut graph = BeamGraph { in_mm: true, ..BeamGraph::default() };
     let (mut short, mut flat, mut clipped, mut triangles) = (0, 0, 0, 0);
-    let held = place_all(bytes, &mut |placed: &Placed| {
+    place_all(bytes, which, &mut |placed: &Placed| {
         let Some(lattice) = &placed.object.lattice else { return Ok(()) };
         let factor = similarity(&placed.matrix).ok_or_else(|| {
             Fault::new("", "a beam lattice is placed with a transform that is no similarity: round beams would be oval")
@@ -235,13 +253,6 @@ pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
         triangles += placed.object.triangles.len();
         Ok(())
     })?;
-    if graph.beams.is_empty() {
-        let message = match held {
-            0 => "the file has no beam lattice; a mesh is read as a region ([region.mesh])",
-            _ => "the build places none of the beam lattices",
-        };
-        return Err(Fault::new("", message));
-    }
     drop_unused(&mut graph);
     for (count, what, done) in [
         (short, "beam", "shorter than the file's minlength left out"),

@@ -155,7 +155,7 @@ impl<'a> Package<'a> {
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut joiner = Joiner::default();
-    let lattices = place_all(bytes, &mut |placed| {
+    let lattices = place_all(bytes, Which::Placed, &mut |placed| {
         let mirrored = determinant(&placed.matrix) < 0.0;
         for &[a, b, c] in &placed.object.triangles {
             let t = if mirrored { [a, c, b] } else { [a, b, c] };
@@ -170,13 +170,31 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     Ok(mesh)
 }
 
-/// Gives each object that the build places (supports left out) where it is, and the number of beam lattices in the file.
-pub(super) fn place_all(bytes: &[u8], take: &mut dyn FnMut(&Placed) -> Result<(), Fault>) -> Result<usize, Fault> {
+/// Which objects of a file are given.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Which {
+    /// Those that the build places.
+    Placed,
+    /// Beam lattices, where they are defined.
+    Lattices,
+}
+
+/// Gives objects (supports left out) where they are, and the number of beam lattices in the file.
+pub(super) fn place_all(
+    bytes: &[u8],
+    which: Which,
+    take: &mut dyn FnMut(&Placed) -> Result<(), Fault>,
+) -> Result<usize, Fault> {
     let mut package = Package::open(bytes)?;
     let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
     let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
     let root = root.or_else(models).unwrap_or_else(|| MODEL.to_string());
-    let main = package.file(&root, model)?;
+    let mut main = package.file(&root, model)?;
+    if which == Which::Lattices {
+        let mut ids: Vec<u32> = main.objects.iter().filter(|o| o.1.lattice.is_some()).map(|o| *o.0).collect();
+        ids.sort_unstable();
+        main.items = ids.into_iter().map(|id| Use { path: String::new(), id, placement: Placement::NONE }).collect();
+    }
     if main.items.is_empty() {
         return Err(Fault::new(
             "",

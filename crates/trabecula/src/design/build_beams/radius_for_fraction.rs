@@ -13,7 +13,7 @@ use crate::design::sample;
 use crate::environment::Environment;
 use crate::kind::DesignError;
 use crate::map::Map;
-use ::beams::graph::{Graph, PeriodicGraph, Radii, Wireframe, with_radii};
+use ::beams::graph::{GivenRadii, Graph, PeriodicGraph, Radii, Wireframe, with_radii};
 use ::beams::quador::{PeriodicCell, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Mat3, inverse, transpose};
@@ -189,7 +189,7 @@ pub(super) fn of_frame(
     let region = environment.region;
     let graph = |radius: f64| -> Result<Graph, Fault> {
         let radii = Radii { radius: Some(radius), hub: None, profile: spec.profile.map(profile) };
-        with_radii(wire, &[], &radii, |radius, _, out| out.fill(*radius))
+        with_radii(wire, &GivenRadii::default(), &radii, |radius, _, out| out.fill(*radius))
     };
     let quadors = |radius: f64| Quadors::new(&graph(radius)?, fillet(spec.fillet));
     let share = || sample::inside(region, 10 * sample::COUNT).1 * region.bounds().size().iter().product::<f64>();

@@ -7,7 +7,7 @@ use crate::environment::Environment;
 use crate::grade::Grade;
 use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
-use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wireframe};
+use ::beams::graph::{self, GivenRadii, Graph, Nodes, Profile, Radii, Wireframe};
 use ::beams::quador::Pencil;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
@@ -35,6 +35,7 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
         (Some(_), _) if fault.at == "profile" => "profile",
         (_, Some(_)) => "hub",
         _ if spec.radius.is_some() => "radius",
+        _ if matches!(spec.graph, GraphSpec::File(_)) => "path",
         _ => "nodes",
     };
     let message = format!("the beam from {from} to {to}: {}{more}", fault.message);
@@ -105,7 +106,7 @@ pub(super) fn tables(
     graph: &NodeGraph,
     spec: &BeamsSpec,
     environment: &Environment,
-) -> Result<(Wireframe, Vec<f64>), DesignError> {
+) -> Result<(Wireframe, GivenRadii), DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let read = |path: &str, key: &str| environment.load(path, &below(key));
     let wrong =
@@ -146,7 +147,7 @@ pub(super) fn tables(
         let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
         return Err(DesignError::new(&environment.path, message));
     }
-    Ok((wire, nodes.radii))
+    Ok((wire, GivenRadii { nodes: nodes.radii, struts: Vec::new() }))
 }
 
 /// Nodes listed in the design.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{GradeSpec, MapKind};
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
+use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table, Unit};
 
 /// Graphs of beams, by name.
 #[derive(Clone, Debug, Default, PartialEq, Kind)]
@@ -95,6 +95,8 @@ pub enum GraphSpec {
     Cell(CellGraph),
     /// Nodes and struts.
     Nodes(NodeGraph),
+    /// A file of another program.
+    File(FileGraph),
     /// A program of repeats.
     Pattern(PatternGraph),
 }
@@ -105,6 +107,7 @@ impl GraphSpec {
         match self {
             GraphSpec::Cell(c) => c.trimming,
             GraphSpec::Nodes(n) => n.trimming,
+            GraphSpec::File(f) => f.trimming,
             GraphSpec::Pattern(_) => Trimming::default(),
         }
     }
@@ -129,6 +132,22 @@ pub struct NodeGraph {
     pub nodes: NodesSpec,
     /// The nodes that each beam joins: pairs of ids, or the path of a table (csv) of these.
     pub struts: StrutsSpec,
+    /// Trimming to the region.
+    #[kind(flatten)]
+    pub trimming: Trimming,
+}
+
+/// A file of another program.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct FileGraph {
+    /// Path of a file of beams (3mf, ltcx, csv, json, obj, vtu, vtk, inp, bdf, nas, txt), relative to the design file. Its radii hold
+    /// unless radius, hub or fraction are given.
+    pub path: String,
+    /// Unit of the file's lengths (mm unless given); 3MF and LTCX files name their own.
+    pub unit: Option<Unit>,
+    /// Factor on all lengths, after the unit.
+    #[kind(above = 0.0, default = 1.0)]
+    pub scale: f64,
     /// Trimming to the region.
     #[kind(flatten)]
     pub trimming: Trimming,
