@@ -129,14 +129,14 @@ def test_a_mesh_region_is_a_node_of_its_mesh(tmp_path):
         (
             BOX,
             PLAIN.replace("0.3", "{ linear = { along = [0, 0, 1], stops = [[0, 0.2], [5, 0.3]] } }"),
-            "a fraction that varies",
+            "fraction that varies",
         ),
         ("[region.capsule]\nstart = [0, 0, 0]\nend = [9, 0, 0]\nradius = 5\n", PLAIN, "region.capsule"),
         (BOX, PLAIN.replace("fraction = 0.3", 'iso.formula = "0.3 + step(0, x)/10"'), "the function step"),
         (
             BOX,
             PLAIN.replace("fraction = 0.3", "iso.radial = { center = [0, 0, 0], stops = [[0, 0.3], [5, 0.5]] }"),
-            "grade radial",
+            "radial",
         ),
     ],
 )

@@ -53,10 +53,10 @@ def cell(name: str) -> dict[str, Any]:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, NDArray]:
-    """The graph in a file of another program: ``nodes`` (n, 3) and ``beams`` (m, 2), numbers of nodes; where the file has radii,
-    ``radii`` (n,) of nodes and ``beam_radii`` (m, 2) of beams at their two ends, NaN where none is given. Lengths are mm if the
-    file names its unit (3MF, most LTCX), else in the file's own. The suffix decides the format: 3mf, ltcx, csv, json, obj, vtu,
-    vtk, inp, bdf, nas, txt.
+    """The graph in a file of another program: ``nodes`` (n, 3) and ``beams`` (m, 2), numbers of nodes; where the file has
+    radii, ``radii`` (n,) of nodes and ``beam_radii`` (m, 2) of beams at their two ends, NaN where none is given. Lengths are mm
+    if the file names its unit (3MF, most LTCX), else in the file's own. The suffix decides the format: 3mf, ltcx, csv, json,
+    obj, vtu, vtk, inp, bdf, nas, txt.
 
     Raises OSError if it cannot be read, ValueError with line or element for what the format does not allow.
     """

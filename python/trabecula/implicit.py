@@ -1,12 +1,13 @@
 """3MF with the volumetric and implicit extensions (drafts of 2022-01 and 2023-12): a part as a function of position.
 
-The function is the solid's own field, max(region, lattice), written out in the nodes that the implicit extension has. Source: 3MF
-Consortium, Volumetric Extension 0.8.0, implicit.xsd and volumetric.xsd.
+The function is the solid's own field, max(region, lattice), written out in the nodes that the implicit extension has. Source:
+3MF Consortium, Volumetric Extension 0.8.0, implicit.xsd and volumetric.xsd.
 """
 
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 import os
 import zipfile
@@ -196,7 +197,7 @@ def graded_level(write: Expressions, name: str, level: dict) -> str:
     s = write.dot(of["along"])
     stops = of["stops"]
     parts = [write.constant(stops[0][1])]
-    for (a, va), (b, vb) in zip(stops, stops[1:], strict=False):
+    for (a, va), (b, vb) in itertools.pairwise(stops):
         share = write.two("division", write.two("subtraction", s, write.constant(a)), write.constant(b - a))
         parts.append(write.two("multiplication", write.constant(vb - va), write.clamp(share, 0.0, 1.0)))
     return write.sum(parts)
@@ -265,12 +266,11 @@ def region_value(write: Expressions, region: dict) -> tuple[str, bool]:
         value, whole = region_value(write, of["of"])
         return write.two("subtraction", value, write.constant(of["by"])), whole
     if kind == "mesh":
-        more = (
-            '<i:in><i:vectorref identifier="pos" ref="inputs.pos"/><i:resourceref identifier="mesh" ref="region.value"/></i:in>'
-        )
         write.nodes.append(
             '<i:constresourceid identifier="region" value="1"><i:out><i:resourceid identifier="value"/></i:out>'
-            f'</i:constresourceid>\n<i:mesh identifier="distance">{more}<i:out><i:scalar identifier="distance"/></i:out></i:mesh>\n'
+            '</i:constresourceid>\n<i:mesh identifier="distance"><i:in><i:vectorref identifier="pos" ref="inputs.pos"/>'
+            '<i:resourceref identifier="mesh" ref="region.value"/></i:in><i:out><i:scalar identifier="distance"/></i:out>'
+            "</i:mesh>\n"
         )
         return "distance.distance", True
     shapes = {"box": box, "sphere": sphere, "halfspace": halfspace, "cylinder": cylinder}

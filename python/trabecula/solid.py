@@ -526,9 +526,9 @@ class Solid(Seen):
         return save_beams(self, path, None if chord is None else positive("chord", chord), mesh, _threads(threads))
 
     def save_implicit(self, path: str | os.PathLike[str]) -> dict[str, Any]:
-        """Writes the part as a function of position to a .3mf with the volumetric and implicit extensions (0.8.0, a draft): exact,
-        and a few kilobytes in addition to a region's mesh. Gives ``nodes`` of the function, ``triangles`` of the mesh in the file
-        (the bounds, unless the region is a mesh) and ``bytes``.
+        """Writes the part as a function of position to a .3mf with the volumetric and implicit extensions (0.8.0, a draft):
+        exact, and a few kilobytes in addition to a region's mesh. Gives ``nodes`` of the function, ``triangles`` of the mesh in
+        the file (the bounds, unless the region is a mesh) and ``bytes``.
 
         The function is ``field``, in mm. A lattice may be of any series, with an affine or Spartan map; its level an iso,
         fraction or pore that does not vary, or an iso that is a linear grade or a formula; the region a box, ball, cylinder,
