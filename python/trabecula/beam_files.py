@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 MOST_SHOWN = 300_000
 #: Chord errors of that mesh in the one of a usual mesh, a fiftieth of the thinnest beam's radius.
 COARSER = (5, 10, 20)
+#: Steps of its grid, where it needs one, on the thinnest beam's diameter.
+BEAM_STEPS = (2.5, 1.6)
 #: Steps of the grid on which the region's mesh is made, along its diagonal, and its greatest error in diagonals.
 CLIP_STEPS, CLIP_ERROR = 64, 2e-5
 
@@ -74,8 +76,10 @@ def shown_mesh(core: _core.Solid, threads: int | None) -> _core.Mesh | None:
                 return core.mesh_beams(times * usual, threads)[0]
         return None
     report = core.report()
-    thin = min(beams.thickness for beams in report.beams.values())
-    edge = thin / 2.5
-    if core.estimate(edge, edge).triangles > MOST_SHOWN:
-        return None
-    return core.mesh(edge, threads, None, "keep")[0]
+    (beams,) = report.beams.values()
+    thin, volume = beams.thickness, beams.fraction * report.region.volume
+    for steps in BEAM_STEPS:
+        # Two triangles for each square of a step on the surface of cylinders of this diameter and volume, 4 V / d.
+        if 8 * volume * steps**2 <= MOST_SHOWN * thin**3:
+            return core.mesh(thin / steps, threads, None, "keep")[0]
+    return None
