@@ -276,3 +276,10 @@ def test_beams_of_a_file_that_cross_without_a_node_are_named(tmp_path):
     text = 'schema = 1\nregion.box.size = [8, 8, 8]\n[beams.core]\npath = "a.csv"'
     warned = parsed(text, False, "test", str(tmp_path)).build().warnings
     assert any("1 pair of beams run into" in w["message"] and "(0.000, 0.000, 0.000) mm" in w["message"] for w in warned)
+
+
+@pytest.mark.filterwarnings("error::trabecula.DesignWarning")
+def test_a_warning_that_is_an_error_leaves_no_file(tmp_path):
+    with pytest.raises(lt.DesignWarning, match="the region cuts some beams"):
+        built(CUT).save_beams(tmp_path / "a.csv")
+    assert not list(tmp_path.iterdir())

@@ -35,8 +35,7 @@ def save_beams(
     core = solid._core
     if kind != "3mf":
         with whole_file(path) as temporary:
-            made = _core.write_graph(core, temporary, kind)
-        return warned(made)
+            return warned(_core.write_graph(core, temporary, kind))
     clip = region_mesh(core) if core.cuts_beams() else None
     shown = shown_mesh(core, threads) if mesh else None
     if mesh and shown is None:
@@ -48,12 +47,11 @@ def save_beams(
         )
     title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
     with whole_file(path) as temporary:
-        made = _core.write_beam_lattice(core, temporary, title, chord, clip, shown, threads)
-    return warned(made)
+        return warned(_core.write_beam_lattice(core, temporary, title, chord, clip, shown, threads))
 
 
 def warned(made: BeamsFileReport) -> BeamsFileReport:
-    """Warns of what the format cannot hold."""
+    """Warns of what the format cannot hold, before the file has its name: a warning may be an error."""
     for sentence in made.lost:
         warnings.warn(sentence, DesignWarning, stacklevel=4)
     return made

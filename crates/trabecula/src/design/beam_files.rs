@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{Built, build_beams};
 use crate::report::BeamsFileReport;
 use crate::truss::Beams;
-use beams::{Frusta, Graph, Profile, Quadors};
+use beams::{Fillet, Frusta, Graph, Profile, Quadors};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{Aside, BeamGraph, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph};
 use geometry::progress::{Stopped, checkpoint};
@@ -67,11 +67,8 @@ impl Written<'_> {
 
     /// What any file of beams loses, unless it has the region's mesh and fillets.
     fn lost(&self, clipped: bool) -> Vec<String> {
-        let fillets = |i: usize| {
-            let radius = self.quadors.fillet_radius(i);
-            radius > 0.0 && radius.is_finite()
-        };
-        let filleted = (0..self.quadors.len()).into_par_iter().filter(|i| fillets(*i)).count();
+        let hubs = if self.quadors.fillet() == Fillet::None { 0 } else { self.quadors.len() };
+        let filleted = (0..hubs).filter(|i| self.quadors.hub(*i).half_beams.len() > 1).count();
         let mut lost = Vec::new();
         if filleted > 0 {
             lost.push(format!(

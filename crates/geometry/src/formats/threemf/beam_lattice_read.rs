@@ -4,7 +4,6 @@
 //! beams.
 
 use std::collections::{HashMap, HashSet};
-use std::io::BufRead;
 
 use quick_xml::events::BytesStart;
 
@@ -48,20 +47,14 @@ fn local<'a>(tag: &'a BytesStart, name: &str) -> Option<std::borrow::Cow<'a, str
     attribute_where(tag, |n| n.rsplit(':').next() == Some(name))
 }
 
-fn optional<T: core::str::FromStr, R: BufRead>(
-    s: &crate::formats::xml::Scanner<R>,
-    tag: &BytesStart,
-    name: &str,
-) -> Result<Option<T>, Fault> {
+fn optional<T: core::str::FromStr>(s: &Source, tag: &BytesStart, name: &str) -> Result<Option<T>, Fault> {
     let Some(text) = local(tag, name) else { return Ok(None) };
-    let value = text
-        .parse()
-        .map_err(|_| s.fault(format!("{name} = {} is not a number that it can be", shown(text.as_bytes()))))?;
-    Ok(Some(value))
+    let wrong = |_| s.fault(format!("{name} = {} is not a number that it can be", shown(text.as_bytes())));
+    text.parse().map(Some).map_err(wrong)
 }
 
 fn positive(s: &Source, tag: &BytesStart, name: &str) -> Result<Option<f64>, Fault> {
-    match optional::<f64, _>(s, tag, name)? {
+    match optional::<f64>(s, tag, name)? {
         Some(v) if !(v > 0.0 && v.is_finite()) => Err(s.fault(format!("{name} = {v}; it must be greater than 0"))),
         found => Ok(found),
     }
@@ -94,7 +87,7 @@ impl Lattice {
         if mode != "none" && ball_radius.is_none() {
             return Err(s.fault(format!("ballmode is {mode}; ballradius is needed then")));
         }
-        let mesh = optional::<u32, _>(s, tag, "clippingmesh")?;
+        let mesh = optional::<u32>(s, tag, "clippingmesh")?;
         let clipping = one_of(s, tag, "clippingmode", &["none", "inside", "outside"])?;
         if clipping != "none" && mesh.is_none() {
             return Err(s.fault(format!("clippingmode is {clipping}; clippingmesh is needed then")));
@@ -271,11 +264,11 @@ fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
 fn drop_unused(graph: &mut BeamGraph) {
     let mut used = vec![false; graph.nodes.len()];
     graph.beams.iter().flatten().for_each(|n| used[*n as usize] = true);
-    let mut next = 0;
-    let numbers: Vec<u32> = used.iter().map(|u| (next, next += u32::from(*u)).0).collect();
-    let kept = |i: usize| used[i];
-    graph.nodes = (0..used.len()).filter(|i| kept(*i)).map(|i| graph.nodes[i]).collect();
-    graph.radii = (0..used.len()).filter(|i| kept(*i)).map(|i| graph.radii[i]).collect();
+    let kept: Vec<usize> = (0..used.len()).filter(|i| used[*i]).collect();
+    let mut numbers = vec![0; used.len()];
+    kept.iter().enumerate().for_each(|(new, old)| numbers[*old] = new as u32);
+    graph.nodes = kept.iter().map(|i| graph.nodes[*i]).collect();
+    graph.radii = kept.iter().map(|i| graph.radii[*i]).collect();
     graph.beams.iter_mut().flatten().for_each(|n| *n = numbers[*n as usize]);
 }
 

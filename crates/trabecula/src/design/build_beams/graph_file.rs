@@ -31,8 +31,8 @@ pub(super) fn read(
     }
     let mut remarks = std::mem::take(&mut graph.remarks);
     let own = radii(&mut graph, spec, environment, &mut remarks)?;
-    let told = remarks.into_iter().map(|r| Warning { path: below("path"), message: format!("{}: {r}", file.path) });
-    warnings.extend(told);
+    let made = remarks.into_iter().map(|r| Warning { path: below("path"), message: format!("{}: {r}", file.path) });
+    warnings.extend(made);
     Ok((Wireframe { nodes: graph.nodes, struts: graph.beams }, own))
 }
 

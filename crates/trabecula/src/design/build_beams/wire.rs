@@ -91,7 +91,7 @@ pub(super) fn check_left(wire: &Wireframe, key: &str, environment: &Environment)
         "dangling" => {
             "no beam is left once those with a free end are dropped: none of them lies on a closed way".into()
         }
-        "struts" => "no beam has two different ends".to_string(),
+        "struts" | "path" => "no beam has two different ends".to_string(),
         _ => {
             let b = environment.region.bounds();
             let corner = |v: Vec3| v.map(number).join(", ");
