@@ -14,6 +14,7 @@ from .reports import (
     IslandsReport,
     LayersReport,
     MeshReport,
+    PermeabilityReport,
     QualityReport,
     RepairReport,
     SimplifyReport,
@@ -144,6 +145,7 @@ class Cell:
         work: tuple[int | None, Any],
     ) -> StiffnessReport: ...
     def conductivity(self, grid: tuple[int, bool], pore: float, work: tuple[int | None, Any]) -> ConductivityReport: ...
+    def permeability(self, n: int, upper: bool | None, work: tuple[int | None, Any]) -> PermeabilityReport: ...
 
 class Solid:
     @property

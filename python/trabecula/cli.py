@@ -17,6 +17,7 @@ from .formats import (
     MESH_READS,
     MESH_WRITES,
     MESHES,
+    PERMEABILITY_WRITES,
     STDIN,
     STEP_WRITES,
     STIFFNESS_WRITES,
@@ -167,9 +168,12 @@ def of_cell(known: tuple[str, ...]):
     return (
         option("-o", "--output", nargs="+", type=ending(known), metavar="OUT", help=f"files to write ({dotted(known)})"),
         option("--n", type=VOXELS, default=64, metavar="N", help="voxels along the cell's edge (default: 64)"),
-        option("--voxels", action="store_true", help="plain voxels: solid if the centre is, without fractions"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     )
+
+
+#: Without the fractions of voxels.
+PLAIN = option("--voxels", action="store_true", help="plain voxels: solid if the centre is, without fractions")
 
 
 #: The mesh formats that are written, each with what is particular to it.
@@ -436,7 +440,7 @@ COMMANDS = {
         ".bdf (Nastran), .mac (Ansys), material cards. Several may be named.\n\n"
         "examples:\n  trabecula stiffness part.toml --E 114000 --nu 0.34\n"
         "  trabecula stiffness part.toml --json --n 96\n  trabecula stiffness part.toml -o cell.inp modulus.png",
-        *(DESIGN, *of_cell(STIFFNESS_WRITES)),
+        *(DESIGN, *of_cell(STIFFNESS_WRITES), PLAIN),
         option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid (default: 1)"),
         option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
     ),
@@ -444,8 +448,17 @@ COMMANDS = {
         "Find how well the periodic cell of a design conducts heat or electricity, relative to its solid.",
         "As `stiffness`. With --pore the pore conducts too, this many times as well as the solid.\n\n"
         "examples:\n  trabecula conductivity part.toml\n  trabecula conductivity part.toml --pore 0.026 --json",
-        *(DESIGN, *of_cell(CONDUCTIVITY_WRITES)),
+        *(DESIGN, *of_cell(CONDUCTIVITY_WRITES), PLAIN),
         option("--pore", type=SHARE, default=0.0, metavar="K", help="conductivity of the pore by the solid's (default: 0)"),
+    ),
+    "permeability": (
+        "Find how permeable the pore of the periodic cell of a design is to creeping flow, in every direction.",
+        "The cell is that of `stiffness`. k, in mm², is the limit of three grids, n, n/2 and n/4 nodes along the cell:\n"
+        "mean flux over the whole cell = -k grad p / viscosity. With hydraulic diameter, tortuosity and Kozeny's constant.\n"
+        "Of a sheet both sides together, or one of them with --side.\n\n"
+        "examples:\n  trabecula permeability part.toml\n  trabecula permeability part.toml --side lower --json",
+        *(DESIGN, *of_cell(PERMEABILITY_WRITES)),
+        option("--side", choices=("lower", "upper"), help="the pore on one side of a sheet (default: both)"),
     ),
     "doctor": (
         "Say what is installed, and what is missing: versions, processors, memory, extras.",

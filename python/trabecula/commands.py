@@ -25,6 +25,7 @@ from .texts import counted, table, voids
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "measure", "mesh", "new"),
     *("render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
+    *("permeability", "render", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
 ]
 
 
@@ -674,6 +675,11 @@ def stiffness(args) -> None:
 
 def conductivity(args) -> None:
     """``trabecula conductivity``."""
+    of_cell(args)
+
+
+def permeability(args) -> None:
+    """``trabecula permeability``."""
     of_cell(args)
 
 

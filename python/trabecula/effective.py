@@ -1,4 +1,4 @@
-"""``trabecula stiffness`` and ``trabecula conductivity``: the figures of a design's periodic cell, printed and written."""
+"""``trabecula stiffness``, ``conductivity`` and ``permeability``: the figures of a design's periodic cell, printed and written."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from .files import check_place, whole_file
 from .formats import kind_of
 from .inputs import build, keep_file
 from .moduli import SURFACE_WRITES, write_surface
-from .reports import ConductivityReport, StiffnessReport
+from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
 from .terminal import Progress, figure, say, warn
 
-__all__ = ["LINES", "conductivity", "stiffness"]
+__all__ = ["LINES", "conductivity", "permeability", "stiffness"]
+
+#: What is found of a cell.
+Found = StiffnessReport | ConductivityReport | PermeabilityReport
 
 #: The pairs of axes in Voigt's order.
 AXES = ("11", "22", "33", "23", "13", "12")
@@ -48,6 +51,17 @@ def conductivity(args) -> ConductivityReport:
     return found
 
 
+def permeability(args) -> PermeabilityReport:
+    """The permeability that is asked for; written where a file is named."""
+    solid = placed(args)
+    with Progress("permeability", args.progress) as progress:
+        found = solid.permeability(args.n, args.side, args.threads, progress)
+    for name in args.output or ():
+        written(name, table(found.k, "123", found.k_n))
+    told(found, args)
+    return found
+
+
 def placed(args):
     """The solid of the design, after the outputs' places have been checked."""
     for name in args.output or ():
@@ -56,7 +70,7 @@ def placed(args):
     return build(args.design, tell=not args.json)
 
 
-def told(found: StiffnessReport | ConductivityReport, args) -> None:
+def told(found: Found, args) -> None:
     """Says warnings and what was written."""
     for warning in found.warnings:
         warn(warning["message"], warning["path"], not args.json)
@@ -97,10 +111,13 @@ def ranged(bounds: Sequence[float] | None) -> str:
     return "" if bounds is None else f" (Hashin-Shtrikman {figure(bounds[0])} to {figure(bounds[1])})"
 
 
-def accuracy(found: StiffnessReport | ConductivityReport, size: str) -> list[str]:
+def accuracy(found: Found, size: str) -> list[str]:
     """How the figures were found, and how sure they are."""
     grids = ", ".join(" x ".join(map(str, g.shape)) for g in found.grids)
-    walls = "" if found.wall_voxels is None else f"; {found.wall_voxels:.3g} voxels across the thinnest wall"
+    if isinstance(found, PermeabilityReport):
+        walls = "" if found.pore_nodes is None else f"; {found.pore_nodes:.3g} steps across the hydraulic diameter"
+    else:
+        walls = "" if found.wall_voxels is None else f"; {found.wall_voxels:.3g} voxels across the thinnest wall"
     return [
         f"fraction   {found.fraction:.6f}",
         f"accuracy   at n = {found.n} {size} is {100 * found.error:.2g} % off the limit given; grids of {grids}",
@@ -136,8 +153,25 @@ def lines_of_conductivity(found: ConductivityReport) -> list[str]:
     return [*lines, f"mean       {figure(mean)}{ranged(found.bounds)}", *accuracy(found, "k")]
 
 
+def lines_of_permeability(found: PermeabilityReport) -> list[str]:
+    """The figures for people."""
+    of = "" if found.side is None else f" of the {found.side} side"
+    lines = [f"k{of}, mm²:", *matrix(found.k, "123")]
+    rest: list[tuple[str, float | None, str]] = [
+        ("k / cell²", None if found.k_cell is None else sum(found.k_cell[i][i] for i in range(3)) / 3, ", mean of the axes"),
+        ("diameter", found.hydraulic_diameter, " mm, hydraulic: 4 volume / area"),
+        ("area", found.area_per_volume, " mm² of wall a mm³ of the cell"),
+        ("porosity", found.porosity, ""),
+        ("tortuosity", found.tortuosity, ", porosity / conductivity of the pore"),
+        ("kozeny", found.kozeny, ", porosity³ / (k area²)"),
+    ]
+    lines += [f"{word:<11}{figure(v)}{more}" for word, v, more in rest if v is not None]
+    return lines + accuracy(found, "k")
+
+
 #: What a command prints of a report.
 LINES: dict[str, Callable[..., list[str]]] = {
     "stiffness": lines_of_stiffness,
     "conductivity": lines_of_conductivity,
+    "permeability": lines_of_permeability,
 }

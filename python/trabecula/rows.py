@@ -17,8 +17,11 @@ from .solid import Solid
 
 __all__ = ["PROPERTIES", "UNITS", "Job", "named", "row_of"]
 
-#: Units of the columns that every row has; those of parameters are the design's: mm and degrees.
-UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm²", "seconds": "s"}
+#: Units of the columns of figures; those of parameters are the design's: mm and degrees.
+UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm²", "seconds": "s"} | {
+    **{f"permeability{i + 1}{j + 1}_mm2": "mm²" for i in range(3) for j in range(i, 3)},
+    "hydraulic_diameter_mm": "mm",
+}
 
 
 @dataclass(frozen=True)
@@ -120,5 +123,17 @@ def _conductivity(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {f"k{i + 1}{j + 1}": found.k[i][j] for i in range(3) for j in range(i, 3)} | {"k_error": found.error}
 
 
+def _permeability(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The six entries in mm², their relative error, hydraulic diameter and tortuosity."""
+    found = solid.permeability(**settings)
+    made = {f"permeability{i + 1}{j + 1}_mm2": found.k[i][j] for i in range(3) for j in range(i, 3)}
+    made |= {"permeability_error": found.error, "hydraulic_diameter_mm": found.hydraulic_diameter}
+    return made | {"tortuosity": found.tortuosity}
+
+
 #: Properties that can be asked for: functions of a solid and their settings, to columns.
-PROPERTIES: dict[str, Any] = {"conductivity": _conductivity, "stiffness": _stiffness}
+PROPERTIES: dict[str, Any] = {
+    "conductivity": _conductivity,
+    "permeability": _permeability,
+    "stiffness": _stiffness,
+}

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         DesignReport,
         EstimateReport,
         MeshReport,
+        PermeabilityReport,
         QualityReport,
         RepairReport,
         StepReport,
@@ -61,6 +62,8 @@ TRIANGLE = 2 * (12 + 12)
 SPOOLED = 24
 #: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
 STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
+#: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
+PERMEABILITY_BYTES = 1300
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
@@ -694,6 +697,29 @@ class Solid(Seen):
         """
         grid = _voxels(n, CONDUCTIVITY_BYTES), voxels
         return self._cell.conductivity(grid, number("pore", pore), (_threads(threads), progress))
+
+    def permeability(
+        self,
+        n: int = 64,
+        side: Literal["lower", "upper"] | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> PermeabilityReport:
+        """The permeability of the pore of the periodic cell to creeping flow, (3, 3) in mm²: mean flux over the whole cell = -k
+        grad p / viscosity; with hydraulic diameter, tortuosity, Kozeny's constant, and how sure it is. Both sides of a sheet
+        together, or that of one ``side``.
+
+        Stokes's flow between the exact walls, by a lattice Boltzmann scheme of two relaxation times with interpolated
+        bounce-back on ``n`` nodes along the cell's edge, on n/2 and n/4 too, and the limit of the three. Directions in which
+        the pore does not go through have zeros, and a warning.
+
+        Raises DesignError for a design without such a cell, ValueError for the side of what is no sheet, for ``n`` below 8 or
+        beyond the memory there is.
+        """
+        if side not in (None, "lower", "upper"):
+            raise ValueError(f'side is {side!r}; expected "lower", "upper" or None for both')
+        n = _voxels(n, PERMEABILITY_BYTES)
+        return self._cell.permeability(n, None if side is None else side == "upper", (_threads(threads), progress))
 
     def _picture(self) -> Mesh:
         low, high = self.bounds

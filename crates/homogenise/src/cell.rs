@@ -71,21 +71,12 @@ impl VoxelCell {
 
     /// Axes in which the first edge is along x and the second in the plane of x and y, as columns; and the edges of a voxel there.
     fn frame(&self) -> (Mat3, Mat3) {
-        let [a, b, c] = columns(&self.edges);
-        let x = unit(a);
-        let y = unit(sub(b, scale(x, dot(b, x))));
-        let across = sub(c, scale(x, dot(c, x)));
-        let z = unit(sub(across, scale(y, dot(across, y))));
-        let frame = transpose(&[x, y, z]);
-        let mut voxel = product(&transpose(&frame), &self.edges);
+        let (frame, mut voxel) = upper_edges(&self.edges);
         for row in &mut voxel {
             for (v, n) in row.iter_mut().zip(self.shape) {
                 *v /= n as f64;
             }
         }
-        // Edges at right angles are so to the last digit.
-        let size = columns(&voxel).map(norm).into_iter().fold(0.0, f64::max);
-        voxel = voxel.map(|row| row.map(|v| if v.abs() < 1e-14 * size { 0.0 } else { v }));
         (frame, voxel)
     }
 
@@ -213,6 +204,21 @@ impl VoxelCell {
         }
         Ok(made)
     }
+}
+
+/// Axes in which the first of three edges is along x and the second in the plane of x and y, as columns; and the edges there, which are
+/// an upper triangular matrix.
+pub fn upper_edges(edges: &Mat3) -> (Mat3, Mat3) {
+    let [a, b, c] = columns(edges);
+    let x = unit(a);
+    let y = unit(sub(b, scale(x, dot(b, x))));
+    let across = sub(c, scale(x, dot(c, x)));
+    let z = unit(sub(across, scale(y, dot(across, y))));
+    let axes = transpose(&[x, y, z]);
+    let upper = product(&transpose(&axes), edges);
+    // Edges at right angles are so to the last digit.
+    let size = columns(&upper).map(norm).into_iter().fold(0.0, f64::max);
+    (axes, upper.map(|row| row.map(|v| if v.abs() < 1e-14 * size { 0.0 } else { v })))
 }
 
 /// The columns of a matrix.

@@ -69,6 +69,26 @@ pub fn inverse6(m: &[[f64; 6]; 6]) -> Option<[[f64; 6]; 6]> {
     Some(out)
 }
 
+/// The solution of A x = b for a symmetric positive definite A, by Cholesky's factors; `None` if it is not positive definite.
+pub fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
+    let n = b.len();
+    for i in 0..n {
+        for j in 0..=i {
+            let sum = a[i][j] - (0..j).map(|k| a[i][k] * a[j][k]).sum::<f64>();
+            a[i][j] = match i == j {
+                true if sum > 0.0 => sum.sqrt(),
+                true => return None,
+                false => sum / a[j][j],
+            };
+        }
+        b[i] = (b[i] - (0..i).map(|k| a[i][k] * b[k]).sum::<f64>()) / a[i][i];
+    }
+    for i in (0..n).rev() {
+        b[i] = (b[i] - (i + 1..n).map(|k| a[k][i] * b[k]).sum::<f64>()) / a[i][i];
+    }
+    Some(b)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

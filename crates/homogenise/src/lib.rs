@@ -1,9 +1,12 @@
-//! Effective properties of a periodic cell of voxels: stiffness and conductivity.
+//! Effective properties of a periodic cell of voxels: stiffness and conductivity; and of its pore: permeability.
 //!
 //! A [`VoxelCell`] is a parallelepiped of voxels, each with the share of it that is solid. Trilinear finite elements, their stiffness
 //! weighted by that share, give the periodic field of each unit load; its energy is the effective tensor. The element is applied in
 //! modal coordinates ([`element`](mod@element)) without a stored matrix (`operator.rs`), and the systems are solved by conjugate gradients
 //! with geometric multigrid (`solve.rs`, `multigrid.rs`), so that the number of iterations does not grow with that of the voxels.
+//!
+//! A [`PoreGrid`] is a pore filled by nodes of a cubic grid, with the distances of walls. Creeping flow through it is found by a lattice
+//! Boltzmann scheme with two relaxation times (`boltzmann.rs`) that is led to its steady state (`flow.rs`).
 //!
 //! ```
 //! use geometry::progress::Silent;
@@ -19,18 +22,22 @@
 //! assert!(c[2][2].abs() < 1e-9);
 //! ```
 
+mod boltzmann;
 mod cell;
 mod dense;
 pub mod element;
 mod fields;
+mod flow;
 mod lanes;
 mod material;
 mod moduli;
 mod multigrid;
 mod operator;
 mod percolation;
+mod pore;
 mod solve;
 
-pub use cell::{Homogenised, VoxelCell};
+pub use cell::{Homogenised, VoxelCell, upper_edges};
 pub use material::{AXES, Material, Voigt, turned, voigt};
 pub use moduli::{Moduli, bounds, conductivity_bounds};
+pub use pore::{PoreGrid, VELOCITIES, WallLink, opposite};

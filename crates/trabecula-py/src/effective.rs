@@ -7,7 +7,7 @@ use homogenise::Material;
 use pyo3::prelude::*;
 use serde::Serialize;
 use trabecula::design::Design;
-use trabecula::effective::{Resolution, UnitCell};
+use trabecula::effective::{Resolution, Side, UnitCell};
 
 use crate::error;
 use crate::folder::Folder;
@@ -91,5 +91,17 @@ impl Cell {
     ) -> PyResult<Bound<'py, PyAny>> {
         let resolution = Resolution { n: grid.0, plain: grid.1 };
         self.report(py, "ConductivityReport", work, move |cell, p| cell.conductivity(pore, resolution, p))
+    }
+
+    /// The permeability of the pore, as `reports.PermeabilityReport`; `upper` is the side of a sheet, or both.
+    fn permeability<'py>(
+        &self,
+        py: Python<'py>,
+        n: usize,
+        upper: Option<bool>,
+        work: Work,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let side = upper.map(|up| if up { Side::Upper } else { Side::Lower });
+        self.report(py, "PermeabilityReport", work, move |cell, p| cell.permeability(n, side, p))
     }
 }

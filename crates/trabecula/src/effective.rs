@@ -1,6 +1,8 @@
-//! Effective figures of a periodic cell: its voxels, three grids of them, and what they tend to.
+//! Effective figures of a periodic cell: its voxels, three grids of them, and what they tend to; flow through its pore.
 
 mod limit;
+mod permeability;
+mod pore_space;
 
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3, determinant, norm, transpose};
@@ -14,6 +16,7 @@ use crate::kind::Warning;
 use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
 use crate::voxel_fractions::{VoxelGrid, voxel_fractions};
 use limit::{Limit, limit};
+pub use permeability::Side;
 
 /// A periodic cell.
 pub struct UnitCell {
@@ -21,6 +24,8 @@ pub struct UnitCell {
     pub path: String,
     /// The solid in coordinates of the cell, 0 to 1 along each edge.
     pub solid: CsgSolid,
+    /// Whether it is a sheet: its first surface is towards the upper side, its second towards the lower one.
+    pub sheet: bool,
     /// The edges, mm, one row each.
     pub edges: Mat3,
     /// The solid fraction, if it is known beforehand.

@@ -15,7 +15,7 @@ use serde_json::Value as Json;
 pub use beams_report::{
     BeamsFileReport, BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
 };
-pub use cell_report::{CellGrid, ConductivityReport, StiffnessReport};
+pub use cell_report::{CellGrid, ConductivityReport, PermeabilityReport, StiffnessReport};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     PeriodReport, RbfReport, RegionReport, SingularLineReport, TransitionReport,
@@ -71,6 +71,7 @@ struct Reports {
     layers: LayersReport,
     stiffness: StiffnessReport,
     conductivity: ConductivityReport,
+    permeability: PermeabilityReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

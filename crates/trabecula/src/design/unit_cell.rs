@@ -120,11 +120,13 @@ fn pulled(path: String, field: Arc<dyn Implicit>, corner: Vec3, edges: Mat3) -> 
         parts if parts.is_empty() => vec![field],
         parts => parts,
     };
+    let sheet = parts.len() == 2;
     let surfaces: Vec<Surface> = parts.into_iter().map(Surface::smooth).collect();
     let tree = CsgTree::Intersection((0..surfaces.len()).map(CsgTree::Leaf).collect());
     UnitCell {
         path,
         solid: CsgSolid { surfaces, tree }.in_frame(corner, edges),
+        sheet,
         edges: transpose(&edges),
         fraction: None,
         connected: None,

@@ -96,3 +96,50 @@ pub struct ConductivityReport {
     /// Possible mistakes.
     pub warnings: Vec<Warning>,
 }
+
+/// Permeability of the pore of a periodic cell to creeping flow, in world axes: mean flux over the whole cell = -k grad p / viscosity.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PermeabilityReport {
+    /// Permeability, extrapolated to infinitely many nodes: 3 x 3, mm².
+    pub k: [[f64; 3]; 3],
+    /// Permeability at n nodes, mm².
+    pub k_n: [[f64; 3]; 3],
+    /// Permeability in units of the wavelength squared; None unless the cell is a cube.
+    pub k_cell: Option<[[f64; 3]; 3]>,
+    /// Nodes along the edge of the cell, or of a cube of its volume.
+    pub n: usize,
+    /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not whole numbers
+    /// of steps adds.
+    pub error: f64,
+    /// Exponent of the grid's step with which the error was taken to fall.
+    pub order: f64,
+    /// Greatest change by a step of the iteration, over that of the first.
+    pub residual: f64,
+    /// Most steps of a force.
+    pub iterations: usize,
+    /// Which pore: both sides of a sheet together if None.
+    pub side: Option<String>,
+    /// Volume of the pore over that of the cell.
+    pub porosity: f64,
+    /// Area of the wall of the pore over the volume of the cell, 1/mm.
+    pub area_per_volume: f64,
+    /// Hydraulic diameter, 4 volume of the pore / area of its wall, mm; None without a wall.
+    pub hydraulic_diameter: Option<f64>,
+    /// Kozeny's constant porosity³ / (k S²), with the mean k over the axes and the area S of the wall over the volume of the cell; None
+    /// where nothing flows.
+    pub kozeny: Option<f64>,
+    /// Conductivity of the pore, 1 where it is open: 3 x 3.
+    pub conductivity: [[f64; 3]; 3],
+    /// Tortuosity porosity / conductivity, with the mean conductivity over the axes; None where the pore does not conduct.
+    pub tortuosity: Option<f64>,
+    /// Solid fraction of the cell.
+    pub fraction: f64,
+    /// Edges of the cell, mm, one row each.
+    pub edges: [[f64; 3]; 3],
+    /// Steps of the grid across the hydraulic diameter; None without a wall.
+    pub pore_nodes: Option<f64>,
+    /// The grids, with the share of nodes that are not in the pore and the tensor in mm².
+    pub grids: Vec<CellGrid>,
+    /// Possible mistakes.
+    pub warnings: Vec<Warning>,
+}
