@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
     from .layers import Layer, Layers
+    from .laws import Law, law
     from .levels import fraction, iso
     from .mesh import Mesh
     from .parts import write_parts
@@ -38,6 +39,7 @@ __all__ = [
     "DesignError",
     "DesignWarning",
     "Lattice",
+    "Law",
     "Layer",
     "Layers",
     "Mesh",
@@ -55,6 +57,7 @@ __all__ = [
     "fraction",
     "grade",
     "iso",
+    "law",
     "level",
     "load",
     "map",
@@ -76,6 +79,8 @@ _HOMES = {
     "skin": "design",
     "DesignError": "errors",
     "DesignWarning": "errors",
+    "Law": "laws",
+    "law": "laws",
     "Layer": "layers",
     "Layers": "layers",
     "Mesh": "mesh",

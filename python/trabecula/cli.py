@@ -13,6 +13,7 @@ from .formats import (
     BEAM_WRITES,
     CONDUCTIVITY_WRITES,
     DESIGNS,
+    LAW_WRITES,
     LAYER_WRITES,
     MESH_READS,
     MESH_WRITES,
@@ -81,6 +82,8 @@ ANGLE = number("degrees")
 COUNT = number("a whole number", lambda v: 1 <= v <= 4096, " from 1 to 4096", int)
 MODULUS = number("Young's modulus", lambda v: v > 0, " greater than 0")
 NUMBER = number("a number")
+FRACTION = number("a fraction", lambda v: 0 < v < 1, " between 0 and 1")
+POINTS = number("a whole number", lambda v: 2 <= v <= 1000, " from 2 to 1000", int)
 SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")
 VOXELS = number("a whole number", lambda v: 8 <= v <= 4096, " from 8 to 4096", int)
 FRAMES = number("a whole number", lambda v: 2 <= v <= 720, " from 2 to 720", int)
@@ -459,6 +462,30 @@ COMMANDS = {
         "examples:\n  trabecula permeability part.toml\n  trabecula permeability part.toml --side lower --json",
         *(DESIGN, *of_cell(PERMEABILITY_WRITES)),
         option("--side", choices=("lower", "upper"), help="the pore on one side of a sheet (default: both)"),
+    ),
+    "law": (
+        "Find what a named cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
+        "At each fraction the limit of grids of n, n/2 and n/4 voxels along the cell; between them monotone cubics, and powers of\n"
+        "the fraction fitted (Gibson and Ashby). Stiffness and conductivity are relative to the solid's, lengths to the\n"
+        "wavelength. OUT: .csv, a row for each fraction; .json, with fits and notes; .svg, plots. Several may be named.\n\n"
+        "examples:\n  trabecula law gyroid -o gyroid.csv gyroid.svg\n"
+        "  trabecula law diamond --part lower --from 0.2 --to 0.5 --count 7 --properties stiffness --json",
+        option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` lists them"),
+        option("-o", "--output", nargs="+", type=ending(LAW_WRITES), metavar="OUT", help=f"files to write ({dotted(LAW_WRITES)})"),
+        option("--part", choices=("sheet", "lower", "upper"), default="sheet", help="what is solid (default: sheet)"),
+        option("--from", dest="start", type=FRACTION, default=0.05, metavar="F", help="the least fraction (default: 0.05)"),
+        option("--to", dest="stop", type=FRACTION, default=0.6, metavar="F", help="the greatest fraction (default: 0.6)"),
+        option("--count", type=POINTS, default=12, metavar="N", help="fractions (default: 12)"),
+        option("--n", type=VOXELS, default=48, metavar="N", help="voxels along the cell's edge (default: 48)"),
+        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
+        option(
+            "--properties",
+            nargs="+",
+            choices=("stiffness", "conductivity", "permeability", "area"),
+            default=("stiffness", "conductivity", "permeability", "area"),
+            help="which of stiffness, conductivity, permeability, area (default: all)",
+        ),
+        *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
     "doctor": (
         "Say what is installed, and what is missing: versions, processors, memory, extras.",

@@ -25,6 +25,7 @@ from .texts import counted, table, voids
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "measure", "mesh", "new"),
     *("render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
+    *("cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new"),
     *("permeability", "render", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
 ]
 
@@ -681,6 +682,18 @@ def conductivity(args) -> None:
 def permeability(args) -> None:
     """``trabecula permeability``."""
     of_cell(args)
+
+
+def law(args) -> None:
+    """``trabecula law``."""
+    import numpy  # noqa: F401  wanted later; see `terminal` for why no import waits until then
+
+    from . import effective
+
+    found = effective.law(args)
+    if args.json:
+        return put_json(found.to_dict())
+    print("\n".join(effective.lines_of_law(found)))
 
 
 def of_cell(args) -> None:

@@ -13,7 +13,7 @@ from .moduli import SURFACE_WRITES, write_surface
 from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
 from .terminal import Progress, figure, say, warn
 
-__all__ = ["LINES", "conductivity", "permeability", "stiffness"]
+__all__ = ["LINES", "conductivity", "law", "lines_of_law", "permeability", "stiffness"]
 
 #: What is found of a cell.
 Found = StiffnessReport | ConductivityReport | PermeabilityReport
@@ -59,6 +59,24 @@ def permeability(args) -> PermeabilityReport:
     for name in args.output or ():
         written(name, table(found.k, "123", found.k_n))
     told(found, args)
+    return found
+
+
+def law(args):
+    """The law that is asked for, a `laws.Law`; written where files are named."""
+    from . import laws
+
+    for name in args.output or ():
+        check_place(name)
+    with Progress("law", args.progress) as progress:
+        settings = args.start, args.stop, args.count, args.n, args.nu, tuple(args.properties)
+        found = laws.law(args.cell, args.part, *settings, args.threads, progress)
+    for fraction, messages in found.notes.items():
+        for message in messages:
+            warn(message, f"fraction {fraction:.4g}", not args.json)
+    for name in args.output or ():
+        found.write(name)
+        say(f"{name}: written")
     return found
 
 
@@ -167,6 +185,25 @@ def lines_of_permeability(found: PermeabilityReport) -> list[str]:
     ]
     lines += [f"{word:<11}{figure(v)}{more}" for word, v, more in rest if v is not None]
     return lines + accuracy(found, "k")
+
+
+#: Columns of a law that are printed; all are written.
+PRINTED = ("fraction", "E", "G", "nu", "zener", "k", "K", "tortuosity", "area")
+
+
+def lines_of_law(found) -> list[str]:
+    """The figures for people."""
+    shown = [name for name in PRINTED if name in found.columns]
+    rows = [[figure(v) if v == v else "-" for v in row] for row in zip(*(found.columns[name] for name in shown), strict=True)]
+    wide = max(len(text) for row in [shown, *rows] for text in row)
+    lines = [" ".join(text.rjust(wide) for text in row) for row in [shown, *rows]]
+    for name, fit in found.fits.items():
+        size = f"{fit['coefficient']:.4g} fraction^{fit['exponent']:.4g}"
+        lines.append(f"{name:<5}= {size}, at most {100 * fit['residual']:.2g} % off these")
+    errors = [float(v.max()) for key, v in found.columns.items() if key.endswith("_error") and (v == v).all()]
+    if errors:
+        lines.append(f"accuracy: at n = {found.n} at most {100 * max(errors):.2g} % off the limits given")
+    return lines
 
 
 #: What a command prints of a report.

@@ -10,6 +10,7 @@ from . import _core
 __all__ = [
     *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "STIFFNESS_WRITES"),
     *("CONDUCTIVITY_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
+    *("CONDUCTIVITY_WRITES", "LAW_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
     *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES"),
     *("dotted", "is_design", "kind_of"),
@@ -32,6 +33,8 @@ BEAM_WRITES = tuple(suffix for suffix, row in BEAMS.items() if row[1])
 #: What is found of a periodic cell: tables, the surface of Young's modulus, material cards.
 STIFFNESS_WRITES = ("csv", "png", "ply", "vtu", "inp", "bdf", "mac")
 CONDUCTIVITY_WRITES = PERMEABILITY_WRITES = ("csv",)
+#: What a cell does by its fraction: a table, all of it, plots.
+LAW_WRITES = ("csv", "json", "svg")
 #: Formats of tables.
 SWEEP_WRITES = ("csv", "parquet")
 VOXEL_WRITES = ("npy", "vti")

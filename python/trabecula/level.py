@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .given import named
 
-__all__ = ["fraction", "iso", "pore", "porosity", "thickness"]
+__all__ = ["fraction", "iso", "permeability", "pore", "porosity", "stiffness", "thickness"]
 
 Amount = float | dict
 
@@ -35,6 +37,28 @@ def pore(value: Amount, mid: float = 0.0) -> dict:
     The map is ``map.affine()`` or ``map.spartan()``.
     """
     return _level("pore", value, mid=mid)
+
+
+@named
+def stiffness(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, mid: float = 0.0) -> dict:
+    """Young's modulus of the periodic cell over that of the solid, ``along`` a direction in the axes of the cell: the fraction is
+    solved for.
+
+    ``nu`` is Poisson's ratio of the solid. The map is ``map.affine()`` or ``map.spartan()``.
+    """
+    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0]), "nu": (nu, 0.3)}
+    return _level("stiffness", value, mid=mid) | {k: v for k, (v, usual) in given.items() if v != usual}
+
+
+@named
+def permeability(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), mid: float = 0.0) -> dict:
+    """The permeability of the pore in mm², of both sides of a sheet together, ``along`` a direction in the axes of the cell: the
+    fraction is solved for.
+
+    The map is ``map.affine()`` or ``map.spartan()``.
+    """
+    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0])}
+    return _level("permeability", value, mid=mid) | {k: v for k, (v, usual) in given.items() if v != usual}
 
 
 @named

@@ -36,6 +36,7 @@ __all__ = [
     "MinMeanMax",
     "NarrowestNeck",
     "PeriodReport",
+    "PermeabilityReport",
     "QualityReport",
     "RbfReport",
     "RegionReport",
@@ -655,6 +656,59 @@ class PeriodReport(Report):
     """A point in the hole, on the line through it that cells go round, mm."""
     cells: list[int]
     """Whole cells round the line along each axis of the cell; negative against a right-handed screw."""
+
+
+class PermeabilityReport(Report):
+    """Permeability of the pore of a periodic cell to creeping flow, in world axes: mean flux over the whole cell = -k grad p
+    / viscosity."""
+
+    _parts = {
+        "grids": "CellGrid",
+        "warnings": "WarningReport",
+    }
+
+    area_per_volume: float
+    """Area of the wall of the pore over the volume of the cell, 1/mm."""
+    conductivity: list[list[float]]
+    """Conductivity of the pore, 1 where it is open: 3 x 3."""
+    edges: list[list[float]]
+    """Edges of the cell, mm, one row each."""
+    error: float
+    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not
+    whole numbers of steps adds."""
+    fraction: float
+    """Solid fraction of the cell."""
+    grids: list[CellGrid]
+    """The grids, with the share of nodes that are not in the pore and the tensor in mm²."""
+    hydraulic_diameter: float | None
+    """Hydraulic diameter, 4 volume of the pore / area of its wall, mm; None without a wall."""
+    iterations: int
+    """Most steps of a force."""
+    k: list[list[float]]
+    """Permeability, extrapolated to infinitely many nodes: 3 x 3, mm²."""
+    k_cell: list[list[float]] | None
+    """Permeability in units of the wavelength squared; None unless the cell is a cube."""
+    k_n: list[list[float]]
+    """Permeability at n nodes, mm²."""
+    kozeny: float | None
+    """Kozeny's constant porosity³ / (k S²), with the mean k over the axes and the area S of the wall over the volume of the
+    cell; None where nothing flows."""
+    n: int
+    """Nodes along the edge of the cell, or of a cube of its volume."""
+    order: float
+    """Exponent of the grid's step with which the error was taken to fall."""
+    pore_nodes: float | None
+    """Steps of the grid across the hydraulic diameter; None without a wall."""
+    porosity: float
+    """Volume of the pore over that of the cell."""
+    residual: float
+    """Greatest change by a step of the iteration, over that of the first."""
+    side: str | None
+    """Which pore: both sides of a sheet together if None."""
+    tortuosity: float | None
+    """Tortuosity porosity / conductivity, with the mean conductivity over the axes; None where the pore does not conduct."""
+    warnings: list[WarningReport]
+    """Possible mistakes."""
 
 
 class QualityReport(Report):

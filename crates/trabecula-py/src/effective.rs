@@ -93,6 +93,12 @@ impl Cell {
         self.report(py, "ConductivityReport", work, move |cell, p| cell.conductivity(pore, resolution, p))
     }
 
+    /// The area of the wall in the cell, mm².
+    fn area(&self, py: Python<'_>, n: usize, threads: Option<usize>) -> PyResult<f64> {
+        let cell = &self.cell;
+        run(py, threads, None, |p| cell.area(n, p))?.map_err(error::stopped)
+    }
+
     /// The permeability of the pore, as `reports.PermeabilityReport`; `upper` is the side of a sheet, or both.
     fn permeability<'py>(
         &self,

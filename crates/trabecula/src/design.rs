@@ -10,6 +10,7 @@ mod build_blend;
 mod build_cell;
 mod build_level;
 mod build_pattern;
+mod build_property;
 mod build_skin;
 mod build_tets;
 mod build_tiling;

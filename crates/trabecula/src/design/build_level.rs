@@ -1,5 +1,6 @@
 //! Levels, which set how much is solid: data to [`Level`].
 
+use super::build_property;
 use super::built_report::Varied;
 use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
@@ -11,7 +12,7 @@ use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
 use geometry::fault::{Fault, number};
-use geometry::math::Interval;
+use geometry::math::{Interval, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -70,7 +71,7 @@ pub(super) fn level(
     let quantity = spec.amount.quantity(path(key), environment);
     let amount = value.build(&quantity)?;
     let length = spec.amount.length();
-    if matches!(key, "iso" | "thickness" | "pore") || length.is_some() {
+    if !matches!(key, "fraction" | "porosity") || length.is_some() {
         let found = length.map_or(key.to_string(), |(length, _)| format!("a {length}, too"));
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
@@ -84,6 +85,9 @@ pub(super) fn level(
     }
     if key == "pore" {
         return pore(&amount, part.into(), cell, map, environment);
+    }
+    if matches!(key, "stiffness" | "permeability") {
+        return build_property::level(&spec.amount, &amount, part.into(), cell, map, environment);
     }
     if key == "iso" {
         return Ok(Level::Iso(amount));
@@ -283,6 +287,8 @@ impl AmountSpec {
             AmountSpec::Porosity(_) => "porosity",
             AmountSpec::Iso(_) => "iso",
             AmountSpec::Pore(_) => "pore",
+            AmountSpec::Stiffness(_) => "stiffness",
+            AmountSpec::Permeability(_) => "permeability",
         }
     }
 
@@ -294,6 +300,17 @@ impl AmountSpec {
             AmountSpec::Porosity(s) => &s.porosity,
             AmountSpec::Iso(s) => &s.iso,
             AmountSpec::Pore(s) => &s.pore,
+            AmountSpec::Stiffness(s) => &s.stiffness,
+            AmountSpec::Permeability(s) => &s.permeability,
+        }
+    }
+
+    /// The direction of a property, in the axes of the cell.
+    pub(super) fn along(&self) -> Vec3 {
+        match self {
+            AmountSpec::Stiffness(s) => s.along,
+            AmountSpec::Permeability(s) => s.along,
+            _ => [1.0, 0.0, 0.0],
         }
     }
 
@@ -302,7 +319,7 @@ impl AmountSpec {
         let (thickness, pore) = match self {
             AmountSpec::Fraction(s) => (&s.thickness, &s.pore),
             AmountSpec::Porosity(s) => (&s.thickness, &s.pore),
-            AmountSpec::Thickness(_) | AmountSpec::Iso(_) | AmountSpec::Pore(_) => return Vec::new(),
+            _ => return Vec::new(),
         };
         [("thickness", thickness), ("pore", pore)].into_iter().filter_map(|(key, s)| Some((key, s.as_ref()?))).collect()
     }

@@ -292,8 +292,8 @@ pub(super) fn lattice(
             return Err(DesignError::new(path, message));
         }
         AmountSpec::Thickness(_) => Amount::Thickness,
-        AmountSpec::Pore(_) => {
-            let message = "pore goes with map.affine and map.spartan, whose cells are alike; give a fraction";
+        AmountSpec::Pore(_) | AmountSpec::Stiffness(_) | AmountSpec::Permeability(_) => {
+            let message = format!("{key} goes with map.affine and map.spartan, whose cells are alike; give a fraction");
             return Err(DesignError::new(path, message));
         }
     };

@@ -11,6 +11,7 @@ pub use crate::map::{
     AffineKind, Ends, Joined, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
 };
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
+use geometry::math::Vec3;
 use geometry::symmetry::Group;
 
 /// A word out of a catalogue: its type, noun, the catalogue's words, why a word of another catalogue is refused, and words that
@@ -76,7 +77,7 @@ pub struct LatticeSpec {
     /// Position (mm) to phase (turns), such as map.affine with wavelength = 4.
     #[kind(hints("mapping", "transform", "coordinates"))]
     pub map: MapKind,
-    /// How much is solid: exactly one of iso, fraction, porosity, thickness, pore.
+    /// How much is solid: exactly one of iso, fraction, porosity, thickness, pore, stiffness, permeability.
     pub level: LevelSpec,
 }
 
@@ -369,6 +370,10 @@ pub enum AmountSpec {
     Porosity(PorositySpec),
     /// A field value.
     Iso(IsoSpec),
+    /// A stiffness.
+    Stiffness(StiffnessSpec),
+    /// A permeability.
+    Permeability(PermeabilitySpec),
 }
 
 /// The thickness of a sheet's wall.
@@ -426,6 +431,31 @@ pub struct IsoSpec {
     /// The field value t; for a sheet the half-level.
     #[kind(hints("isovalue", "iso_value", "isolevel", "threshold", "level_set"))]
     pub iso: GradeSpec,
+}
+
+/// A stiffness of the cell.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct StiffnessSpec {
+    /// Young's modulus of the periodic cell over that of the solid: the fraction is solved for.
+    #[kind(above = 0.0, below = 1.0, hints("modulus", "relative_modulus", "young", "E"))]
+    pub stiffness: GradeSpec,
+    /// The direction of the modulus, in the axes of the cell.
+    #[kind(default = [1.0, 0.0, 0.0])]
+    pub along: Vec3,
+    /// Poisson's ratio of the solid.
+    #[kind(above = -1.0, below = 0.5, default = 0.3)]
+    pub nu: f64,
+}
+
+/// A permeability of the cell.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct PermeabilitySpec {
+    /// Permeability of the pore, of both sides of a sheet together: the fraction is solved for.
+    #[kind(unit = "mm²", above = 0.0)]
+    pub permeability: GradeSpec,
+    /// The direction of the flow, in the axes of the cell.
+    #[kind(default = [1.0, 0.0, 0.0])]
+    pub along: Vec3,
 }
 
 /// What a fraction is of.

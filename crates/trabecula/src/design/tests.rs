@@ -175,7 +175,7 @@ fn exactly_one_amount() {
     assert!(e.message.contains("fraction and porosity at once"), "{e}");
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.porosity", Some(13)));
     let e = refused(GOOD.split("porosity").next().unwrap_or_default());
-    assert_eq!(e.message, "give exactly one of thickness, pore, fraction, porosity, iso");
+    assert_eq!(e.message, "give exactly one of thickness, pore, fraction, porosity, iso, stiffness, permeability");
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));
 }
 

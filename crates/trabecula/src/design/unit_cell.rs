@@ -49,7 +49,7 @@ fn frame(map: &Affine, repeats: [i32; 3]) -> (Vec3, Mat3) {
     (corner, edges)
 }
 
-fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell, DesignError> {
+pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell, DesignError> {
     let path = format!("lattice.{name}");
     let Some(map) = lattice.map.affine() else {
         let message = "cells differ from place to place under this map, and none is periodic; take map.affine with the wavelengths of \

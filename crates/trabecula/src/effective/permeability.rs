@@ -6,7 +6,7 @@ use geometry::progress::{Progress, Stage, Stopped};
 use homogenise::{Homogenised, VoxelCell};
 
 use super::limit::{Limit, limit};
-use super::pore_space::{CubicGrid, PoreSpace};
+use super::pore_space::{CubicGrid, PoreSpace, wall_area};
 use super::{LEAST, TOLERANCE, UnitCell, work};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::kind::Warning;
@@ -96,6 +96,37 @@ impl UnitCell {
         })
     }
 
+    /// The area of the wall, mm², from grids of n, n/2 and n/4 nodes along the cell.
+    ///
+    /// # Errors
+    /// Too few nodes; an interruption.
+    pub fn area(&self, n: usize, progress: &dyn Progress) -> Result<f64, Stopped> {
+        self.check(n)?;
+        let solids = self.opposite(None).map_err(Stopped::Refused)?;
+        let grids = self.grids(n);
+        let total: f64 = grids.iter().map(|g| work(&g.shape)).sum();
+        let (mut areas, mut done) = (Vec::new(), 0.0);
+        for grid in &grids {
+            let next = done + work(&grid.shape);
+            let stage = Stage { whole: progress, from: done / total, to: next / total };
+            areas.push((grid.shape, vec![wall_area(&solids, grid, &stage)?]));
+            done = next;
+        }
+        Ok(limit(&areas).tensor[0])
+    }
+
+    /// The cubic grids of about n, n/2 and n/4 nodes along the cell.
+    fn grids(&self, n: usize) -> Vec<CubicGrid> {
+        let edges = transpose(&self.edges);
+        let mut grids = vec![CubicGrid::near(&edges, n)];
+        for by in [2, 4] {
+            if n / by >= LEAST {
+                grids.push(grids[0].coarser(by).unwrap_or_else(|| CubicGrid::near(&edges, n / by)));
+            }
+        }
+        grids
+    }
+
     /// What may be wrong.
     fn doubts(&self, k: &Mat3, n: usize, across: Option<f64>, strain: f64) -> Vec<Warning> {
         let mut said = Vec::new();
@@ -137,13 +168,7 @@ impl UnitCell {
 
     /// The flow on each grid, the finest first.
     fn flows(&self, n: usize, solids: &[CsgSolid], progress: &dyn Progress) -> Result<Vec<Flow>, Stopped> {
-        let edges = transpose(&self.edges);
-        let mut grids = vec![CubicGrid::near(&edges, n)];
-        for by in [2, 4] {
-            if n / by >= LEAST {
-                grids.push(grids[0].coarser(by).unwrap_or_else(|| CubicGrid::near(&edges, n / by)));
-            }
-        }
+        let grids = self.grids(n);
         // Steps grow with the number of nodes along an edge.
         let cost = |g: &CubicGrid| work(&g.shape).powf(4.0 / 3.0);
         let total: f64 = grids.iter().map(cost).sum();

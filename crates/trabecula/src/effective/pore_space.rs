@@ -124,7 +124,7 @@ impl PoreSpace {
             let alone = PoreGrid::new(grid.shape, grid.lean, values.iter().map(|v| *v > 0.0).collect(), Vec::new());
             let alone = alone.map_err(Stopped::Refused)?;
             walls.extend(crossings(solid, grid, &alone, &values, &whole(0.3, 0.9))?);
-            area += wall_area(grid, &alone, &values);
+            area += zero_area(grid, &alone, &values);
             cyclic = cyclic && is_cyclic(grid.shape[0], &values);
             inside.iter_mut().zip(&alone.pore).for_each(|(i, p)| *i |= p);
             if !whole(0.9, 1.0).step(1, 1) {
@@ -136,6 +136,20 @@ impl PoreSpace {
         let grid = PoreGrid::new(grid.shape, grid.lean, inside, walls).map_err(Stopped::Refused)?;
         Ok(PoreSpace { grid, area, cyclic })
     }
+}
+
+/// The area of the walls of some solids, mm².
+///
+/// # Errors
+/// An interruption.
+pub fn wall_area(solids: &[CsgSolid], grid: &CubicGrid, progress: &dyn Progress) -> Result<f64, Stopped> {
+    let mut area = 0.0;
+    for solid in solids {
+        let values = sampled(solid, grid, progress)?;
+        let alone = PoreGrid::new(grid.shape, grid.lean, vec![true; values.len()], Vec::new());
+        area += zero_area(grid, &alone.map_err(Stopped::Refused)?, &values);
+    }
+    Ok(area)
 }
 
 /// The values of a solid at the nodes.
@@ -212,7 +226,7 @@ fn is_cyclic(n: usize, values: &[f64]) -> bool {
 }
 
 /// The area of the zero set, mm²: the planes of the values at the corners of six tetrahedra in each cube of nodes.
-fn wall_area(grid: &CubicGrid, alone: &PoreGrid, values: &[f64]) -> f64 {
+fn zero_area(grid: &CubicGrid, alone: &PoreGrid, values: &[f64]) -> f64 {
     // The paths from one corner of a cube to the opposite one along its edges; each is a tetrahedron.
     const PATHS: [[usize; 3]; 6] = [[1, 2, 4], [1, 4, 2], [2, 1, 4], [2, 4, 1], [4, 1, 2], [4, 2, 1]];
     let corner = |i: usize| [0, 1, 2].map(|a| (i >> a & 1) as f64);

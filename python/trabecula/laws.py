@@ -1,0 +1,265 @@
+"""Laws of a cell: what it does by its solid fraction, from a few fractions, interpolated."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .design import Design, Lattice
+from .files import extension, whole_file
+from .formats import LAW_WRITES
+from .given import number, positive, whole
+from .map import affine
+from .region import box
+
+__all__ = ["PROPERTIES", "Law", "law", "monotone"]
+
+#: What a law may have, and the columns of each, with what they are. Lengths are in units of the wavelength.
+PROPERTIES: dict[str, dict[str, str]] = {
+    "stiffness": {
+        "C11": "stiffness over E of the solid, mean of 11, 22, 33",
+        "C12": "mean of 12, 13, 23",
+        "C44": "mean of 44, 55, 66",
+        "E": "Young's modulus along the axes over that of the solid",
+        "G": "shear modulus of the planes of the axes",
+        "nu": "Poisson's ratio of the axes",
+        "bulk": "bulk modulus",
+        "zener": "2 C44 / (C11 - C12)",
+        "C_error": "estimated relative error of C",
+    },
+    "conductivity": {"k": "conductivity over that of the solid, mean of the axes", "k_error": "its estimated relative error"},
+    "permeability": {
+        "K": "permeability of the pore over the wavelength squared, mean of the axes",
+        "K_error": "its estimated relative error",
+        "diameter": "hydraulic diameter over the wavelength",
+        "tortuosity": "porosity over the conductivity of the pore",
+    },
+    "area": {"area": "area of the wall times the wavelength over the volume of the cell"},
+}
+#: Powers of the fraction (Gibson and Ashby), fitted to these columns.
+FITTED = ("E", "G", "bulk", "k")
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a cell does by its solid fraction. Columns by name, NaN where there is no such number (see ``notes``)."""
+
+    cell: str
+    part: str
+    n: int
+    nu: float
+    #: ``fraction``, ascending, and the columns of `PROPERTIES`.
+    columns: dict[str, np.ndarray]
+    #: By column ``coefficient``, ``exponent`` and ``residual``: column = coefficient fraction^exponent, with the largest relative
+    #: difference at the fractions.
+    fits: dict[str, dict[str, float]] = field(default_factory=dict)
+    #: Why there is no number, or a doubtful one, by fraction.
+    notes: dict[float, list[str]] = field(default_factory=dict)
+
+    def at(self, column: str, fraction: Any) -> np.ndarray:
+        """A column at fractions, by monotone cubics between those it was found at. Raises ValueError outside them."""
+        x, y = self._points(column)
+        asked = np.asarray(fraction, dtype=float)
+        if np.any(asked < x[0]) or np.any(asked > x[-1]):
+            raise ValueError(f"{column} is known at fractions from {x[0]:g} to {x[-1]:g}, found {fraction}")
+        return monotone(x, y, asked)
+
+    def fraction(self, **asked: float) -> float:
+        """The solid fraction at which a column has a value, as in ``law.fraction(E=0.1)``. Raises ValueError where it has none."""
+        if len(asked) != 1:
+            raise ValueError(f"give one column and its value, found {len(asked)}")
+        ((column, value),) = asked.items()
+        x, y = self._points(column)
+        value = number(column, value)
+        if not min(y) <= value <= max(y):
+            raise ValueError(f"{column} runs from {min(y):.4g} to {max(y):.4g}, found {value:g}")
+        step = next((i for i in range(len(x) - 1) if min(y[i : i + 2]) <= value <= max(y[i : i + 2])), 0)
+        low, high = x[step], x[step + 1]
+        rising = y[step + 1] >= y[step]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if (monotone(x, y, np.array(middle)) < value) == rising:
+                low = middle
+            else:
+                high = middle
+        return float(0.5 * (low + high))
+
+    def _points(self, column: str) -> tuple[np.ndarray, np.ndarray]:
+        if column == "fraction" or column not in self.columns:
+            known = [name for name in self.columns if name != "fraction"]
+            raise ValueError(f"the law has no column {column!r}; it has {', '.join(known)}")
+        values = self.columns[column]
+        kept = np.isfinite(values)
+        if kept.sum() < 2:
+            raise ValueError(f"{column} is known at {kept.sum()} fractions; two are needed")
+        return self.columns["fraction"][kept], values[kept]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data, None where there is no number."""
+        plain = {name: [float(v) if np.isfinite(v) else None for v in values] for name, values in self.columns.items()}
+        notes = [{"fraction": p, "messages": said} for p, said in self.notes.items()]
+        head = {"cell": self.cell, "part": self.part, "n": self.n, "nu": self.nu}
+        return head | {"columns": plain, "fits": self.fits, "notes": notes}
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the columns (.csv), all of it (.json), or its plots (.svg)."""
+        kind = extension(path, LAW_WRITES)
+        if kind == "csv":
+            lines = [",".join(self.columns)]
+            rows = zip(*self.columns.values(), strict=True)
+            lines += [",".join(repr(float(v)) if np.isfinite(v) else "" for v in row) for row in rows]
+            text = "\n".join(lines) + "\n"
+        elif kind == "json":
+            import json
+
+            text = json.dumps(self.to_dict(), indent=1) + "\n"
+        else:
+            text = self.svg()
+        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+            out.write(text)
+
+    def svg(self) -> str:
+        """Its plots as SVG."""
+        from .curves import law_plots
+
+        return law_plots(self)
+
+
+def law(
+    cell: str,
+    part: str = "sheet",
+    start: float = 0.05,
+    stop: float = 0.6,
+    count: int = 12,
+    n: int = 48,
+    nu: float = 0.3,
+    properties: Sequence[str] = tuple(PROPERTIES),
+    threads: int | None = None,
+    progress: Callable[[int, int], Any] | None = None,
+) -> Law:
+    """What a named cell does by its solid fraction: stiffness over E of a solid of Poisson's ratio ``nu``, conductivity over the
+    solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions from ``start`` to ``stop``, each
+    the limit of grids of n, n/2 and n/4 voxels along the cell, with monotone interpolation between and powers of the fraction
+    fitted (Gibson and Ashby).
+
+    ``properties`` names fewer of "stiffness", "conductivity", "permeability", "area". Where a cell falls apart its stiffness is
+    NaN, and ``notes`` says so. Raises ValueError for fractions outside 0 to 1 or out of order.
+    """
+    start, stop = positive("start", start), positive("stop", stop)
+    count = whole("count", count, 2, 1000)
+    if not start < stop < 1:
+        raise ValueError(f"fractions run from {start:g} to {stop:g}; expected ascending ones between 0 and 1")
+    for name in properties:
+        if name not in PROPERTIES:
+            raise ValueError(f"no property {name!r}; there are {', '.join(PROPERTIES)}")
+    fractions = np.linspace(start, stop, count)
+    names = [column for key, columns in PROPERTIES.items() if key in properties for column in columns]
+    columns = {"fraction": fractions} | {name: np.full(count, np.nan) for name in names}
+    notes: dict[float, list[str]] = {}
+    for i, fraction in enumerate(fractions):
+        lattice = Lattice(cell, part, affine(wavelength=1.0), {"fraction": float(fraction)})
+        solid = Design(box(size=[1, 1, 1]), lattice).build()
+        for j, key in enumerate(k for k in PROPERTIES if k in properties):
+            done, total = i * len(properties) + j, count * len(properties)
+            work = threads, _part(progress, done, total)
+            try:
+                values, warnings = _FOUND[key](solid, n, nu, work)
+            except ValueError as why:
+                values, warnings = {}, [f"{key}: {why}"]
+            for name, value in values.items():
+                columns[name][i] = np.nan if value is None else value
+            if warnings:
+                notes.setdefault(float(fraction), []).extend(w for w in warnings)
+    fits = {name: made for name in FITTED if name in columns and (made := _power(fractions, columns[name]))}
+    return Law(cell, part, n, nu, columns, fits, notes)
+
+
+def _part(progress: Callable[[int, int], Any] | None, done: int, total: int) -> Callable[[int, int], Any] | None:
+    """The progress of one of ``total`` pieces of work."""
+    if progress is None:
+        return None
+    return lambda at, of: progress(round(1e6 * (done + at / max(of, 1))), 1_000_000 * total)
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
+
+
+def _stiffness(solid, n: int, nu: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+    found = solid.stiffness(n, 1.0, nu, None, False, *work)
+    c = np.array(found.C)
+    made = {
+        "C11": _mean(c[[0, 1, 2], [0, 1, 2]]),
+        "C12": _mean(c[[0, 0, 1], [1, 2, 2]]),
+        "C44": _mean(c[[3, 4, 5], [3, 4, 5]]),
+        "C_error": found.error,
+        "zener": found.zener,
+        "bulk": found.bulk,
+    }
+    if found.E is not None:
+        made |= {"E": _mean(found.E), "G": _mean(found.G), "nu": _mean(found.nu)}
+    return made, [f"stiffness: {w['message']}" for w in found.warnings]
+
+
+def _conductivity(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+    found = solid.conductivity(n, 0.0, False, *work)
+    return {"k": _mean(np.diag(found.k)), "k_error": found.error}, [f"conductivity: {w['message']}" for w in found.warnings]
+
+
+def _permeability(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+    found = solid.permeability(n, None, *work)
+    made = {
+        "K": _mean(np.diag(found.k)),
+        "K_error": found.error,
+        "diameter": found.hydraulic_diameter,
+        "tortuosity": found.tortuosity,
+    }
+    return made, [f"permeability: {w['message']}" for w in found.warnings]
+
+
+def _area(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+    return {"area": solid._cell.area(n, work[0]) / solid._cell.volume}, []
+
+
+_FOUND = {"stiffness": _stiffness, "conductivity": _conductivity, "permeability": _permeability, "area": _area}
+
+
+def _power(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
+    """The power of x nearest to y in the squares of the logarithms, and its largest relative difference."""
+    kept = np.isfinite(y) & (y > 0)
+    if kept.sum() < 3:
+        return None
+    x, y = x[kept], y[kept]
+    exponent, constant = np.polyfit(np.log(x), np.log(y), 1)
+    off = np.exp(constant) * x**exponent / y - 1
+    return {
+        "coefficient": float(np.exp(constant)),
+        "exponent": float(exponent),
+        "residual": float(np.abs(off).max()),
+    }
+
+
+def monotone(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The piecewise cubic through points of ascending x that has no extremum between them (Fritsch and Carlson 1980), at positions
+    within them.
+    """
+    h, secant = np.diff(x), np.diff(y) / np.diff(x)
+    slope = np.empty(len(x))
+    slope[0], slope[-1] = secant[0], secant[-1]
+    a, b = secant[:-1], secant[1:]
+    same = a * b > 0
+    weights = h[:-1] + 2 * h[1:], 2 * h[:-1] + h[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = 3 * (h[:-1] + h[1:]) / (weights[0] / a + weights[1] / b)
+    slope[1:-1] = np.where(same, inner, 0.0)
+    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    t = (at - x[i]) / h[i]
+    return (
+        y[i]
+        + (y[i + 1] - y[i]) * t * t * (3 - 2 * t)
+        + h[i] * t * (1 - t) * ((1 - t) * slope[i] - t * slope[i + 1])
+    )

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""Writes docs/generated/properties.json, what all named cells do by their fraction, and docs/generated/catalogue.md with plots of it.
+
+Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--page]
+
+Cells that stand in the data at this n or a finer one are kept; --page makes the page of what is there.
+"""
+
+import argparse
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import trabecula as lt
+from trabecula import _core
+from trabecula.curves import Curve, Panel, panels
+from trabecula.laws import monotone
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT / "docs" / "generated" / "properties.json"
+PAGE = ROOT / "docs" / "generated" / "catalogue.md"
+PICTURES = ROOT / "docs" / "images"
+FRACTIONS = (0.05, 0.6, 12)
+PARTS = ("sheet", "lower", "upper")
+#: Plots: column, title, and whether it is logarithmic.
+SHOWN = (
+    ("E", "Young's modulus along the axes, over the solid's", True),
+    ("zener", "Zener's ratio 2 C44 / (C11 - C12)", True),
+    ("k", "Conductivity over the solid's", False),
+    ("K", "Permeability over wavelength²", True),
+    ("area", "Area of the wall × wavelength / volume", False),
+)
+
+
+#: The named cells but one of the two gyroids, which are mirror images.
+CELLS = [cell[0] for cell in _core.cells() if cell[0] != "gyroid_mirrored"]
+
+
+def compute(n, cells):
+    """Adds laws to the data."""
+    kept = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {"laws": []}
+    laws = {(law["cell"], law["part"]): law for law in kept["laws"]}
+    for cell in cells:
+        for part in PARTS:
+            if laws.get((cell, part), {"n": 0})["n"] >= n:
+                continue
+            law = lt.law(cell, part, *FRACTIONS, n=n).to_dict()
+            law["columns"] = {k: [v and float(f"{v:.6g}") for v in column] for k, column in law["columns"].items()}
+            laws[cell, part] = law
+            order = sorted(laws.values(), key=lambda it: (CELLS.index(it["cell"]), PARTS.index(it["part"])))
+            rows = ",\n".join(json.dumps(it) for it in order)
+            DATA.write_text(f'{{"laws": [\n{rows}\n]}}\n', encoding="utf-8")
+            print(f"{cell} {part}: done", flush=True)
+
+
+def page():
+    """The page and its plots."""
+    laws = json.loads(DATA.read_text(encoding="utf-8"))["laws"]
+    for part in PARTS:
+        plots = []
+        for column, title, log in SHOWN:
+            curves = []
+            for law in (law for law in laws if law["part"] == part):
+                x = np.array(law["columns"]["fraction"])
+                y = np.array([math.nan if v is None else v for v in law["columns"][column]])
+                known = np.isfinite(y) & (y > 0)
+                along = np.linspace(x[known][0], x[known][-1], 81) if known.sum() > 1 else []
+                values = monotone(x[known], y[known], along) if len(along) else []
+                curves.append(Curve(law["cell"], x[known], y[known], along, values))
+            plots.append(Panel(title, f"solid fraction, {part}", curves, log))
+        (PICTURES / f"properties_{part}.svg").write_text(panels(plots), encoding="utf-8")
+    PAGE.write_text("\n".join(lines(laws)) + "\n", encoding="utf-8")
+    print(PAGE)
+
+
+def lines(laws):
+    """The page's text."""
+    yield "<!-- Made by scripts/catalogue_of_properties.py; do not edit. -->"
+    yield "# What the named cells do"
+    yield ""
+    yield (
+        "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three grids, by "
+        "[`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
+        "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through."
+    )
+    for part in PARTS:
+        yield from ("", f"## {part}", "", f"![Properties by fraction](../images/properties_{part}.svg)", "")
+        yield "| cell | n | fraction | E | error of C | Zener | k | error of k | K / λ² | error of K | area λ / V |"
+        yield "|" + "---|" * 11
+        for law in (law for law in laws if law["part"] == part):
+            columns = law["columns"]
+            for i in range(0, len(columns["fraction"]), 2):
+                cells = [columns[name][i] for name in ("E", "C_error", "zener", "k", "k_error", "K", "K_error", "area")]
+                shares = {1, 4, 6}
+                texts = [
+                    "–" if v is None or (v == 0 and j == 5) else f"{100 * v:.2g} %" if j in shares else f"{v:.4g}"
+                    for j, v in enumerate(cells)
+                ]
+                yield "| " + " | ".join([f"`{law['cell']}`", str(law["n"]), f"{columns['fraction'][i]:.2f}", *texts]) + " |"
+
+
+def main():
+    """Compute what is asked for, and the page."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--n", type=int, default=64)
+    parser.add_argument("--cells", nargs="+", default=CELLS)
+    parser.add_argument("--page", action="store_true")
+    args = parser.parse_args()
+    if not args.page:
+        compute(args.n, args.cells)
+    page()
+
+
+if __name__ == "__main__":
+    main()

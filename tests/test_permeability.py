@@ -1,0 +1,199 @@
+"""Flow through cells, laws of cells, and levels that ask for a property: published values, closed forms, files and mistakes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import trabecula as lt
+from conftest import command, in_process
+from trabecula import level, map, region
+from trabecula.laws import monotone
+
+
+def solid(cell: str = "gyroid", part: str = "sheet", amount: dict | None = None, **more) -> lt.Solid:
+    lattice = lt.Lattice(cell, part, map.affine(**({"wavelength": 4} | more)), amount or level.fraction(0.3))
+    return lt.Design(region.box(size=[8, 8, 8]), lattice).build()
+
+
+@pytest.mark.parametrize(("cell", "wanted"), [("primitive", 3.20e-3), ("gyroid", 2.20e-3), ("diamond", 1.37e-3)])
+def test_networks_are_as_permeable_as_an_independent_program_found(cell: str, wanted: float):
+    found = solid(cell, "lower", level.fraction(0.5)).permeability(n=32)
+    # That program had walls half-way between nodes: 2 to 3 % low on balls, where ours is within 0.5 %.
+    assert found.k_cell[0][0] == pytest.approx(1.025 * wanted, rel=0.02)
+    assert np.allclose(found.k, 16 * np.array(found.k_cell)) and found.error < 0.02
+    # The formation factor of these surfaces at one half is 3 (field by field known): tortuosity 1.5.
+    assert found.tortuosity == pytest.approx(1.5, rel=0.01)
+
+
+def test_beams_have_a_permeability_that_two_grids_agree_on():
+    beams = lt.Beams(cell="sc", map=map.affine(wavelength=4), radius=0.4, hub=1.2, profile="cylinder")
+    made = lt.Design(region.box(size=[8, 8, 8]), beams=beams).build()
+    coarse, fine = made.permeability(n=24), made.permeability(n=40)
+    assert coarse.k[0][0] == pytest.approx(fine.k[0][0], rel=0.01)
+    assert coarse.k[0][0] == pytest.approx(coarse.k[2][2], rel=1e-6)
+
+
+def test_the_sides_of_a_sheet_add_up_and_are_apart():
+    both, lower, upper = (solid().permeability(n=24, side=side) for side in (None, "lower", "upper"))
+    assert np.allclose(np.add(lower.k, upper.k), both.k, rtol=1e-5, atol=1e-9)
+    assert np.allclose(lower.k, upper.k, rtol=1e-5, atol=1e-9)  # a gyroid's sides are mirror images
+    assert lower.porosity == pytest.approx(0.35, abs=1e-3) and both.porosity == pytest.approx(0.7, abs=1e-5)
+    assert lower.side == "lower" and both.side is None
+    assert both.hydraulic_diameter == pytest.approx(4 * both.porosity / both.area_per_volume, rel=1e-12)
+    # The surface as meshed, both faces of the wall.
+    meshed = solid().mesh(per_cell=32).measure()
+    faces = meshed.area_lattice if hasattr(meshed, "area_lattice") else None
+    if faces is not None:
+        assert both.area_per_volume == pytest.approx(faces / 512, rel=0.01)
+    k = both.k[0][0]
+    assert both.kozeny == pytest.approx(both.porosity**3 / (k * both.area_per_volume**2), rel=1e-3)
+
+
+def test_turned_stretched_and_leaning_cells():
+    plain = solid().permeability(n=24)
+    turned = solid(rotate=[10, 20, 30]).permeability(n=24)
+    assert np.allclose(turned.k, plain.k, rtol=1e-4, atol=1e-6) and turned.k_cell is not None
+    double = solid(wavelength=8).permeability(n=24)
+    assert np.allclose(double.k, 4 * np.array(plain.k), rtol=1e-6, atol=1e-9)
+    long = solid(wavelength=[4, 4, 8]).permeability(n=24)
+    assert long.grids[0].shape[2] == 2 * long.grids[0].shape[0] and long.k_cell is None
+    assert long.k[2][2] > long.k[0][0] > plain.k[0][0] and np.allclose(long.k, np.transpose(long.k))
+    # A shear by a whole wavelength is the same lattice.
+    leaning = solid(skew={"xy": 45.0}).permeability(n=24)
+    assert leaning.k[0][0] > 0 and np.all(np.linalg.eigvalsh(leaning.k) > 0)
+
+
+def test_threads_change_no_bit():
+    one, two = (solid().permeability(n=16, threads=t).to_dict() for t in (1, 2))
+    assert one == two
+
+
+def test_a_closed_pore_has_zeros_and_a_word():
+    # Above its connected range the void of a primitive's other side is chambers.
+    found = solid("primitive", "lower", level.fraction(0.85)).permeability(n=16)
+    assert np.array_equal(found.k, np.zeros((3, 3))) and found.kozeny is None and found.tortuosity is None
+    assert any("nothing flows" in w["message"] for w in found.warnings)
+    narrow = solid(amount=level.fraction(0.9)).permeability(n=8)
+    assert any("hydraulic diameter" in w["message"] for w in narrow.warnings)
+
+
+def test_the_command_prints_and_writes(cube, tmp_path):
+    name = tmp_path / "k.csv"
+    report = json.loads(in_process("permeability", cube, "--n", 16, "--json", "-o", name))
+    keys = {"k", "k_n", "k_cell", "error", "hydraulic_diameter", "tortuosity", "kozeny", "porosity", "warnings"}
+    assert keys <= set(report) and report["n"] == 16
+    assert float(name.read_text().splitlines()[1].split(",")[2]) == report["k"][0][0]
+    text = in_process("permeability", cube, "--n", 16, "--side", "upper")
+    assert "of the upper side, mm²" in text and "hydraulic" in text and "accuracy" in text
+    study = lt.load(cube).to_dict() | {"sweep": {"lattice.core.level.fraction": [0.2, 0.3]}}
+    columns = lt.sweep(study, per_cell=8, properties={"permeability": {"n": 16}})
+    assert columns["error"] == [None, None] and columns["permeability11_mm2"][0] > columns["permeability11_mm2"][1] > 0
+
+
+def test_the_side_of_a_network_is_refused():
+    with pytest.raises(ValueError, match="only a sheet has a lower and an upper side"):
+        solid("gyroid", "lower").permeability(n=8, side="lower")
+    with pytest.raises(ValueError, match="side is 'left'"):
+        solid().permeability(n=8, side="left")
+
+
+# --- laws -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_law_has_its_columns_fits_and_files(tmp_path):
+    found = lt.law("gyroid", "sheet", 0.2, 0.4, 3, n=16)
+    x = found.columns["fraction"]
+    assert np.allclose(x, [0.2, 0.3, 0.4]) and not found.notes
+    single = solid().stiffness(n=16)
+    assert found.columns["C11"][1] == pytest.approx(single.C[0][0], rel=1e-9)
+    assert found.columns["K"][1] == pytest.approx(solid().permeability(n=16).k_cell[0][0], rel=1e-6)
+    assert found.at("E", 0.3) == pytest.approx(found.columns["E"][1], rel=1e-12)
+    asked = float(found.at("E", 0.27))
+    assert found.fraction(E=asked) == pytest.approx(0.27, abs=1e-9)
+    assert found.fraction(K=float(found.at("K", 0.33))) == pytest.approx(0.33, abs=1e-9)
+    fit = found.fits["E"]
+    assert np.allclose(fit["coefficient"] * x ** fit["exponent"], found.columns["E"], rtol=fit["residual"] * (1 + 1e-9))
+    # Gibson and Ashby's power of this sheet between 0.1 and 0.5, found independently.
+    assert fit["exponent"] == pytest.approx(1.256, abs=0.12)
+    for name in ("law.csv", "law.json", "law.svg"):
+        found.write(tmp_path / name)
+    assert (tmp_path / "law.csv").read_text().splitlines()[0].startswith("fraction,C11,C12,C44,E,G,nu")
+    assert json.loads((tmp_path / "law.json").read_text())["columns"]["k"][0] == found.columns["k"][0]
+    assert "<svg" in (tmp_path / "law.svg").read_text()
+    with pytest.raises(ValueError, match="known at fractions from 0.2 to 0.4"):
+        found.at("E", 0.5)
+    with pytest.raises(ValueError, match="E runs from"):
+        found.fraction(E=0.9)
+    with pytest.raises(ValueError, match="no column 'F'"):
+        found.at("F", 0.3)
+
+
+def test_a_law_says_where_there_is_none():
+    found = lt.law("primitive", "lower", 0.15, 0.35, 2, n=8, properties=["stiffness", "area"])
+    assert math.isnan(found.columns["E"][0]) and found.columns["E"][1] > 0 and "k" not in found.columns
+    assert any("falls apart" in m for m in found.notes[0.15])
+    assert found.to_dict()["columns"]["E"][0] is None
+    with pytest.raises(ValueError, match="no property 'weight'"):
+        lt.law("gyroid", properties=["weight"])
+    with pytest.raises(ValueError, match="ascending"):
+        lt.law("gyroid", start=0.5, stop=0.2)
+
+
+def test_a_monotone_cubic_stays_within_its_points():
+    x, y = np.array([0.0, 1.0, 2.0, 4.0, 5.0]), np.array([0.0, 0.1, 0.1, 3.0, 3.2])
+    along = np.linspace(0, 5, 501)
+    assert np.all(np.diff(monotone(x, y, along)) >= -1e-15) and np.allclose(monotone(x, y, x), y)
+
+
+def test_the_law_command(tmp_path):
+    words = ("law", "gyroid", "--from", 0.3, "--to", 0.4, "--count", 2, "--n", 8)
+    text = in_process(*words, "--properties", "stiffness", "area", "-o", tmp_path / "law.svg")
+    assert "fraction" in text and "zener" in text and (tmp_path / "law.svg").stat().st_size > 1000
+    report = json.loads(in_process(*words, "--properties", "conductivity", "--json"))
+    assert set(report["columns"]) == {"fraction", "k", "k_error"}
+    done = command("law", "gyroyd", "--n", 8)
+    assert done.returncode == 1 and "gyroid" in done.stderr and done.stderr.count("\n") == 1
+
+
+# --- levels by a property -----------------------------------------------------------------------------------------------
+
+
+def test_a_level_may_ask_for_a_stiffness():
+    made = solid("gyroid", "sheet", level.stiffness(0.1))
+    found = made.stiffness(n=48)
+    # Half a thousandth is left by the search, on other voxels than these.
+    assert found.E[0] == pytest.approx(0.1, rel=3e-3)
+    assert made.report().lattices["core"].fraction == pytest.approx(0.265, abs=0.005)
+    across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1]), wavelength=[3, 3, 3], rotate=[0, 0, 30])
+    c = np.array(across.stiffness(n=32).C)
+    d = np.array([math.cos(math.pi / 6) - 0.5, math.cos(math.pi / 6) + 0.5, 1]) / 3**0.5
+    voigt = np.array([d[0] ** 2, d[1] ** 2, d[2] ** 2, d[1] * d[2], d[0] * d[2], d[0] * d[1]])
+    assert 1 / (voigt @ np.linalg.inv(c) @ voigt) == pytest.approx(0.1, rel=5e-3)
+
+
+def test_a_level_may_ask_for_a_permeability():
+    made = solid("gyroid", "sheet", level.permeability(0.01))
+    assert made.permeability(n=32).k[0][0] == pytest.approx(0.01, rel=5e-3)
+
+
+def test_a_grade_may_ask_for_a_stiffness():
+    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.05, 4: 0.2}))
+    lattice = lt.Lattice("gyroid", "sheet", map.affine(wavelength=4), amount)
+    made = lt.Design(region.box(size=[4, 4, 8]), lattice).build()
+    low, high = made.report().lattices["core"].fraction
+    for fraction, wanted in ((low, 0.05), (high, 0.2)):
+        assert solid(amount=level.fraction(fraction)).stiffness(n=48).E[0] == pytest.approx(wanted, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("amount", "more", "said"),
+    [
+        (level.stiffness(0.99), {}, "stiffness is 0.99; that of this cell is at most"),
+        (level.permeability(100), {}, "permeability is 100 mm²; that of this cell is at most"),
+        (level.stiffness(0.1, along=[0, 0, 0]), {}, "along is"),
+    ],
+)
+def test_what_no_fraction_has_is_refused(amount: dict, more: dict, said: str):
+    with pytest.raises(lt.DesignError, match=said):
+        solid("gyroid", "sheet", amount, **more)
