@@ -3,8 +3,12 @@
 //! Each node has nineteen populations f_q, deviations from those at rest. A step collides and streams them:
 //! f̃_q = f_q − ω⁺(f⁺ − e⁺) − ω⁻(f⁻ − e⁻) + (1 − ω⁻/2) t_q c_q·F, where e⁺ = t_q ρ / 3, e⁻ = t_q c_q·j, j = Σ f_q c_q + F/2: linear, hence Stokes.
 //! Both rates are tied by (1/ω⁺ − ½)(1/ω⁻ − ½) = Λ = 3/16; steady velocities times the viscosity then depend on Λ alone. Walls cut the links at
-//! a distance δ: f_q̄ = f̃_q + κ(f_q − f̃_q̄) with κ = (1 − 2δ)/(1 + 2δ), the central linear interpolation of Ginzburg, Verhaeghe and d'Humières,
-//! which is of second order and keeps that property.
+//! a distance δ of a node, and the population that comes back from there is the multireflection of Ginzburg and d'Humières (Phys. Rev. E 68 (2003)
+//! 066614), f_q̄ = f̃_q + κ₀(f_q − f̃_q̄) + κ₁(f̃_q − f̃_q̄ a node further back) + F: it is zero velocity at the wall of the parabola along the
+//! link, so that plane channels are exact, and keeps that property. With p = f̃⁻ − f⁻ and Λ⁻ = 1/ω⁻ − ½, along a link in a steady flow f_q − f̃_q̄ = 2e − e' − 2Λ⁻p,
+//! the same a node further back, and f̃_q − f_q̄ = 2e + e' − 2Λ⁻p at the node, where e is e⁻ + Λ⁻t_q c_q·F, hence the weights: together they are
+//! S(e + δ e' + ½δ² e'' − Λ⁻p), S = 4/(1 + δ)², and F = SΛ⁻(p − t_q c_q·F) takes what does not belong away. With one node behind alone the
+//! interpolation is linear (κ₀ = (1 − 2δ)/(1 + 2δ), S = 4/(1 + 2δ)), and e'' is taken from p as if the wall were across the link: p − t_q c_q·F = −⅔Λ⁺e''.
 //!
 //! Populations are stored eight nodes at a time; `from` says where each comes from, a wall being its own node's opposite population.
 
@@ -12,7 +16,8 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::lanes::LANES;
-use crate::pore::{PoreGrid, VELOCITIES, opposite};
+use crate::pore::{PoreGrid, VELOCITIES, WallLink, opposite};
+use geometry::math::dot;
 
 /// Velocities.
 pub const Q: usize = 19;
@@ -38,7 +43,34 @@ struct Correction {
     lane: u8,
     /// The velocity towards the wall.
     velocity: u8,
-    kappa: f64,
+    /// κ₀ and κ₁.
+    kappa: [f64; 2],
+    /// The places of the populations a node further back.
+    behind: [u32; 2],
+    /// S.
+    sum: f64,
+    /// What stands in for ½δ² e'', in units of Λ⁺.
+    curved: f64,
+}
+
+impl Correction {
+    /// The correction of a wall at a distance, with one node or two behind; those are `behind`.
+    fn new(lane: usize, wall: &WallLink, behind: Option<[u32; 2]>) -> Correction {
+        let (d, velocity) = (wall.distance, wall.velocity as u8);
+        let lane = lane as u8;
+        match behind {
+            Some(behind) => {
+                let s = (1.0 + d) * (1.0 + d);
+                let kappa = [(1.0 - 2.0 * d - 2.0 * d * d) / s, d * d / s];
+                Correction { lane, velocity, kappa, behind, sum: 4.0 / s, curved: 0.0 }
+            }
+            None => {
+                let s = 1.0 + 2.0 * d;
+                let kappa = [(1.0 - 2.0 * d) / s, 0.0];
+                Correction { lane, velocity, kappa, behind: [0; 2], sum: 4.0 / s, curved: 0.75 * d * d }
+            }
+        }
+    }
 }
 
 /// A run of blocks of one connected component.
@@ -62,7 +94,7 @@ pub struct Nodes {
     /// Nodes of each channel.
     pub sizes: Vec<usize>,
     /// The node of the grid in each lane.
-    pub places: Vec<u32>,
+    places: Vec<u32>,
 }
 
 /// What a step gives of each channel: the mass and the sum of j.
@@ -118,15 +150,14 @@ impl Nodes {
                 let at = grid.walls.partition_point(|w| w.node < node);
                 for w in grid.walls[at..].iter().take_while(|w| w.node == node) {
                     // A gap of one node has no other to interpolate with: half-way bounce-back.
-                    if lane - block * LANES < made.used[block] as usize
-                        && blocked[node] >> opposite(w.velocity) & 1 == 0
-                    {
-                        let kappa = (1.0 - 2.0 * w.distance) / (1.0 + 2.0 * w.distance);
-                        made.corrections.push(Correction {
-                            lane: (lane % LANES) as u8,
-                            velocity: w.velocity as u8,
-                            kappa,
+                    let (q, back) = (w.velocity, opposite(w.velocity));
+                    if lane - block * LANES < made.used[block] as usize && blocked[node] >> back & 1 == 0 {
+                        let (first, _) = grid.neighbour(node, back);
+                        let behind = (blocked[first] >> back & 1 == 0).then(|| {
+                            let (second, _) = grid.neighbour(first, back);
+                            [place(lane_of[second] as usize, q), place(lane_of[first] as usize, back)]
                         });
+                        made.corrections.push(Correction::new(lane % LANES, w, behind));
                     }
                 }
             }
@@ -143,7 +174,8 @@ impl Nodes {
     /// One step under a force, from `state` to `next`. `excess` is taken off the density of each channel.
     pub fn step(&self, viscosity: f64, force: [f64; 3], excess: &[f64], state: &[f64], next: &mut [f64]) -> Sums {
         let even = 1.0 / (3.0 * viscosity + 0.5);
-        let odd = 1.0 / (MAGIC / (3.0 * viscosity) + 0.5);
+        let slack = MAGIC / (3.0 * viscosity);
+        let odd = 1.0 / (slack + 0.5);
         let mut pieces = Vec::with_capacity(self.runs.len());
         let mut rest = next;
         for run in &self.runs {
@@ -153,7 +185,9 @@ impl Nodes {
         }
         let each: Vec<[f64; 4]> = pieces
             .into_par_iter()
-            .map(|(run, out)| collide(self, run, &Step { even, odd, force, excess: excess[run.channel] }, state, out))
+            .map(|(run, out)| {
+                collide(self, run, &Step { even, odd, slack, force, excess: excess[run.channel] }, state, out)
+            })
             .collect();
         let mut sums = vec![[0.0; 4]; self.sizes.len()];
         for (run, of) in self.runs.iter().zip(each) {
@@ -165,10 +199,24 @@ impl Nodes {
     }
 }
 
+/// The flow j at a node by its populations after a collision.
+#[inline(always)]
+fn flow_after(own: &[f64], lane: usize, force: [f64; 3]) -> [f64; 3] {
+    let mut flow = force.map(|f| -0.5 * f);
+    for (q, c) in VELOCITIES.iter().enumerate().skip(1) {
+        for a in 0..3 {
+            flow[a] += f64::from(c[a]) * own[q * LANES + lane];
+        }
+    }
+    flow
+}
+
 /// The numbers of a step.
 struct Step {
     even: f64,
     odd: f64,
+    /// 1 / odd - 1/2.
+    slack: f64,
     force: [f64; 3],
     excess: f64,
 }
@@ -187,10 +235,23 @@ fn collide(nodes: &Nodes, run: &Run, step: &Step, state: &[f64], out: &mut [f64]
         }
         let own = &state[block * BLOCK..(block + 1) * BLOCK];
         let range = nodes.starts[block] as usize..nodes.starts[block + 1] as usize;
+        let mut lane = usize::MAX;
+        let mut moved = [0.0; 3];
         for c in &nodes.corrections[range] {
-            let (q, lane) = (c.velocity as usize, c.lane as usize);
+            let q = c.velocity as usize;
             let back = opposite(q);
-            f[back][lane] += c.kappa * (f[q][lane] - own[back * LANES + lane]);
+            if lane != c.lane as usize {
+                lane = c.lane as usize;
+                moved = flow_after(own, lane, step.force);
+            }
+            let [ahead, opposed] = [q, back].map(|q| own[q * LANES + lane]);
+            let [along, push] = [moved, step.force].map(|v| weight(q) * dot(VELOCITIES[q].map(f64::from), v));
+            // p of the last collision, from what it left: p (1 - ω⁻) = ω⁻ (e - f̃⁻).
+            let change = step.odd / (1.0 - step.odd) * (along + step.slack * push - 0.5 * (ahead - opposed));
+            let [far, near] = c.behind.map(|i| state[i as usize]);
+            f[back][lane] += c.kappa[0] * (f[q][lane] - opposed)
+                + if c.kappa[1] == 0.0 { 0.0 } else { c.kappa[1] * (far - near) }
+                + c.sum * (step.slack - c.curved * step.slack / MAGIC) * (change - push);
         }
         let (mut density, mut flow) = ([0.0; LANES], [[0.0; LANES]; 3]);
         for q in 0..Q {

@@ -1,5 +1,6 @@
 //! The pore of a periodic cell on a cubic grid: nodes, the distances of walls along links, the area of the wall.
 
+use geometry::fault::Fault;
 use geometry::math::{Mat3, Vec3, add, apply, cross, determinant, inverse, norm, product, scale, sub, transpose};
 use geometry::progress::{Progress, Stage, Stopped};
 use homogenise::{PoreGrid, VELOCITIES, WallLink, upper_edges};
@@ -10,6 +11,8 @@ use crate::field::Field;
 
 /// Steps of a root search: it ends much sooner, when a wall is known to a billionth of a link.
 const STEPS: usize = 40;
+/// Steps from a wall within which there is no node of the pore.
+const NEAR: f64 = 0.02;
 /// Values of opposite corners that differ by no more, relative to the largest, are the same.
 const SAME: f64 = 1e-7;
 
@@ -121,8 +124,7 @@ impl PoreSpace {
             let share = |at: f64| (n as f64 + at) / solids.len() as f64;
             let whole = |from, to| Stage { whole: progress, from: share(from), to: share(to) };
             let values = sampled(solid, grid, &whole(0.0, 0.3))?;
-            let alone = PoreGrid::new(grid.shape, grid.lean, values.iter().map(|v| *v > 0.0).collect(), Vec::new());
-            let alone = alone.map_err(Stopped::Refused)?;
+            let alone = open(grid, &values).map_err(Stopped::Refused)?;
             walls.extend(crossings(solid, grid, &alone, &values, &whole(0.3, 0.9))?);
             area += zero_area(grid, &alone, &values);
             cyclic = cyclic && is_cyclic(grid.shape[0], &values);
@@ -136,6 +138,18 @@ impl PoreSpace {
         let grid = PoreGrid::new(grid.shape, grid.lean, inside, walls).map_err(Stopped::Refused)?;
         Ok(PoreSpace { grid, area, cyclic })
     }
+}
+
+/// The pore of one solid, without its walls. A node nearer to a wall than a fiftieth of a step is left to the solid: where all its links are
+/// cut at once flow becomes steady slowly.
+fn open(grid: &CubicGrid, values: &[f64]) -> Result<PoreGrid, Fault> {
+    let all = PoreGrid::new(grid.shape, grid.lean, vec![true; values.len()], Vec::new())?;
+    let is_open = |node: usize| {
+        let rise = |q: usize| (values[all.neighbour(node, q).0] - values[node]).abs();
+        values[node] > 0.0 && (1..=6).map(rise).fold(0.0, f64::max) * NEAR < values[node]
+    };
+    let inside = (0..values.len()).into_par_iter().map(is_open).collect();
+    PoreGrid::new(grid.shape, grid.lean, inside, Vec::new())
 }
 
 /// The area of the walls of some solids, mm².
@@ -182,13 +196,13 @@ fn crossings(
                 for velocity in 1..VELOCITIES.len() {
                     let (to, _) = alone.neighbour(node, velocity);
                     if !alone.pore[to] {
-                        links.push((node, velocity, [0.0, 1.0, values[node], values[to]]));
+                        links.push((node, velocity, [0.0, 1.0, values[node], values[to].min(0.0)]));
                     }
                 }
             }
             let mut found = vec![0.0; links.len()];
             for _ in 0..STEPS {
-                let guess = |[a, b, f, g]: &[f64; 4]| if f > g { a + (b - a) * f / (f - g) } else { 0.5 * (a + b) };
+                let guess = |[a, b, f, g]: &[f64; 4]| if *g < 0.0 { a + (b - a) * f / (f - g) } else { 0.5 * (a + b) };
                 let points: Vec<Vec3> = links.iter().map(|(n, q, l)| grid.place(&back, *n, *q, guess(l))).collect();
                 solid.values(&points, &mut found);
                 let mut open = false;
