@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/generated/properties.json, what all named cells do by their fraction, and docs/generated/catalogue.md with plots of it.
+"""Writes docs/generated/properties.json, what all named cells do by their fraction, and catalogue.md with plots of it.
 
 Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--page]
 
@@ -80,8 +80,8 @@ def lines(laws):
     yield "# What the named cells do"
     yield ""
     yield (
-        "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three grids, by "
-        "[`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
+        "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three "
+        "grids, by [`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
         "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through."
     )
     for part in PARTS:

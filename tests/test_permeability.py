@@ -16,21 +16,24 @@ def solid(cell: str = "gyroid", part: str = "sheet", amount: dict | None = None,
     return lt.Design(region.box(size=[8, 8, 8]), lattice).build()
 
 
-@pytest.mark.parametrize(("cell", "wanted"), [("primitive", 3.20e-3), ("gyroid", 2.20e-3), ("diamond", 1.37e-3)])
-def test_networks_are_as_permeable_as_an_independent_program_found(cell: str, wanted: float):
+@pytest.mark.parametrize(
+    ("cell", "wanted", "conducts"),
+    [("primitive", 3.20e-3, 0.329), ("gyroid", 2.20e-3, 0.333), ("diamond", 1.37e-3, 0.333)],
+)
+def test_networks_are_as_permeable_as_an_independent_program_found(cell: str, wanted: float, conducts: float):
     found = solid(cell, "lower", level.fraction(0.5)).permeability(n=32)
     # That program had walls half-way between nodes: 2 to 3 % low on balls, where ours is within 0.5 %.
     assert found.k_cell[0][0] == pytest.approx(1.025 * wanted, rel=0.02)
     assert np.allclose(found.k, 16 * np.array(found.k_cell)) and found.error < 0.02
-    # The formation factor of these surfaces at one half is 3 (field by field known): tortuosity 1.5.
-    assert found.tortuosity == pytest.approx(1.5, rel=0.01)
+    # Its three digits of the conductivity, and what 32 nodes may be off.
+    assert found.tortuosity == pytest.approx(0.5 / conducts, rel=0.005)
 
 
 def test_beams_have_a_permeability_that_two_grids_agree_on():
     beams = lt.Beams(cell="sc", map=map.affine(wavelength=4), radius=0.4, hub=1.2, profile="cylinder")
     made = lt.Design(region.box(size=[8, 8, 8]), beams=beams).build()
     coarse, fine = made.permeability(n=24), made.permeability(n=40)
-    assert coarse.k[0][0] == pytest.approx(fine.k[0][0], rel=0.01)
+    assert abs(coarse.k[0][0] / fine.k[0][0] - 1) < coarse.error + fine.error < 0.05
     assert coarse.k[0][0] == pytest.approx(coarse.k[2][2], rel=1e-6)
 
 
@@ -38,14 +41,12 @@ def test_the_sides_of_a_sheet_add_up_and_are_apart():
     both, lower, upper = (solid().permeability(n=24, side=side) for side in (None, "lower", "upper"))
     assert np.allclose(np.add(lower.k, upper.k), both.k, rtol=1e-5, atol=1e-9)
     assert np.allclose(lower.k, upper.k, rtol=1e-5, atol=1e-9)  # a gyroid's sides are mirror images
-    assert lower.porosity == pytest.approx(0.35, abs=1e-3) and both.porosity == pytest.approx(0.7, abs=1e-5)
+    assert lower.porosity == pytest.approx(0.35, abs=1e-3) and both.porosity == pytest.approx(0.7, abs=1e-4)
     assert lower.side == "lower" and both.side is None
     assert both.hydraulic_diameter == pytest.approx(4 * both.porosity / both.area_per_volume, rel=1e-12)
     # The surface as meshed, both faces of the wall.
-    meshed = solid().mesh(per_cell=32).measure()
-    faces = meshed.area_lattice if hasattr(meshed, "area_lattice") else None
-    if faces is not None:
-        assert both.area_per_volume == pytest.approx(faces / 512, rel=0.01)
+    faces = solid().mesh(per_cell=24).measure().area_lattice
+    assert both.area_per_volume == pytest.approx(faces / 512, rel=0.01)
     k = both.k[0][0]
     assert both.kozeny == pytest.approx(both.porosity**3 / (k * both.area_per_volume**2), rel=1e-3)
 
@@ -58,10 +59,9 @@ def test_turned_stretched_and_leaning_cells():
     assert np.allclose(double.k, 4 * np.array(plain.k), rtol=1e-6, atol=1e-9)
     long = solid(wavelength=[4, 4, 8]).permeability(n=24)
     assert long.grids[0].shape[2] == 2 * long.grids[0].shape[0] and long.k_cell is None
-    assert long.k[2][2] > long.k[0][0] > plain.k[0][0] and np.allclose(long.k, np.transpose(long.k))
-    # A shear by a whole wavelength is the same lattice.
-    leaning = solid(skew={"xy": 45.0}).permeability(n=24)
-    assert leaning.k[0][0] > 0 and np.all(np.linalg.eigvalsh(leaning.k) > 0)
+    assert long.k[2][2] > max(long.k[0][0], plain.k[0][0]) and np.allclose(long.k, np.transpose(long.k))
+    leaning = solid(skew={"xy": 45.0}).permeability(n=16)
+    assert np.all(np.linalg.eigvalsh(leaning.k) > 0) and abs(leaning.k[0][1]) > 0.01 * leaning.k[0][0]
 
 
 def test_threads_change_no_bit():
@@ -104,7 +104,8 @@ def test_the_side_of_a_network_is_refused():
 def test_a_law_has_its_columns_fits_and_files(tmp_path):
     found = lt.law("gyroid", "sheet", 0.2, 0.4, 3, n=16)
     x = found.columns["fraction"]
-    assert np.allclose(x, [0.2, 0.3, 0.4]) and not found.notes
+    assert np.allclose(x, [0.2, 0.3, 0.4])
+    assert all("across" in message for said in found.notes.values() for message in said)  # walls of a voxel or two
     single = solid().stiffness(n=16)
     assert found.columns["C11"][1] == pytest.approx(single.C[0][0], rel=1e-9)
     assert found.columns["K"][1] == pytest.approx(solid().permeability(n=16).k_cell[0][0], rel=1e-6)
@@ -121,7 +122,7 @@ def test_a_law_has_its_columns_fits_and_files(tmp_path):
     assert (tmp_path / "law.csv").read_text().splitlines()[0].startswith("fraction,C11,C12,C44,E,G,nu")
     assert json.loads((tmp_path / "law.json").read_text())["columns"]["k"][0] == found.columns["k"][0]
     assert "<svg" in (tmp_path / "law.svg").read_text()
-    with pytest.raises(ValueError, match="known at fractions from 0.2 to 0.4"):
+    with pytest.raises(ValueError, match=r"known at fractions from 0\.2 to 0\.4"):
         found.at("E", 0.5)
     with pytest.raises(ValueError, match="E runs from"):
         found.fraction(E=0.9)
@@ -160,37 +161,38 @@ def test_the_law_command(tmp_path):
 
 
 def test_a_level_may_ask_for_a_stiffness():
-    made = solid("gyroid", "sheet", level.stiffness(0.1))
-    found = made.stiffness(n=48)
-    # Half a thousandth is left by the search, on other voxels than these.
-    assert found.E[0] == pytest.approx(0.1, rel=3e-3)
-    assert made.report().lattices["core"].fraction == pytest.approx(0.265, abs=0.005)
-    across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1]), wavelength=[3, 3, 3], rotate=[0, 0, 30])
-    c = np.array(across.stiffness(n=32).C)
+    made = solid("gyroid", "sheet", level.stiffness(0.1, n=24))
+    # A thousandth is left by the search, and a table's share of a fraction.
+    assert made.stiffness(n=24).E[0] == pytest.approx(0.1, rel=2e-3)
+    # The fraction of an independent table, which 24 voxels are 2 % off.
+    assert made.report().lattices["core"].fraction == pytest.approx(0.262, abs=0.006)
+    across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1], n=16), wavelength=[3, 3, 3], rotate=[0, 0, 30])
+    c = np.array(across.stiffness(n=16).C)
     d = np.array([math.cos(math.pi / 6) - 0.5, math.cos(math.pi / 6) + 0.5, 1]) / 3**0.5
     voigt = np.array([d[0] ** 2, d[1] ** 2, d[2] ** 2, d[1] * d[2], d[0] * d[2], d[0] * d[1]])
-    assert 1 / (voigt @ np.linalg.inv(c) @ voigt) == pytest.approx(0.1, rel=5e-3)
+    assert 1 / (voigt @ np.linalg.inv(c) @ voigt) == pytest.approx(0.1, rel=2e-3)
 
 
 def test_a_level_may_ask_for_a_permeability():
-    made = solid("gyroid", "sheet", level.permeability(0.01))
-    assert made.permeability(n=32).k[0][0] == pytest.approx(0.01, rel=5e-3)
+    made = solid("gyroid", "sheet", level.permeability(0.01, n=16))
+    assert made.permeability(n=16).k[0][0] == pytest.approx(0.01, rel=2e-3)
 
 
 def test_a_grade_may_ask_for_a_stiffness():
-    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.05, 4: 0.2}))
+    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.08, 4: 0.2}), n=16)
     lattice = lt.Lattice("gyroid", "sheet", map.affine(wavelength=4), amount)
     made = lt.Design(region.box(size=[4, 4, 8]), lattice).build()
     low, high = made.report().lattices["core"].fraction
-    for fraction, wanted in ((low, 0.05), (high, 0.2)):
-        assert solid(amount=level.fraction(fraction)).stiffness(n=48).E[0] == pytest.approx(wanted, rel=0.01)
+    # Monotone cubics in logarithms through six fractions.
+    for fraction, wanted in ((low, 0.08), (high, 0.2)):
+        assert solid(amount=level.fraction(fraction)).stiffness(n=16).E[0] == pytest.approx(wanted, rel=0.03)
 
 
 @pytest.mark.parametrize(
     ("amount", "more", "said"),
     [
-        (level.stiffness(0.99), {}, "stiffness is 0.99; that of this cell is at most"),
-        (level.permeability(100), {}, "permeability is 100 mm²; that of this cell is at most"),
+        (level.stiffness(0.99, n=8), {}, "stiffness is 0.99; that of this cell is at most"),
+        (level.permeability(100, n=8), {}, "permeability is 100 mm²; that of this cell is at most"),
         (level.stiffness(0.1, along=[0, 0, 0]), {}, "along is"),
     ],
 )

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from . import beams, blend, cell, grade, level, map, region, reports
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
-    from .layers import Layer, Layers
     from .laws import Law, law
+    from .layers import Layer, Layers
     from .levels import fraction, iso
     from .mesh import Mesh
     from .parts import write_parts

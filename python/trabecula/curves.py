@@ -12,7 +12,7 @@ from .chart import FAINT, FONT, INK, label
 __all__ = ["Curve", "Panel", "law_plots", "panels"]
 
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 460, 320, 64, 112, 34, 44
-#: Told apart also by those who see fewer colours (after Okabe and Ito), and by dashes where there are more.
+#: Distinct also to those who see fewer colours (after Okabe and Ito); dashes where there are more curves.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#28282c")
 DASHES = ("", "6 3", "2 2")
 
@@ -44,11 +44,15 @@ class Panel:
 def panels(of: Sequence[Panel], wide: int = 2) -> str:
     """The panels in rows of ``wide``."""
     columns, rows = min(wide, len(of)), math.ceil(len(of) / wide)
-    size = WIDTH * columns, HEIGHT * rows
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}" height="{size[1]}" viewBox="0 0 {size[0]} {size[1]}" {FONT}>'
-    parts = [head, f'<rect width="{size[0]}" height="{size[1]}" fill="white"/>']
+    x, y = WIDTH * columns, HEIGHT * rows
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{x}" height="{y}" viewBox="0 0 {x} {y}" {FONT}>'
+    parts = [head, f'<rect width="{x}" height="{y}" fill="white"/>']
     for i, panel in enumerate(of):
-        parts += [f'<g transform="translate({WIDTH * (i % wide)} {HEIGHT * (i // wide)})" fill="{INK}">', *_drawn(panel), "</g>"]
+        parts += [
+            f'<g transform="translate({WIDTH * (i % wide)} {HEIGHT * (i // wide)})" fill="{INK}">',
+            *_drawn(panel),
+            "</g>",
+        ]
     return "\n".join([*parts, "</svg>\n"])
 
 

@@ -1,4 +1,4 @@
-"""``trabecula stiffness``, ``conductivity`` and ``permeability``: the figures of a design's periodic cell, printed and written."""
+"""``trabecula stiffness``, ``conductivity``, ``permeability``, ``law``: what a periodic cell does, printed and written."""
 
 from __future__ import annotations
 

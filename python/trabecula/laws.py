@@ -54,8 +54,8 @@ class Law:
     nu: float
     #: ``fraction``, ascending, and the columns of `PROPERTIES`.
     columns: dict[str, np.ndarray]
-    #: By column ``coefficient``, ``exponent`` and ``residual``: column = coefficient fraction^exponent, with the largest relative
-    #: difference at the fractions.
+    #: By column ``coefficient``, ``exponent`` and ``residual``: column = coefficient fraction^exponent, with the largest
+    #: relative difference at the fractions.
     fits: dict[str, dict[str, float]] = field(default_factory=dict)
     #: Why there is no number, or a doubtful one, by fraction.
     notes: dict[float, list[str]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Law:
         return monotone(x, y, asked)
 
     def fraction(self, **asked: float) -> float:
-        """The solid fraction at which a column has a value, as in ``law.fraction(E=0.1)``. Raises ValueError where it has none."""
+        """The solid fraction at which a column has a value, as in ``law.fraction(E=0.1)``. ValueError where it has none."""
         if len(asked) != 1:
             raise ValueError(f"give one column and its value, found {len(asked)}")
         ((column, value),) = asked.items()
@@ -141,10 +141,10 @@ def law(
     threads: int | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> Law:
-    """What a named cell does by its solid fraction: stiffness over E of a solid of Poisson's ratio ``nu``, conductivity over the
-    solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions from ``start`` to ``stop``, each
-    the limit of grids of n, n/2 and n/4 voxels along the cell, with monotone interpolation between and powers of the fraction
-    fitted (Gibson and Ashby).
+    """What a named cell does by its solid fraction: stiffness over E of a solid of Poisson's ratio ``nu``, conductivity over
+    the solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions from ``start`` to ``stop``,
+    each the limit of grids of n, n/2 and n/4 voxels along the cell, with monotone interpolation between and powers of the
+    fraction fitted (Gibson and Ashby).
 
     ``properties`` names fewer of "stiffness", "conductivity", "permeability", "area". Where a cell falls apart its stiffness is
     NaN, and ``notes`` says so. Raises ValueError for fractions outside 0 to 1 or out of order.
@@ -244,8 +244,9 @@ def _power(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
 
 
 def monotone(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The piecewise cubic through points of ascending x that has no extremum between them (Fritsch and Carlson 1980), at positions
-    within them.
+    """The piecewise cubic through points of ascending x that has no extremum between them (Fritsch and Carlson 1980).
+
+    ``at`` holds positions within them.
     """
     h, secant = np.diff(x), np.diff(y) / np.diff(x)
     slope = np.empty(len(x))
@@ -258,8 +259,4 @@ def monotone(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     slope[1:-1] = np.where(same, inner, 0.0)
     i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
     t = (at - x[i]) / h[i]
-    return (
-        y[i]
-        + (y[i + 1] - y[i]) * t * t * (3 - 2 * t)
-        + h[i] * t * (1 - t) * ((1 - t) * slope[i] - t * slope[i + 1])
-    )
+    return y[i] + (y[i + 1] - y[i]) * t * t * (3 - 2 * t) + h[i] * t * (1 - t) * ((1 - t) * slope[i] - t * slope[i + 1])

@@ -40,24 +40,26 @@ def pore(value: Amount, mid: float = 0.0) -> dict:
 
 
 @named
-def stiffness(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, mid: float = 0.0) -> dict:
-    """Young's modulus of the periodic cell over that of the solid, ``along`` a direction in the axes of the cell: the fraction is
-    solved for.
+def stiffness(
+    value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, n: int = 48, mid: float = 0.0
+) -> dict:
+    """Young's modulus of the periodic cell over that of the solid, ``along`` a direction in the axes of the cell: the fraction
+    is solved for.
 
-    ``nu`` is Poisson's ratio of the solid. The map is ``map.affine()`` or ``map.spartan()``.
+    ``nu`` is Poisson's ratio of the solid, ``n`` how many voxels along the cell it is found on. The map is ``map.affine()`` or ``map.spartan()``.
     """
-    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0]), "nu": (nu, 0.3)}
+    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0]), "nu": (nu, 0.3), "n": (n, 48)}
     return _level("stiffness", value, mid=mid) | {k: v for k, (v, usual) in given.items() if v != usual}
 
 
 @named
-def permeability(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), mid: float = 0.0) -> dict:
-    """The permeability of the pore in mm², of both sides of a sheet together, ``along`` a direction in the axes of the cell: the
-    fraction is solved for.
+def permeability(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), n: int = 32, mid: float = 0.0) -> dict:
+    """The permeability of the pore in mm², of both sides of a sheet together, ``along`` a direction in the axes of the cell:
+    the fraction is solved for.
 
-    The map is ``map.affine()`` or ``map.spartan()``.
+    ``n`` is how many nodes along the cell it is found on. The map is ``map.affine()`` or ``map.spartan()``.
     """
-    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0])}
+    given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0]), "n": (n, 32)}
     return _level("permeability", value, mid=mid) | {k: v for k, (v, usual) in given.items() if v != usual}
 
 

@@ -1,8 +1,8 @@
 //! Levels by what the cell does: the fraction at which it is as stiff, or as permeable, as asked.
 //!
-//! A property is a monotone function of the fraction. Its root is bracketed on coarse voxels; the error of these is then measured at the
-//! root on fine ones and allowed for, until the fine ones say what was asked for. Where the amount varies, the function is taken at a few
-//! fractions and interpolated by monotone cubics (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238).
+//! A property is a monotone function of the fraction, nearly a power of it. Its root is found on coarse voxels, and from there on fine ones by the
+//! secant in logarithms. Where the amount varies, the function is found at a few fractions and interpolated in logarithms by monotone cubics
+//! (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238).
 
 use super::built_report::Varied;
 use super::data::AmountSpec;
@@ -22,16 +22,17 @@ use std::sync::Arc;
 
 /// Solid fractions between which a level is sought.
 const FRACTIONS: [f64; 2] = [0.03, 0.97];
-/// Voxels along a coarse cell, and the least and most along a fine one.
+/// Voxels along a coarse cell.
 const COARSE: usize = 16;
-const FINE: [usize; 2] = [32, 64];
-/// Relative difference between what is found and what was asked for that is left.
-const MET: f64 = 5e-4;
-/// Rounds in which the coarse function is corrected.
-const ROUNDS: usize = 4;
+/// Relative difference to what was asked for at which the search ends, on coarse and on fine voxels.
+const MET: [f64; 2] = [5e-3, 1e-3];
+/// Steps on coarse voxels, and on fine ones.
+const STEPS: [usize; 2] = [24, 3];
 /// Fractions at which a property that varies is found, and stops of the function between them.
-const NODES: usize = 9;
+const NODES: usize = 6;
 const STOPS: usize = 65;
+/// Part of a fraction by which the first and the last of these are further out than the coarse voxels say.
+const BEYOND: f64 = 0.05;
 
 /// A property of a cell by its fraction.
 struct Property<'a> {
@@ -71,9 +72,8 @@ pub(super) fn level(
     }
     let mut asked = vec![0.0; environment.points.len()];
     amount.values(environment.points, &mut asked);
-    let Varied { min, max } = Varied::of(&asked);
-    let ends = [property.fraction(min)?, property.fraction(max)?];
-    Ok(Level::Fraction(Grade::from(Remapped::new(amount.clone(), property.between([min, max], ends)?))))
+    let stops = property.between(Varied::of(&asked))?;
+    Ok(Level::Fraction(Grade::from(Remapped::new(amount.clone(), stops))))
 }
 
 impl Property<'_> {
@@ -85,13 +85,9 @@ impl Property<'_> {
         unit_cell::of_lattice("", &Arc::new(lattice))
     }
 
-    /// The property at a fraction, 0 where the cell has none; on fine voxels, three across the thinnest wall where that is within reach.
-    fn value(&self, fraction: f64, fine: bool) -> Result<f64, DesignError> {
+    /// The property at a fraction, 0 where the cell has none.
+    fn value(&self, fraction: f64, n: usize) -> Result<f64, DesignError> {
         let cell = self.at(fraction)?;
-        let longest = cell.edges.map(norm).into_iter().fold(0.0, f64::max);
-        let across = 3.0 * longest / cell.wall.unwrap_or(longest).max(1e-9 * longest);
-        let need = (8 * (across / 8.0).ceil() as usize).clamp(FINE[0], FINE[1]);
-        let n = if fine { need } else { COARSE };
         let (axes, _) = upper_edges(&transpose(&cell.edges));
         let found = match self.amount {
             AmountSpec::Stiffness(of) => {
@@ -134,77 +130,106 @@ impl Property<'_> {
 
     /// The fraction at which the property has this value.
     fn fraction(&self, asked: f64) -> Result<f64, DesignError> {
+        let (mut at, mut slope) = self.coarse_root(asked)?;
         let [low, high] = self.range();
-        let ends = [self.value(low, false)?, self.value(high, false)?];
-        let (mut wanted, mut found) = (asked, low);
-        for round in 0..ROUNDS {
-            found = self.coarse_root(wanted, [low, high], ends, asked)?;
-            let fine = self.value(found, true)?;
-            if fine <= 0.0 || (fine / asked - 1.0).abs() <= MET || round + 1 == ROUNDS {
+        let mut last: Option<[f64; 2]> = None;
+        for _ in 0..STEPS[1] {
+            let off = (self.value(at, self.fine())? / asked).ln();
+            if !off.is_finite() || off.abs() <= MET[1] {
                 break;
             }
-            // The same relative error of the coarse voxels is expected at the next root.
-            wanted *= asked / fine;
+            if let Some([x, y]) = last
+                && (off - y) / (at.ln() - x) * slope > 0.0
+            {
+                slope = (off - y) / (at.ln() - x);
+            }
+            last = Some([at.ln(), off]);
+            at = (at.ln() - off / slope).exp().clamp(low, high);
         }
-        Ok(found)
+        Ok(at)
     }
 
-    /// Where the coarse function is `wanted`, by false position (Illinois) in its logarithm; refuses what it does not reach.
-    fn coarse_root(&self, wanted: f64, range: [f64; 2], ends: [f64; 2], asked: f64) -> Result<f64, DesignError> {
-        let [least, most] = if self.grows() { ends } else { [ends[1], ends[0]] };
-        if wanted < least || wanted > most {
-            let (limit, word, at) = if wanted < least {
-                (least, "least", if self.grows() { range[0] } else { range[1] })
-            } else {
-                (most, "most", if self.grows() { range[1] } else { range[0] })
-            };
-            let (key, unit) = if self.grows() { ("stiffness", "") } else { ("permeability", " mm²") };
+    /// Voxels along a fine cell.
+    fn fine(&self) -> usize {
+        match self.amount {
+            AmountSpec::Stiffness(s) => s.n as usize,
+            AmountSpec::Permeability(s) => s.n as usize,
+            _ => COARSE,
+        }
+    }
+
+    /// Where the property is `asked` on coarse voxels, and the slope there, in logarithms: by false position (Illinois). Refuses what it does not
+    /// reach.
+    fn coarse_root(&self, asked: f64) -> Result<(f64, f64), DesignError> {
+        let n = COARSE.min(self.fine());
+        let range = self.range();
+        let ends = [self.value(range[0], n)?, self.value(range[1], n)?];
+        let (grows, most) = (self.grows(), ends[0].max(ends[1]));
+        if !(ends[0].min(ends[1]) <= asked && asked <= most) {
+            let above = asked > most;
+            let (limit, at) = if above == grows { (ends[1], range[1]) } else { (ends[0], range[0]) };
+            let (word, unit) = (if above { "most" } else { "least" }, if grows { "" } else { " mm²" });
             let message = format!(
-                "{key} is {}{unit}; that of this cell is at {word} about {limit:.3}{unit}, at a solid fraction of {at:.3}",
+                "{} is {}{unit}; that of this cell is at {word} about {limit:.3}{unit}, at a solid fraction of {at:.3}",
+                self.amount.key(),
                 number(asked)
             );
             return Err(DesignError::new(&self.path, message));
         }
-        let sign = if self.grows() { 1.0 } else { -1.0 };
-        let far = |v: f64| sign * (v.max(1e-12 * most) / wanted).ln();
-        let ([mut a, mut b], [mut fa, mut fb]) = (range, ends.map(far));
-        let mut last = 0;
-        for _ in 0..24 {
-            if b - a < 1e-7 || fa == 0.0 {
-                break;
-            }
+        let far = |v: f64| (v.max(1e-12 * most) / asked).ln();
+        let sign = if grows { 1.0 } else { -1.0 };
+        let ([mut a, mut b], [mut fa, mut fb]) = (range.map(f64::ln), ends.map(far));
+        let mut slope = (fb - fa) / (b - a);
+        let mut last = [a, fa];
+        for _ in 0..STEPS[0] {
             let at = (a - fa * (b - a) / (fb - fa)).clamp(a, b);
-            let f = far(self.value(at, false)?);
-            if f.abs() < 0.1 * MET {
-                return Ok(at);
+            let f = far(self.value(at.exp(), n)?);
+            if at != last[0] && (f - last[1]) / (at - last[0]) * sign > 0.0 {
+                slope = (f - last[1]) / (at - last[0]);
             }
-            if f < 0.0 {
+            if f.abs() < MET[0] || b - a < 1e-7 {
+                return Ok((at.exp(), slope));
+            }
+            let before = last[1];
+            last = [at, f];
+            if f * sign < 0.0 {
                 (a, fa) = (at, f);
-                fb *= if last == -1 { 0.5 } else { 1.0 };
-                last = -1;
+                fb *= if before * f > 0.0 { 0.5 } else { 1.0 };
             } else {
                 (b, fb) = (at, f);
-                fa *= if last == 1 { 0.5 } else { 1.0 };
-                last = 1;
+                fa *= if before * f > 0.0 { 0.5 } else { 1.0 };
             }
         }
-        Ok(0.5 * (a + b))
+        Ok((last[0].exp(), slope))
     }
 
-    /// The fraction by the property between two ends.
-    fn between(&self, values: [f64; 2], fractions: [f64; 2]) -> Result<Stops, DesignError> {
-        let [first, last] = fractions;
-        let mut nodes = vec![[values[0].ln(), first]];
-        for i in 1..NODES - 1 {
-            let p = first + (last - first) * i as f64 / (NODES - 1) as f64;
-            let v = self.value(p, true)?.ln();
-            if nodes.last().is_some_and(|n| n[0] < v) && v < values[1].ln() {
-                nodes.push([v, p]);
+    /// The fraction by the property, over the range of what is asked for.
+    fn between(&self, asked: Varied) -> Result<Stops, DesignError> {
+        let ends = [self.coarse_root(asked.min)?.0, self.coarse_root(asked.max)?.0];
+        let ([low, high], [least, most]) = (self.range(), [ends[0].min(ends[1]), ends[0].max(ends[1])]);
+        let (first, last) = ((least * (1.0 - BEYOND)).max(low).ln(), (most * (1.0 + BEYOND)).min(high).ln());
+        let mut nodes: Vec<[f64; 2]> = Vec::new();
+        for i in 0..NODES {
+            let share = i as f64 / (NODES - 1) as f64;
+            let at = if self.grows() { first + (last - first) * share } else { last + (first - last) * share };
+            let value = self.value(at.exp(), self.fine())?.ln();
+            if value.is_finite() && nodes.last().is_none_or(|n| n[0] < value) {
+                nodes.push([value, at]);
             }
         }
-        nodes.push([values[1].ln(), last]);
-        let at = |i: usize| values[0] + (values[1] - values[0]) * i as f64 / (STOPS - 1) as f64;
-        let mut stops: Vec<[f64; 2]> = (0..STOPS).map(|i| [at(i), monotone(&nodes, at(i).ln())]).collect();
+        if nodes.len() < 2 {
+            let message = format!(
+                "{} could not be found between fractions of {:.3} and {:.3}; take more voxels (n)",
+                self.amount.key(),
+                first.exp(),
+                last.exp()
+            );
+            return Err(DesignError::new(&self.path, message));
+        }
+        let ends = [nodes.first(), nodes.last()].map(|n| n.map_or(0.0, |n| n[0].exp()));
+        let (from, to) = (asked.min.clamp(ends[0], ends[1]), asked.max.clamp(ends[0], ends[1]));
+        let at = |i: usize| from + (to - from) * i as f64 / (STOPS - 1) as f64;
+        let mut stops: Vec<[f64; 2]> = (0..STOPS).map(|i| [at(i), monotone(&nodes, at(i).ln()).exp()]).collect();
         stops.dedup_by(|a, b| a[0] == b[0]);
         Ok(Stops(stops))
     }

@@ -445,6 +445,9 @@ pub struct StiffnessSpec {
     /// Poisson's ratio of the solid.
     #[kind(above = -1.0, below = 0.5, default = 0.3)]
     pub nu: f64,
+    /// Voxels along the cell on which it is found.
+    #[kind(min = 8.0, max = 256.0, default = 48)]
+    pub n: u32,
 }
 
 /// A permeability of the cell.
@@ -456,6 +459,9 @@ pub struct PermeabilitySpec {
     /// The direction of the flow, in the axes of the cell.
     #[kind(default = [1.0, 0.0, 0.0])]
     pub along: Vec3,
+    /// Nodes along the cell on which it is found.
+    #[kind(min = 8.0, max = 256.0, default = 32)]
+    pub n: u32,
 }
 
 /// What a fraction is of.
