@@ -107,8 +107,8 @@ def test_a_law_has_its_columns_fits_and_files(tmp_path):
     assert np.allclose(x, [0.2, 0.3, 0.4])
     assert all("across" in message for said in found.notes.values() for message in said)  # walls of a voxel or two
     single = solid().stiffness(n=16)
-    assert found.columns["C11"][1] == pytest.approx(single.C[0][0], rel=1e-9)
-    assert found.columns["K"][1] == pytest.approx(solid().permeability(n=16).k_cell[0][0], rel=1e-6)
+    assert found.columns["C11"][1] == pytest.approx(single.C[0][0], rel=1e-4)  # a table, for other cells
+    assert found.columns["K"][1] == pytest.approx(solid().permeability(n=16).k_cell[0][0], rel=1e-3)
     assert found.at("E", 0.3) == pytest.approx(found.columns["E"][1], rel=1e-12)
     asked = float(found.at("E", 0.27))
     assert found.fraction(E=asked) == pytest.approx(0.27, abs=1e-9)
@@ -166,26 +166,26 @@ def test_a_level_may_ask_for_a_stiffness():
     assert made.stiffness(n=24).E[0] == pytest.approx(0.1, rel=2e-3)
     # The fraction of an independent table, which 24 voxels are 2 % off.
     assert made.report().lattices["core"].fraction == pytest.approx(0.262, abs=0.006)
-    across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1], n=16), wavelength=[3, 3, 3], rotate=[0, 0, 30])
-    c = np.array(across.stiffness(n=16).C)
+    across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1], n=8), wavelength=[3, 3, 3], rotate=[0, 0, 30])
+    c = np.array(across.stiffness(n=8).C)
     d = np.array([math.cos(math.pi / 6) - 0.5, math.cos(math.pi / 6) + 0.5, 1]) / 3**0.5
     voigt = np.array([d[0] ** 2, d[1] ** 2, d[2] ** 2, d[1] * d[2], d[0] * d[2], d[0] * d[1]])
     assert 1 / (voigt @ np.linalg.inv(c) @ voigt) == pytest.approx(0.1, rel=2e-3)
 
 
 def test_a_level_may_ask_for_a_permeability():
-    made = solid("gyroid", "sheet", level.permeability(0.01, n=16))
-    assert made.permeability(n=16).k[0][0] == pytest.approx(0.01, rel=2e-3)
+    made = solid("gyroid", "sheet", level.permeability(0.01, n=12))
+    assert made.permeability(n=12).k[0][0] == pytest.approx(0.01, rel=2e-3)
 
 
 def test_a_grade_may_ask_for_a_stiffness():
-    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.08, 4: 0.2}), n=16)
+    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.08, 4: 0.2}), n=8)
     lattice = lt.Lattice("gyroid", "sheet", map.affine(wavelength=4), amount)
     made = lt.Design(region.box(size=[4, 4, 8]), lattice).build()
     low, high = made.report().lattices["core"].fraction
     # Monotone cubics in logarithms through six fractions.
     for fraction, wanted in ((low, 0.08), (high, 0.2)):
-        assert solid(amount=level.fraction(fraction)).stiffness(n=16).E[0] == pytest.approx(wanted, rel=0.03)
+        assert solid(amount=level.fraction(fraction)).stiffness(n=8).E[0] == pytest.approx(wanted, rel=0.03)
 
 
 @pytest.mark.parametrize(

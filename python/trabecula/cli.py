@@ -467,8 +467,7 @@ COMMANDS = {
         "Find what a named cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
         "At each fraction the limit of grids of n, n/2 and n/4 voxels along the cell; between them monotone cubics, and\n"
         "powers of the fraction fitted (Gibson and Ashby). Stiffness and conductivity are relative to the solid's, lengths\n"
-        "to the wavelength. OUT: .csv, a row for each fraction; .json, with fits and notes; .svg, plots. Several may be given.\n"
-        "\n"
+        "to the wavelength. OUT: .csv, a row for each fraction; .json, with fits and notes; .svg, plots.\n\n"
         "examples:\n  trabecula law gyroid -o gyroid.csv gyroid.svg\n"
         "  trabecula law diamond --part lower --from 0.2 --to 0.5 --count 7 --properties stiffness --json",
         option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` lists them"),

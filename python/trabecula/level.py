@@ -40,13 +40,12 @@ def pore(value: Amount, mid: float = 0.0) -> dict:
 
 
 @named
-def stiffness(
-    value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, n: int = 48, mid: float = 0.0
-) -> dict:
+def stiffness(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, n: int = 48, mid: float = 0.0) -> dict:
     """Young's modulus of the periodic cell over that of the solid, ``along`` a direction in the axes of the cell: the fraction
     is solved for.
 
-    ``nu`` is Poisson's ratio of the solid, ``n`` how many voxels along the cell it is found on. The map is ``map.affine()`` or ``map.spartan()``.
+    ``nu`` is Poisson's ratio of the solid, ``n`` how many voxels along the cell it is found on. The map is ``map.affine()``
+    or ``map.spartan()``.
     """
     given = {"along": ([float(v) for v in along], [1.0, 0.0, 0.0]), "nu": (nu, 0.3), "n": (n, 48)}
     return _level("stiffness", value, mid=mid) | {k: v for k, (v, usual) in given.items() if v != usual}
