@@ -23,10 +23,8 @@ from .terminal import Progress, figure, say, settle, warn, warned
 from .texts import counted, table, voids
 
 __all__ = [
-    *("cells", "check", "conductivity", "doctor", "measure", "mesh", "new"),
-    *("render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
     *("cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new"),
-    *("permeability", "render", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
+    *("permeability", "render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
 ]
 
 
