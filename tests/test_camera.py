@@ -36,17 +36,18 @@ def read(png, kinds=(b"IDAT",)):
 
 
 def unfiltered(rows):
-    """Rows of bytes whose filter is none, sub or up (PNG, section 9)."""
-    out = np.zeros((rows.shape[0], rows.shape[1] - 1), np.uint8)
-    for y, row in enumerate(rows):
-        line = row[1:].astype(np.uint8)
-        assert row[0] in (0, 1, 2)
-        if row[0] == 1:
-            line = np.add.accumulate(line.reshape(-1, 3), axis=0, dtype=np.uint8).ravel()
-        elif row[0] == 2:
-            line = line + out[y - 1]
-        out[y] = line
-    return out
+    """Rows of bytes without their filters (PNG, section 9), three bytes a pixel."""
+    above, out = [0] * (rows.shape[1] - 1), []
+    for kind, *line in rows.tolist():
+        for i, v in enumerate(line):
+            left, corner = (line[i - 3], above[i - 3]) if i > 2 else (0, 0)
+            up = above[i]
+            guess = left + up - corner
+            paeth = min((left, up, corner), key=lambda c: abs(guess - c))
+            line[i] = (v + (0, left, up, (left + up) // 2, paeth)[kind]) % 256
+        above = line
+        out.append(line)
+    return np.array(out, np.uint8)
 
 
 @pytest.fixture(scope="module")

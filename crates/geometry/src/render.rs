@@ -1,5 +1,7 @@
 //! Pictures of meshes, drawn on the processor.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -147,13 +149,14 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
     if drawn {
         let size = [w * OVER, h * OVER];
         let room = [size[0], size[1] - legend::height(&legend, &paper) * OVER];
-        let camera = Camera::new(&bounds, &surface.mesh.vertices, view, room);
+        let section = look.section.as_ref();
+        let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
+        let camera = Camera::new(&bounds, &shown, view, room);
         let finish = match (&look.colours, &look.lines) {
             (Some(colours), _) => Finish::Coloured(colours),
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let section = look.section.as_ref();
         let body = Layer::new(surface, &camera, size, finish, section);
         let tubes = look.lines.as_ref().map(Tubes::of);
         let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t), section));

@@ -1,7 +1,8 @@
 //! Sections: what lies beyond a plane is left out, and the solid that the plane cuts is seen in it.
 
 use super::Camera;
-use crate::math::{Vec3, add, dot, scale};
+use crate::math::{Vec3, add, dot, scale, sub};
+use crate::mesh::Mesh;
 
 /// A plane; what lies where `normal` · p > `offset` is left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +11,31 @@ pub struct Section {
     pub normal: Vec3,
     /// Distance from the origin along the normal (mm).
     pub offset: f64,
+}
+
+impl Section {
+    /// Height of a point above the plane (mm).
+    fn height(&self, p: Vec3) -> f64 {
+        dot(self.normal, p) - self.offset
+    }
+
+    /// The vertices of a mesh that are kept, and the points where the plane cuts its edges; all vertices if the plane leaves out all.
+    pub(super) fn kept(&self, mesh: &Mesh) -> Vec<Vec3> {
+        let heights: Vec<f64> = mesh.vertices.iter().map(|p| self.height(*p)).collect();
+        let mut kept: Vec<Vec3> =
+            mesh.vertices.iter().zip(&heights).filter(|(_, h)| **h <= 0.0).map(|(p, _)| *p).collect();
+        for t in &mesh.triangles {
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| (a as usize, b as usize)) {
+                // Each edge of a closed surface is passed both ways.
+                if heights[a] <= 0.0 && heights[b] > 0.0 {
+                    let share = heights[a] / (heights[a] - heights[b]);
+                    let (p, q) = (mesh.vertices[a], mesh.vertices[b]);
+                    kept.push(add(p, scale(sub(q, p), share)));
+                }
+            }
+        }
+        if kept.is_empty() { mesh.vertices.clone() } else { kept }
+    }
 }
 
 /// A section as a camera sees it. The inverse distance times the height above the plane is affine in column, row and inverse
@@ -25,7 +51,7 @@ impl SeenSection {
         let eye = add(camera.center, scale(camera.axes[2], camera.distance));
         let (across, down) = (right / camera.focal, -up / camera.focal);
         let constant = -out - across * camera.middle[0] - down * camera.middle[1];
-        SeenSection { of: [constant, across, down, dot(section.normal, eye) - section.offset] }
+        SeenSection { of: [constant, across, down, section.height(eye)] }
     }
 
     /// Whether the section leaves out the point behind a sample.

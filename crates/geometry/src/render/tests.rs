@@ -256,11 +256,12 @@ fn a_section_is_as_large_as_the_solid_there() {
         section: Some(Section { normal: [0.0, 0.0, side], offset: side * offset }),
         ..Look::default()
     };
-    let camera = Camera::new(&ball.mesh.bounds(), &ball.mesh.vertices, &view, view.size);
     let red = |rgb: &[u8]| rgb.chunks(3).filter(|c| i32::from(c[0]) > i32::from(c[1]) + 60).count() as f64;
     let whole = render(&ball, &view, &Look::default());
     for height in [0.3, 0.5, 0.75] {
         let seen = render(&ball, &view, &look(height, 1.0));
+        let shown = look(height, 1.0).section.expect("a section").kept(&ball.mesh);
+        let camera = Camera::new(&ball.mesh.bounds(), &shown, &view, view.size);
         let near = camera.project([0.5, 0.5, height])[2];
         let radius = (0.16 - (height - 0.5) * (height - 0.5)).sqrt() * camera.focal * near;
         // The boundary within a pixel, and the sag of the ball's facets: an eighth of the square of their edge over its radius.
