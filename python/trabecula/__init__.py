@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
+    from .volumes import VolumeMesh, VolumeSet
     from .voxels import Voxels
 
 __all__ = [
@@ -49,6 +50,8 @@ __all__ = [
     "TetMesh",
     "Thickness",
     "Transitions",
+    "VolumeMesh",
+    "VolumeSet",
     "Voxels",
     "__version__",
     "beams",
@@ -90,6 +93,8 @@ _HOMES = {
     "TetMesh": "tets",
     "Thickness": "thickness",
     "Transitions": "transition",
+    "VolumeMesh": "volumes",
+    "VolumeSet": "volumes",
     "Voxels": "voxels",
     "objective": "sweeps",
     "spartan": "design",

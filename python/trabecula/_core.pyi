@@ -25,6 +25,7 @@ from .reports import (
     TetMeshReport,
     ThicknessReport,
     TransitionReport,
+    VolumeReport,
 )
 
 __version__: str
@@ -33,6 +34,7 @@ Progress = Callable[[int, int], Any]
 
 def mesh_formats() -> list[MeshFormat]: ...
 def layer_formats() -> list[tuple[str, str, bool, bool]]: ...
+def volume_formats() -> list[tuple[str, str]]: ...
 
 class LatticeTerms:
     @property
@@ -129,6 +131,34 @@ class Layers:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> LayersReport: ...
+
+class VolumeMesh:
+    @staticmethod
+    def make(
+        solid: Solid,
+        edge: float,
+        of: str = "solid",
+        order: int = 1,
+        periodic: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> VolumeMesh: ...
+    @property
+    def nodes(self) -> NDArray[np.float64]: ...
+    @property
+    def elements(self) -> NDArray[np.uint32]: ...
+    @property
+    def domain(self) -> NDArray[np.uint8]: ...
+    @property
+    def domains(self) -> list[str]: ...
+    @property
+    def sets(self) -> list[str]: ...
+    def set(self, name: str) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32]] | None: ...
+    @property
+    def pairs(self) -> NDArray[np.uint32]: ...
+    def report(self) -> VolumeReport: ...
+    def boundary(self) -> Mesh: ...
+    def write(self, file: tuple[str, str, str], elastic: list[float] = ...) -> None: ...
 
 class Cell:
     @staticmethod

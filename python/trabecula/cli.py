@@ -25,6 +25,7 @@ from .formats import (
     SWEEP_WRITES,
     TET_READS,
     TET_WRITES,
+    VOLUME_WRITES,
     VOXEL_WRITES,
     dotted,
     kind_of,
@@ -117,6 +118,14 @@ def parts(text: str) -> list[str]:
         return check_parts([name.strip() for name in text.split(",")])
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def names(text: str) -> list[str]:
+    """Names by commas."""
+    found = [name.strip() for name in text.split(",")]
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"expected names by commas, such as X0,LATTICE, found {text!r}")
+    return found
 
 
 def front(text: str) -> tuple[str, str]:
@@ -298,6 +307,34 @@ COMMANDS = {
         "  trabecula simplify part.3mf -o light.3mf --triangles 200000",
         file("file", MESH_READS, "a mesh file, mm"),
         *(output(MESH_WRITES, "the mesh to write"), *LIGHTER, PROGRESS, JSON),
+    ),
+    "volume": (
+        "Mesh the inside of a design: tetrahedra with named sets, for finite elements and flow.",
+        "The name of OUT decides the format: .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .vtu (ParaView) or .bdf (Nastran).\n"
+        "Tetrahedra conform to all surfaces, edges and corners. Sets, each of nodes, elements and faces: X0 X1 Y0 Y1 Z0 Z1\n"
+        "(bounding planes), CUT (the region's boundary), LATTICE (the lattice's own surface), SKIN, KEEP_NAME.\n"
+        "The .inp of a --periodic cell has equations and six steps and runs as it is.\n\n"
+        "examples:\n  trabecula volume part.toml -o part.inp --wall 3 --order 2\n"
+        "  trabecula volume exchanger.toml -o fluids.msh --of all\n"
+        "  trabecula volume cell.toml -o rve.inp --periodic --per-cell 32 --E 114000 --nu 0.34",
+        *(DESIGN, output(VOLUME_WRITES, f"the mesh to write ({dotted(VOLUME_WRITES)})")),
+        [
+            option("--edge", type=LENGTH, metavar="MM", help="longest edge of most tetrahedra, mm"),
+            option("--per-cell", type=SAMPLES, metavar="N", help="edges along the smallest wavelength"),
+            option("--wall", type=SAMPLES, metavar="N", help="edges through the thinnest wall (default: 2)"),
+        ],
+        option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic tetrahedra"),
+        option(
+            "--of",
+            choices=("solid", "pore", "lower", "upper", "all"),
+            default="solid",
+            help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes",
+        ),
+        option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
+        option("--sets", type=names, metavar="NAMES", help="sets that must not be empty, by commas"),
+        option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid in the file (default: 1)"),
+        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
+        *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
     "voxels": (
         "Write the solid as cubic voxels.",

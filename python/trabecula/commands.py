@@ -24,7 +24,7 @@ from .texts import counted, table, voids
 
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new"),
-    *("permeability", "render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "voxels"),
+    *("permeability", "render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "volume", "voxels"),
 ]
 
 
@@ -331,6 +331,31 @@ def voxels(args) -> None:
     say(
         f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
         f"{made['solid_fraction']:.4f}, {made['seconds']:.2f} s"
+    )
+
+
+def volume(args) -> None:
+    """``trabecula volume``."""
+    check_place(args.output)
+    keep_file(args.design, args.output)
+    solid = build(args.design, tell=not args.json)
+    start = time.perf_counter()
+    with Progress("meshing", args.progress) as progress:
+        made = solid.volume_mesh(
+            args.edge, args.per_cell, args.wall, args.order, args.of, args.periodic, args.threads, progress
+        )
+    missing = [name for name in args.sets or () if name not in made.report().sets]
+    if missing:
+        raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
+    settle()
+    made.write(args.output, args.E, args.nu)
+    figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        return put_json(figures | {"warnings": warned()})
+    say(
+        f"{args.output}: {figures['elements']} tetrahedra, {figures['nodes']} nodes, volume {figure(made.volume)} mm³, "
+        f"dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees; sets {', '.join(figures['sets'])}; "
+        f"{figures['seconds']:.2f} s"
     )
 
 

@@ -10,7 +10,7 @@ from . import _core
 __all__ = [
     *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "LAW_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
-    *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOXEL_WRITES"),
+    *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOLUME_WRITES", "VOXEL_WRITES"),
     *("dotted", "is_design", "kind_of"),
 ]
 
@@ -51,6 +51,9 @@ class LayerRow(NamedTuple):
 #: The formats of layers by suffix.
 LAYERS = {suffix: LayerRow(*row) for suffix, *row in _core.layer_formats()}
 LAYER_WRITES = tuple(LAYERS)
+#: The formats of volume meshes: suffix, what it is.
+VOLUMES = dict(_core.volume_formats())
+VOLUME_WRITES = tuple(VOLUMES)
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
 MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")

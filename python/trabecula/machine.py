@@ -9,7 +9,7 @@ from . import _core
 from .files import check_place, special
 from .formats import MESHES
 
-__all__ = ["fewer_threads", "file_size", "fits", "rounded_up"]
+__all__ = ["fewer_threads", "file_size", "fits", "rounded_down", "rounded_up"]
 
 #: Address space of a command, and of each of its threads (stack, the allocator's reserve, tiles in flight), bytes: several
 #: times what they take, since an allocation that fails ends the process on the spot.
@@ -101,3 +101,9 @@ def rounded_up(v: float) -> float:
     """v, rounded up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(v)) - 1)
     return round(math.ceil(v / unit) * unit, 12)
+
+
+def rounded_down(v: float) -> float:
+    """v, rounded down to two digits."""
+    unit = 10.0 ** (math.floor(math.log10(v)) - 1)
+    return round(math.floor(v / unit) * unit, 12)

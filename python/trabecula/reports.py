@@ -19,6 +19,7 @@ __all__ = [
     "DihedralReport",
     "DistanceReport",
     "DistortionReport",
+    "DomainReport",
     "EstimateReport",
     "FilletShortfall",
     "FitReport",
@@ -41,6 +42,7 @@ __all__ = [
     "RbfReport",
     "RegionReport",
     "RepairReport",
+    "SetReport",
     "SimplifyReport",
     "SingularLineReport",
     "SmoothReport",
@@ -56,6 +58,7 @@ __all__ = [
     "TransitionReport",
     "TrimmedReport",
     "VoidReport",
+    "VolumeReport",
     "WallSpread",
     "WarningReport",
     "ZoneJoin",
@@ -357,6 +360,17 @@ class DistortionReport(Report):
     """Least and greatest length of a cell over the one asked for, along any direction."""
     turn: float
     """Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees."""
+
+
+class DomainReport(Report):
+    """A domain of a volume mesh."""
+
+    elements: int
+    """Number of tetrahedra."""
+    inside: list[float]
+    """A point inside: the centroid of its largest tetrahedron, mm."""
+    volume: float
+    """Volume, mm³; of quadratic tetrahedra that between their corners."""
 
 
 class EstimateReport(Report):
@@ -778,6 +792,17 @@ class RepairReport(Report):
     """Triangles turned to face as their neighbours do."""
 
 
+class SetReport(Report):
+    """A named set of a volume mesh."""
+
+    elements: int
+    """Number of tetrahedra."""
+    faces: int
+    """Number of faces."""
+    nodes: int
+    """Number of nodes."""
+
+
 class SimplifyReport(Report):
     """What simplification did."""
 
@@ -1134,6 +1159,46 @@ class VoidReport(Report):
     """Lower and upper corner of the bounds, mm."""
     point: list[float]
     """A point inside, mm."""
+    volume: float
+    """Volume, mm³."""
+
+
+class VolumeReport(Report):
+    """The figures of a volume mesh."""
+
+    _parts = {
+        "domains": "DomainReport",
+        "sets": "SetReport",
+    }
+    _by_name = frozenset(["domains", "sets"])
+
+    deviation: float
+    """Greatest distance of boundary faces from the surface, mm, at their corners, edges and centroids; faces on flat cuts
+    have none."""
+    domains: dict[str, DomainReport]
+    """The domains by name."""
+    dropped: float
+    """Volume left out, mm³: small loose components, and tetrahedra where the boundary would touch itself."""
+    edge: list[float]
+    """Edges of the background's cubes along x, y, z, mm: the longest edges of most tetrahedra."""
+    elements: int
+    """Number of tetrahedra."""
+    max_angle: float
+    """Greatest dihedral angle, degrees."""
+    min_angle: float
+    """Smallest dihedral angle, degrees; of quadratic tetrahedra between the planes of their corners."""
+    nodes: int
+    """Number of nodes."""
+    order: int
+    """1 for linear tetrahedra, 2 for quadratic ones."""
+    pairs: int
+    """Number of nodes on upper bounding planes that are tied to their periodic images."""
+    pieces: int
+    """Number of components connected by faces."""
+    sets: dict[str, SetReport]
+    """The named sets."""
+    straight: int
+    """Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted."""
     volume: float
     """Volume, mm³."""
 

@@ -18,7 +18,7 @@ from .given import number, positive, whole
 from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
 from .layers import Layers
-from .machine import file_size, fits, rounded_up
+from .machine import file_size, fits, rounded_down, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         StiffnessReport,
         SurfaceReport,
     )
+    from .volumes import VolumeMesh
 
     Progress = Callable[[int, int], Any]
 
@@ -64,6 +65,8 @@ SPOOLED = 24
 STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
 #: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
 PERMEABILITY_BYTES = 1300
+#: Short edges of a volume mesh's tetrahedra as a fraction of the long ones.
+SHORT_EDGE = math.sqrt(0.75)
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
@@ -633,6 +636,84 @@ class Solid(Seen):
         elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
         return Layers(self, _core.Layers.of(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
+
+    def volume_mesh(
+        self,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        wall: float | None = None,
+        order: int = 1,
+        of: str = "solid",
+        periodic: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> VolumeMesh:
+        """Tetrahedra that conform to all surfaces, edges and corners of the solid, for finite elements.
+
+        One size: ``edge`` (mm), the longest edge of most tetrahedra; ``per_cell``, edges along the smallest wavelength;
+        ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the wavelength.
+
+        ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Linear ones have the volume of the
+        solid to fourth order: their nodes are shifted off curved surfaces by about half the distance of a chord.
+
+        ``of``: ``"solid"``; ``"pore"``, the rest of the region; ``"lower"`` or ``"upper"``, the space on one side of a sheet;
+        ``"all"``, the wall and both spaces of a sheet, else solid and pore, with common nodes.
+
+        ``periodic`` is for a box with whole cells: nodes and faces on opposite sides match in all bits.
+
+        Small loose components and places where the boundary touches itself are left out, ``report().dropped`` is their volume.
+        The same for any number of ``threads``. Raises ValueError for an edge greater than the thinnest wall, a mesh beyond the
+        memory there is, a side of what is no sheet, ``periodic`` where the solid is not.
+        """
+        from .volumes import OF, TET_BYTES, VolumeMesh
+
+        if of not in OF:
+            raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
+        if order not in (1, 2):
+            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        size = self._volume_edge(edge, per_cell, wall)
+        share, region = self._core.expected()
+        part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
+        count = 12 * max(part, 0.02) * region / size**3
+        if count > 3e8:
+            raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
+        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
+        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, _threads(threads), progress)
+        made = VolumeMesh(core, self._core.design)
+        figures = made.report()
+        if figures.pieces > 1 and of in ("solid", "lower", "upper") and not periodic:
+            warnings.warn(
+                f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another",
+                DesignWarning,
+                stacklevel=2,
+            )
+        return made
+
+    def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
+        """The edge (mm) of a request for a volume mesh."""
+        if sum(v is not None for v in (edge, per_cell, wall)) > 1:
+            raise ValueError("give one of edge, per_cell and wall")
+        walls = dict(self._thinnest)
+        if self.skin is not None:
+            walls["skin"] = self.skin
+        where, thin = min(walls.items(), key=lambda item: item[1], default=("", math.inf))
+        if wall is not None:
+            if not walls:
+                raise ValueError("wall: the thinnest wall of this design is not known; give edge, mm")
+            size = thin / positive("wall", wall)
+        elif edge is None and per_cell is None:
+            size = min(thin / 2, self.wavelength / 16)
+        else:
+            size = positive("edge", edge) if edge is not None else self.wavelength / positive("per_cell", per_cell)
+        # Four of a tetrahedron's six edges are shorter than the longest, by half the root of three.
+        if SHORT_EDGE * size > thin:
+            raise ValueError(
+                f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at {where};"
+                f" use {rounded_down(thin / SHORT_EDGE):g} mm or less"
+            )
+        if size > self.wavelength / 4:
+            raise ValueError(f"an edge of {size:.4g} mm is more than a quarter of the wavelength, {self.wavelength:g} mm")
+        return size
 
     def thickness(
         self,

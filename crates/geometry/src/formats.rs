@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
+mod element_files;
 mod elements;
 mod frd;
 mod graphs;
@@ -27,6 +28,7 @@ mod vtk;
 mod vtu;
 mod xml;
 
+pub use element_files::{FE_FORMATS, FeFormat, FeText};
 pub use elements::Elements;
 pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};
 pub use indexed::{Aside, Indexed};

@@ -53,6 +53,7 @@ pub mod bvh;
 pub mod cubic_spline;
 pub mod distance;
 pub mod fault;
+pub mod fe_mesh;
 pub mod feature_edges;
 pub mod formats;
 pub mod layer;

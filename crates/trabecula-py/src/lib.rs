@@ -20,6 +20,7 @@ mod report;
 mod run;
 mod solid;
 mod tets;
+mod volume;
 mod voxels;
 
 /// Rotations and translations.
@@ -67,6 +68,8 @@ mod _core {
     #[pymodule_export]
     use crate::tets::TetMesh;
     #[pymodule_export]
+    use crate::volume::VolumeMesh;
+    #[pymodule_export]
     use crate::voxels::Voxels;
 
     #[pymodule_init]
@@ -105,6 +108,12 @@ mod _core {
     #[pyfunction]
     fn layer_formats() -> Vec<(&'static str, &'static str, bool, bool)> {
         crate::layers::formats()
+    }
+
+    /// The formats of volume meshes, in the order in which texts name them: suffix, what it is.
+    #[pyfunction]
+    fn volume_formats() -> Vec<(&'static str, &'static str)> {
+        crate::volume::formats()
     }
 
     /// The JSON Schema of a design, as JSON text.

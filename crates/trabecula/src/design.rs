@@ -50,9 +50,10 @@ use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
 use crate::truss::Beams;
+use crate::volume_mesh;
 use beams::{StepSummary, write_step};
 use geometry::fault::Fault;
-use geometry::progress::Stopped;
+use geometry::progress::{Progress, Stopped};
 use geometry::repair::Repaired;
 
 pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
@@ -149,6 +150,8 @@ pub struct Tiled {
 pub struct Built {
     /// The solid.
     pub solid: Solid,
+    /// Names of what is solid whatever the lattice says: `SKIN`, `KEEP_` and the name of a keep zone, `NET`.
+    pub bodies: Vec<String>,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
     /// The lattices over tetrahedral meshes, by name.
@@ -369,6 +372,18 @@ impl Built {
     /// Whether files of its mesh are to have no caps on the region's boundary.
     pub fn is_open(&self) -> bool {
         self.tilings.iter().any(|t| t.ends == Ends::Open)
+    }
+
+    /// Its volume mesh, with named sets.
+    ///
+    /// # Errors
+    /// As `volume_mesh::volume_mesh`.
+    pub fn volume_mesh(
+        &self,
+        options: &volume_mesh::Options,
+        progress: &dyn Progress,
+    ) -> Result<volume_mesh::Made, Stopped> {
+        volume_mesh::volume_mesh(&self.solid, &self.bodies, options, progress)
     }
 
     /// The periodic cell of which the design's lattice or beams are made. The region, skin and kept zones are no part of it.

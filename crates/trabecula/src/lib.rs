@@ -59,6 +59,7 @@ pub mod solid;
 pub mod surface_maker;
 pub mod tiling;
 pub mod truss;
+pub mod volume_mesh;
 pub mod voxel_fractions;
 
 pub use cell::{Cell, Part};

@@ -22,8 +22,10 @@ mod smooth;
 mod tet_shape;
 mod work;
 
+pub(crate) use boundary_repair::repair;
 pub use region_fit::{Fit, Uncovered, fit, uncovered};
 pub use tet_shape::ANGLES;
+pub(crate) use tet_shape::shape;
 use work::{Around, Work};
 
 /// Maximum number of tetrahedra.
@@ -63,7 +65,7 @@ pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec
         grid.refine(region, size, MOST)?;
     }
     let (mut mesh, on) = isosurface_stuffing::stuff(&grid, region);
-    let mended = boundary_repair::repair(&mut mesh);
+    let mended = repair(&mut mesh);
     if mesh.tets.is_empty() {
         let message = format!(
             "no tetrahedron of size {} mm fits into the region; use a smaller one, at most half its thickness",

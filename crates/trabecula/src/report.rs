@@ -7,6 +7,7 @@ mod design_report;
 mod layers_report;
 mod mesh_report;
 mod tets_report;
+mod volume_report;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -30,6 +31,7 @@ pub use tets_report::{
     Creases, DihedralReport, FitReport, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport, WallSpread,
     ZoneJoin, ZoneReport,
 };
+pub use volume_report::{DomainReport, SetReport, VolumeReport};
 
 /// A number, or its least and greatest value over the region where it varies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -72,6 +74,7 @@ struct Reports {
     stiffness: StiffnessReport,
     conductivity: ConductivityReport,
     permeability: PermeabilityReport,
+    volume: VolumeReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

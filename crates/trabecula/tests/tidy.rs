@@ -22,7 +22,7 @@ const LAYERS: &[&[&str]] = &[
     &["mesher", "lattice", "tiling", "truss", "skin", "beam_surface"],
     &["blend"],
     &["solid"],
-    &["extract", "layers", "voxel_fractions"],
+    &["extract", "layers", "volume_mesh", "voxel_fractions"],
     &["analysis"],
     &["report"],
     &["effective"],

@@ -13,7 +13,7 @@ const FRAGMENT_TETS: usize = 100;
 
 /// Removes tetrahedra until no two boundary sheets share a node, and fragments that this or thin walls leave; returns
 /// the removed volume (mm³).
-pub(super) fn repair(mesh: &mut TetMesh) -> f64 {
+pub(crate) fn repair(mesh: &mut TetMesh) -> f64 {
     let mut lost = 0.0;
     loop {
         checkpoint();

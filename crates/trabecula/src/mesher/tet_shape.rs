@@ -10,7 +10,7 @@ pub const ANGLES: [f64; 2] = [10.7, 164.8];
 
 /// 1 where the worst dihedral angle is one of `ANGLES`, more where all are better (16 in a regular tetrahedron); a small
 /// angle and one short of 180 degrees count by the squares of what they are short of. Negative without volume.
-pub(super) fn shape(p: [Vec3; 4]) -> f64 {
+pub(crate) fn shape(p: [Vec3; 4]) -> f64 {
     // 1 − cos 10.7°, 1 + cos 164.8°.
     const SMALL: f64 = 0.017_387;
     const LARGE: f64 = 0.034_984;

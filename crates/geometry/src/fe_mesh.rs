@@ -1,0 +1,165 @@
+//! Meshes for finite elements: linear or quadratic tetrahedra in domains, named sets, periodic pairs.
+
+use rayon::prelude::*;
+
+use crate::math::{Mat3, Vec3, determinant, sub};
+use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
+
+/// A mesh for finite elements.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FeMesh {
+    /// Nodes (mm): corners first, then the nodes of edges.
+    pub nodes: Vec<Vec3>,
+    /// The corners of each tetrahedron, (b − a) × (c − a) · (d − a) > 0.
+    pub tets: Vec<[u32; 4]>,
+    /// The nodes on the edges of each tetrahedron, in the order of `EDGES`; empty for linear ones.
+    pub middles: Vec<[u32; 6]>,
+    /// The domain of each tetrahedron, ascending.
+    pub domain: Vec<u8>,
+    /// Names of the domains.
+    pub domains: Vec<String>,
+    /// Named sets.
+    pub sets: Vec<FeSet>,
+    /// Nodes on upper bounding planes of a periodic cell, each with its image on the lower ones.
+    pub pairs: Vec<Pair>,
+    /// Edges of a periodic cell (mm); zero if it is none.
+    pub period: Vec3,
+}
+
+/// A named set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FeSet {
+    /// Its name.
+    pub name: String,
+    /// Nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Tetrahedra, ascending.
+    pub elements: Vec<u32>,
+    /// Faces: tetrahedron, and the number of the corner opposite to it; ascending.
+    pub faces: Vec<(u32, u8)>,
+}
+
+/// A node of a periodic cell and its image on lower bounding planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The node.
+    pub node: u32,
+    /// Its image.
+    pub image: u32,
+    /// By which periods they differ.
+    pub along: [bool; 3],
+}
+
+/// The order of the edges' nodes in Abaqus, CalculiX, Nastran and VTK, by indices of `EDGES`.
+pub const MIDDLES: [usize; 6] = [0, 3, 1, 2, 4, 5];
+
+impl FeMesh {
+    /// The straight tetrahedra between the corners.
+    pub fn corners(&self) -> TetMesh {
+        TetMesh { nodes: self.nodes.clone(), tets: self.tets.clone(), zones: Vec::new() }.compact()
+    }
+
+    /// Volume (mm³): ∫ det J over the elements, exact.
+    pub fn volume(&self) -> f64 {
+        if self.middles.is_empty() {
+            let of = |t: &[u32; 4]| crate::tetmesh::volume(t.map(|n| self.nodes[n as usize]));
+            return self.tets.iter().map(of).sum();
+        }
+        // Degree three: Keast 1986, in barycentric coordinates.
+        const INNER: f64 = 1.0 / 6.0;
+        (0..self.tets.len())
+            .map(|i| {
+                let at = |c: usize| core::array::from_fn(|k| if k == c { 0.5 } else { INNER });
+                let four: f64 = (0..4).map(|c| self.jacobian(i, at(c))).sum();
+                (-0.8 * self.jacobian(i, [0.25; 4]) + 0.45 * four) / 6.0
+            })
+            .sum()
+    }
+
+    /// The least and greatest dihedral angle (degrees) between the planes of corners.
+    pub fn angles(&self) -> (f64, f64) {
+        let cosines = |t: &[u32; 4]| {
+            let all = dihedral_cosines(t.map(|n| self.nodes[n as usize]));
+            all.iter().fold((1.0f64, -1.0f64), |(lo, hi), c| (lo.min(*c), hi.max(*c)))
+        };
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        let (lo, hi) = self.tets.par_iter().map(cosines).reduce(|| (1.0, -1.0), both);
+        let degrees = |c: f64| c.clamp(-1.0, 1.0).acos().to_degrees();
+        (degrees(hi), degrees(lo))
+    }
+
+    /// The ten nodes of a quadratic tetrahedron: corners, edges in the order of `EDGES`.
+    pub fn quadratic(&self, i: usize) -> [Vec3; 10] {
+        core::array::from_fn(|k| self.nodes[if k < 4 { self.tets[i][k] } else { self.middles[i][k - 4] } as usize])
+    }
+
+    /// det J of a quadratic tetrahedron (six times its volume if it is straight) at barycentric coordinates.
+    pub fn jacobian(&self, i: usize, at: [f64; 4]) -> f64 {
+        jacobian(&self.quadratic(i), at)
+    }
+
+    /// A set by its name.
+    pub fn set(&self, name: &str) -> Option<&FeSet> {
+        self.sets.iter().find(|s| s.name == name)
+    }
+
+    /// The corners of a face, counter-clockwise seen from outside.
+    pub fn face(&self, (t, k): (u32, u8)) -> [u32; 3] {
+        FACES[k as usize].map(|c| self.tets[t as usize][c])
+    }
+
+    /// The nodes on the edges of a face, each after its corner; none in linear meshes.
+    pub fn face_middles(&self, (t, k): (u32, u8)) -> Option<[u32; 3]> {
+        let middles = self.middles.get(t as usize)?;
+        let [a, b, c] = FACES[k as usize];
+        let of = |a: usize, b: usize| EDGES.iter().position(|e| *e == [a.min(b), a.max(b)]).unwrap_or(0);
+        Some([of(a, b), of(b, c), of(c, a)].map(|e| middles[e]))
+    }
+}
+
+/// det J of a quadratic tetrahedron at barycentric coordinates.
+pub fn jacobian(p: &[Vec3; 10], at: [f64; 4]) -> f64 {
+    // ∂N/∂L of each corner function: 4 L − 1; of each edge function: 4 L of the other end.
+    let slope = |corner: usize| -> Vec3 {
+        let mut d: Vec3 = core::array::from_fn(|k| (4.0 * at[corner] - 1.0) * p[corner][k]);
+        for (e, [a, b]) in EDGES.iter().enumerate() {
+            if let Some(other) = [(a, b), (b, a)].iter().find(|(x, _)| **x == corner).map(|(_, y)| **y) {
+                (0..3).for_each(|k| d[k] += 4.0 * at[other] * p[4 + e][k]);
+            }
+        }
+        d
+    };
+    let first = slope(0);
+    let m: Mat3 = [1, 2, 3].map(|c| sub(slope(c), first));
+    determinant(&m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jacobian_of_a_straight_tetrahedron_is_constant() {
+        let corners = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.5, 0.0, 1.0]];
+        let middle = |[a, b]: [usize; 2]| core::array::from_fn(|k| 0.5 * (corners[a][k] + corners[b][k]));
+        let nodes: Vec<Vec3> = corners.into_iter().chain(EDGES.map(middle)).collect();
+        let mesh = FeMesh {
+            nodes,
+            tets: vec![[0, 1, 2, 3]],
+            middles: vec![[4, 5, 6, 7, 8, 9]],
+            domain: vec![0],
+            ..FeMesh::default()
+        };
+        for at in [[0.25; 4], [1.0, 0.0, 0.0, 0.0], [0.1, 0.2, 0.3, 0.4]] {
+            assert!((mesh.jacobian(0, at) - 6.0).abs() < 1e-14);
+        }
+        assert!((mesh.volume() - 1.0).abs() < 1e-15);
+        let mut curved = mesh.clone();
+        // Moving the node of an edge changes the volume as a linear function: ∫ of its basis function, −1/20 + 4/20 … on each face.
+        curved.nodes[7][2] -= 0.1;
+        let more = curved.volume() - 1.0;
+        curved.nodes[7][2] -= 0.1;
+        assert!((curved.volume() - 1.0 - 2.0 * more).abs() < 1e-14 && more != 0.0 || more.abs() < 1e-15);
+        assert_eq!(mesh.face_middles((0, 3)), Some([5, 7, 4]));
+    }
+}

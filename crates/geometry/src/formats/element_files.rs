@@ -1,0 +1,131 @@
+//! Files of finite element meshes: Abaqus and CalculiX, Gmsh, Nastran, VTK.
+
+use std::io::{self, Write};
+
+use rayon::prelude::*;
+
+use crate::fe_mesh::FeMesh;
+
+mod abaqus;
+mod gmsh41;
+mod nastran;
+mod vtk_cells;
+
+/// What is written besides the mesh.
+#[derive(Clone, Debug, Default)]
+pub struct FeText {
+    /// The first line: what it is.
+    pub title: String,
+    /// Young's modulus (MPa) and Poisson's ratio of the first domain's material.
+    pub elastic: [f64; 2],
+}
+
+/// A format of finite element meshes.
+pub struct FeFormat {
+    /// Suffix of file names.
+    pub suffix: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// Writes a mesh.
+    pub write: fn(&FeMesh, &FeText, &mut dyn Write) -> io::Result<()>,
+}
+
+/// The formats of finite element meshes.
+pub const FE_FORMATS: [FeFormat; 4] = [
+    FeFormat { suffix: "inp", title: "Abaqus, CalculiX", write: abaqus::write },
+    FeFormat { suffix: "msh", title: "Gmsh 4.1", write: gmsh41::write },
+    FeFormat { suffix: "vtu", title: "VTK, ParaView", write: vtk_cells::write },
+    FeFormat { suffix: "bdf", title: "Nastran", write: nastran::write },
+];
+
+/// Items formatted by one thread at a time, and by all before they are written.
+const CHUNK: usize = 1 << 13;
+const BATCH: usize = 1 << 18;
+
+/// Writes a text for each of `count` items, formatted by all threads and in order.
+fn lines(out: &mut dyn Write, count: usize, line: impl Fn(usize, &mut String) + Sync) -> io::Result<()> {
+    for first in (0..count).step_by(BATCH) {
+        let end = (first + BATCH).min(count);
+        let starts: Vec<usize> = (first..end).step_by(CHUNK).collect();
+        let texts: Vec<String> = starts
+            .into_par_iter()
+            .map(|start| {
+                let mut text = String::with_capacity(64 * CHUNK);
+                (start..(start + CHUNK).min(end)).for_each(|i| line(i, &mut text));
+                text
+            })
+            .collect();
+        texts.iter().try_for_each(|t| out.write_all(t.as_bytes()))?;
+    }
+    Ok(())
+}
+
+/// Appends a whole number.
+fn push(text: &mut String, mut n: usize) {
+    let mut digits = [0u8; 20];
+    let mut at = digits.len();
+    loop {
+        at -= 1;
+        digits[at] = b'0' + (n % 10) as u8;
+        n /= 10;
+        if n == 0 {
+            break;
+        }
+    }
+    text.extend(digits[at..].iter().map(|d| *d as char));
+}
+
+/// Writes numbers, at most `row` on a line, with `between` them.
+fn rows(out: &mut dyn Write, numbers: &[u32], row: usize, between: &str) -> io::Result<()> {
+    let count = numbers.len().div_ceil(row);
+    lines(out, count, |i, text| {
+        for (k, n) in numbers[i * row..((i + 1) * row).min(numbers.len())].iter().enumerate() {
+            if k > 0 {
+                text.push_str(between);
+            }
+            push(text, *n as usize + 1);
+        }
+        text.push('\n');
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::fe_mesh::FeSet;
+
+    fn two() -> FeMesh {
+        let set = FeSet { name: "X0".into(), nodes: vec![0, 2, 3], elements: vec![0], faces: vec![(0, 1)] };
+        FeMesh {
+            nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1], [1.0; 3]],
+            tets: vec![[0, 1, 2, 3], [1, 4, 2, 3]],
+            domain: vec![0, 1],
+            domains: vec!["WALL".into(), "LOWER".into()],
+            sets: vec![set],
+            ..FeMesh::default()
+        }
+    }
+
+    #[test]
+    fn every_format_is_written_with_sets_and_domains() {
+        for format in FE_FORMATS {
+            let mut bytes = Vec::new();
+            (format.write)(&two(), &FeText { title: "two".into(), elastic: [1.0, 0.3] }, &mut bytes).unwrap();
+            let text = String::from_utf8_lossy(&bytes);
+            for word in ["X0", "WALL", "LOWER"] {
+                assert!(text.contains(word), "{}: {word}", format.suffix);
+            }
+        }
+    }
+
+    #[test]
+    fn lists_have_sixteen_numbers_a_line() {
+        let mut out = Vec::new();
+        rows(&mut out, &(0..40).collect::<Vec<u32>>(), 16, ", ").unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let counts: Vec<usize> = text.lines().map(|l| l.split(", ").count()).collect();
+        assert_eq!(counts, [16, 16, 8]);
+        assert!(text.starts_with("1, 2, ") && text.ends_with("39, 40\n"));
+    }
+}

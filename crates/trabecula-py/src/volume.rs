@@ -1,0 +1,149 @@
+//! Volume meshes: arrays, sets, figures, files.
+
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use geometry::fe_mesh::{FeMesh, MIDDLES};
+use geometry::formats::{FE_FORMATS, FeText};
+use geometry::surface_mesh::SurfaceMesh;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use trabecula::report::VolumeReport;
+use trabecula::volume_mesh::{Made, Of, Options};
+
+use crate::error;
+use crate::file;
+use crate::mesh::Mesh;
+use crate::report::report;
+use crate::run::run;
+use crate::solid::Solid;
+
+/// Nodes, tetrahedra, and faces (tetrahedron, corner opposite to it) of a set.
+type Members<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
+
+/// A volume mesh.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct VolumeMesh {
+    made: Made,
+}
+
+impl VolumeMesh {
+    fn mesh(&self) -> &FeMesh {
+        &self.made.mesh
+    }
+}
+
+#[pymethods]
+impl VolumeMesh {
+    /// Of a solid: edge of the background's cubes (mm), what is meshed, order of the tetrahedra, whether it is periodic.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
+    #[pyo3(signature = (solid, edge, of="solid", order=1, periodic=false, threads=None, progress=None))]
+    fn make(
+        py: Python<'_>,
+        solid: &Solid,
+        edge: f64,
+        of: &str,
+        order: u8,
+        periodic: bool,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<VolumeMesh> {
+        let Some((_, of)) = Of::NAMES.into_iter().find(|(name, _)| *name == of) else {
+            return Err(PyValueError::new_err(format!("of is \"{of}\"; it must be solid, pore, lower, upper or all")));
+        };
+        let options = Options { edge, of, order, periodic };
+        let made = run(py, threads, progress, |p| solid.built().volume_mesh(&options, p))?;
+        Ok(VolumeMesh { made: made.map_err(error::stopped)? })
+    }
+
+    /// Nodes (n, 3), mm.
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let nodes = self.mesh().nodes.clone();
+        let n = nodes.len();
+        nodes.into_flattened().into_pyarray(py).reshape([n, 3])
+    }
+
+    /// Nodes of each tetrahedron (m, 4) or (m, 10), in the order of VTK.
+    #[getter]
+    fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let mesh = self.mesh();
+        let m = mesh.tets.len();
+        if mesh.middles.is_empty() {
+            return mesh.tets.clone().into_flattened().into_pyarray(py).reshape([m, 4]);
+        }
+        let each = mesh.tets.iter().zip(&mesh.middles);
+        let flat: Vec<u32> = each.flat_map(|(t, e)| t.iter().copied().chain(MIDDLES.map(|k| e[k]))).collect();
+        flat.into_pyarray(py).reshape([m, 10])
+    }
+
+    /// The domain of each tetrahedron, a number.
+    #[getter]
+    fn domain<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u8>> {
+        self.mesh().domain.clone().into_pyarray(py)
+    }
+
+    /// The names of the domains.
+    #[getter]
+    fn domains(&self) -> Vec<String> {
+        self.mesh().domains.clone()
+    }
+
+    /// The names of the sets.
+    #[getter]
+    fn sets(&self) -> Vec<String> {
+        self.mesh().sets.iter().map(|s| s.name.clone()).collect()
+    }
+
+    /// Nodes, tetrahedra and faces of a set; None without it.
+    fn set<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Members<'py>>> {
+        let Some(set) = self.mesh().set(name) else { return Ok(None) };
+        let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
+        let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
+        Ok(Some((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces)))
+    }
+
+    /// Periodic pairs (n, 5): node, its image, and by which periods they differ (0 or 1 along x, y, z).
+    #[getter]
+    fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let pairs = &self.mesh().pairs;
+        let flat: Vec<u32> =
+            pairs.iter().flat_map(|p| [p.node, p.image].into_iter().chain(p.along.map(u32::from))).collect();
+        flat.into_pyarray(py).reshape([pairs.len(), 5])
+    }
+
+    /// The figures, as `reports.VolumeReport`.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let figures = run(py, None, None, |_| VolumeReport::from(&self.made))?;
+        report(py, "VolumeReport", &figures)
+    }
+
+    /// The boundary of all domains together, between corners: a closed surface.
+    fn boundary(&self, py: Python<'_>) -> PyResult<Mesh> {
+        let mesh = run(py, None, None, |_| self.mesh().corners().boundary())?;
+        let cut = vec![false; mesh.triangles.len()];
+        Ok(Mesh::new(SurfaceMesh { mesh, cut }, String::new()))
+    }
+
+    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio for formats with a material.
+    #[pyo3(signature = (file, elastic=[1.0, 0.3]))]
+    fn write(&self, py: Python<'_>, file: (PathBuf, String, String), elastic: [f64; 2]) -> PyResult<()> {
+        let (path, suffix, title) = file;
+        let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
+        let format =
+            format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
+        let done = run(py, None, None, |_| {
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
+            (format.write)(self.mesh(), &FeText { title, elastic }, &mut out)?;
+            out.flush()
+        })?;
+        Ok(done?)
+    }
+}
+
+/// The formats of volume meshes: suffix, what it is.
+pub fn formats() -> Vec<(&'static str, &'static str)> {
+    FE_FORMATS.iter().map(|f| (f.suffix, f.title)).collect()
+}

@@ -1,0 +1,102 @@
+//! Figures of volume meshes.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::volume_mesh::Made;
+
+/// The figures of a volume mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct VolumeReport {
+    /// Number of tetrahedra.
+    pub elements: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// 1 for linear tetrahedra, 2 for quadratic ones.
+    pub order: usize,
+    /// Edges of the background's cubes along x, y, z, mm: the longest edges of most tetrahedra.
+    pub edge: [f64; 3],
+    /// Volume, mm³.
+    pub volume: f64,
+    /// Smallest dihedral angle, degrees; of quadratic tetrahedra between the planes of their corners.
+    pub min_angle: f64,
+    /// Greatest dihedral angle, degrees.
+    pub max_angle: f64,
+    /// Number of components connected by faces.
+    pub pieces: usize,
+    /// Greatest distance of boundary faces from the surface, mm, at their corners, edges and centroids; faces on flat cuts have none.
+    pub deviation: f64,
+    /// Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted.
+    pub straight: usize,
+    /// Volume left out, mm³: small loose components, and tetrahedra where the boundary would touch itself.
+    pub dropped: f64,
+    /// Number of nodes on upper bounding planes that are tied to their periodic images.
+    pub pairs: usize,
+    /// The domains by name.
+    pub domains: BTreeMap<String, DomainReport>,
+    /// The named sets.
+    pub sets: BTreeMap<String, SetReport>,
+}
+
+/// A domain of a volume mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DomainReport {
+    /// Number of tetrahedra.
+    pub elements: usize,
+    /// Volume, mm³; of quadratic tetrahedra that between their corners.
+    pub volume: f64,
+    /// A point inside: the centroid of its largest tetrahedron, mm.
+    pub inside: [f64; 3],
+}
+
+/// A named set of a volume mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct SetReport {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of tetrahedra.
+    pub elements: usize,
+    /// Number of faces.
+    pub faces: usize,
+}
+
+impl From<&Made> for VolumeReport {
+    fn from(made: &Made) -> VolumeReport {
+        let mesh = &made.mesh;
+        let (min_angle, max_angle) = mesh.angles();
+        let domains = mesh.domains.iter().enumerate().map(|(d, name)| {
+            let of: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| mesh.domain[*t as usize] as usize == d).collect();
+            let corners = |t: u32| mesh.tets[t as usize].map(|n| mesh.nodes[n as usize]);
+            let volume = |t: u32| geometry::tetmesh::volume(corners(t));
+            let largest = of.iter().copied().max_by(|a, b| volume(*a).total_cmp(&volume(*b)));
+            let inside = largest.map_or([f64::NAN; 3], |t| {
+                let p = corners(t);
+                core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0)
+            });
+            let report = DomainReport { elements: of.len(), volume: of.iter().map(|t| volume(*t)).sum(), inside };
+            (name.clone(), report)
+        });
+        let sets = mesh.sets.iter().map(|s| {
+            let report = SetReport { nodes: s.nodes.len(), elements: s.elements.len(), faces: s.faces.len() };
+            (s.name.clone(), report)
+        });
+        VolumeReport {
+            elements: mesh.tets.len(),
+            nodes: mesh.nodes.len(),
+            order: if mesh.middles.is_empty() { 1 } else { 2 },
+            edge: made.step,
+            volume: mesh.volume(),
+            min_angle,
+            max_angle,
+            pieces: made.pieces,
+            deviation: made.deviation,
+            straight: made.straight,
+            dropped: made.dropped,
+            pairs: mesh.pairs.len(),
+            domains: domains.collect(),
+            sets: sets.collect(),
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Volume meshes: tetrahedra of a solid, of the pore or of both, that conform to its surfaces, edges and corners.
+//!
+//! A body-centred background that ends exactly at the region's bounding planes is cut along each implicit surface in turn
+//! (`surface_cuts.rs`). Nodes know the surfaces they lie on, so that faces, feature edges and corners of the solid are faces, edges and
+//! nodes of the mesh, at any wall thickness. Shapes are then improved by moving nodes along their surfaces, by flips and by collapses, and
+//! the volume that chords cut off is balanced.
+//!
+//! Background and first cut are those of isosurface stuffing: F. Labelle, J. R. Shewchuk, ACM Transactions on Graphics 26(3), 2007.
+
+use geometry::fault::{Fault, number};
+use geometry::fe_mesh::FeMesh;
+use geometry::math::{Aabb, Vec3};
+use geometry::progress::{Progress, Stopped};
+use geometry::tetmesh::{FACES, TetMesh};
+use rayon::prelude::*;
+
+use crate::solid::Solid;
+
+mod body_centred;
+mod chord_balance;
+mod cyclic_nodes;
+mod domains;
+mod flips;
+mod mid_nodes;
+mod named_sets;
+mod node_surfaces;
+mod partition;
+mod shaping;
+mod surface_cuts;
+
+use body_centred::Cubes;
+use chord_balance::{distances, interfaces};
+use domains::Domains;
+pub use domains::Of;
+use node_surfaces::{MOST, SurfaceSet, members, only};
+use partition::{Partition, Tet};
+use shaping::{GONE, Shaping};
+
+/// Most cubes of the background.
+const CUBES: f64 = 4e9;
+
+/// How a volume mesh is made.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Edge of the background's cubes (mm): the longest edges of tetrahedra; twelve tetrahedra fill a cube.
+    pub edge: f64,
+    /// What is meshed.
+    pub of: Of,
+    /// 1 for linear tetrahedra, 2 for quadratic ones.
+    pub order: u8,
+    /// Whether nodes and faces on opposite bounding planes match.
+    pub periodic: bool,
+}
+
+/// A volume mesh and how good it is.
+#[derive(Clone, Debug)]
+pub struct Made {
+    /// The mesh.
+    pub mesh: FeMesh,
+    /// Greatest distance of its boundary from the surface (mm), at corners, edges and centroids of faces.
+    pub deviation: f64,
+    /// Edges of quadratic tetrahedra that stayed straight because a tetrahedron would be distorted.
+    pub straight: usize,
+    /// Connected components.
+    pub pieces: usize,
+    /// Volume that was left out: small components, and where the boundary would touch itself (mm³).
+    pub dropped: f64,
+    /// Edges of the background's cubes, stretched so that a whole number fits (mm).
+    pub step: Vec3,
+}
+
+/// The surfaces of the region's bounding planes: lower and upper, for each axis.
+type Planes = [[Option<usize>; 2]; 3];
+
+/// The volume mesh of a solid; `bodies` are the names of what is solid whatever the lattice says. The same for any number of threads.
+///
+/// # Errors
+/// An edge too fine; a side of what is no sheet; periodic where the solid is not; nothing to mesh; an interruption.
+pub fn volume_mesh(
+    solid: &Solid,
+    bodies: &[String],
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Made, Stopped> {
+    let domains = Domains::new(solid, options.of).map_err(Stopped::Refused)?;
+    if domains.surfaces.len() > MOST {
+        let count = domains.surfaces.len();
+        let m = format!(
+            "the design has {count} surfaces; a volume mesh takes at most {MOST}: unite keep zones, or mesh a part of it"
+        );
+        return Err(Stopped::Refused(Fault::new("design", m)));
+    }
+    let bounds = solid.region.bounds();
+    let planes = bounding_planes(&domains, &bounds);
+    let cubes = Cubes::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);
+    if cubes.count.iter().map(|n| *n as f64).product::<f64>() > CUBES {
+        let m = format!(
+            "an edge of {} mm makes more than four thousand million cubes; use a greater one",
+            number(options.edge)
+        );
+        return Err(Stopped::Refused(Fault::new("edge", m)));
+    }
+    let total = domains.surfaces.len() as u64 + 8;
+    let done = std::sync::atomic::AtomicU64::new(0);
+    let goes_on = || progress.step(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
+    let mut partition = background(&domains, &cubes, &planes);
+    if options.periodic {
+        let (p, lattice) = (&partition, domains.lattice);
+        partition.next =
+            cyclic_nodes::cycles(&cubes, &planes, &p.nodes, p.surfaces, lattice).map_err(Stopped::Refused)?;
+    }
+    let step = cubes.step().into_iter().fold(0.0, f64::max);
+    let structural: Vec<usize> = planes.iter().flatten().flatten().copied().collect();
+    for s in (0..domains.surfaces.len()).filter(|s| !structural.contains(s)) {
+        if !goes_on() {
+            return Err(Stopped::Interrupted);
+        }
+        partition.cut(s, step);
+    }
+    let (mut shaping, dropped) = prepared(partition, options);
+    if shaping.tets.is_empty() {
+        let m = format!(
+            "nothing to mesh: no tetrahedron of edge {} mm lies in it; use a smaller edge",
+            number(options.edge)
+        );
+        return Err(Stopped::Refused(Fault::new("edge", m)));
+    }
+    if !shaping.improve(&goes_on) {
+        return Err(Stopped::Interrupted);
+    }
+    if options.order == 1 {
+        shaping.balance();
+    }
+    let mut made = assembled(shaping, &domains, &planes, bodies, options);
+    (made.dropped, made.step) = (dropped, cubes.step());
+    Ok(made)
+}
+
+/// The planes at the region's bounds that all domains lie behind.
+fn bounding_planes(domains: &Domains, bounds: &Aabb) -> Planes {
+    let mut planes = [[None; 2]; 3];
+    for tree in &domains.trees {
+        tree.for_each_bounding(&mut |s| {
+            if let Some(p) = domains.surfaces[s].plane {
+                let side = usize::from(p.below);
+                if p.at == [bounds.min, bounds.max][side][p.axis] {
+                    planes[p.axis][side] = Some(s);
+                }
+            }
+        });
+    }
+    planes
+}
+
+/// The background where a domain may be, on the inner side of the bounding planes.
+fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Partition<'a> {
+    let matters = |b: &Aabb| domains.trees.iter().any(|t| t.bound(&|s| domains.surfaces[s].field.bound(b)).lo <= 0.0);
+    let (nodes, tets) = cubes.tetrahedra(&cubes.active(&matters));
+    let mut on = vec![0; nodes.len()];
+    let mut negative: SurfaceSet = 0;
+    for (axis, sides) in planes.iter().enumerate() {
+        for (side, s) in sides.iter().enumerate() {
+            let Some(s) = s else { continue };
+            negative |= only(*s);
+            let at = [cubes.bounds.min, cubes.bounds.max][side][axis];
+            on.iter_mut().zip(&nodes).filter(|(_, p)| p[axis] == at).for_each(|(on, _)| *on |= only(*s));
+        }
+    }
+    let next = (0..nodes.len() as u32).collect();
+    let tets = tets.into_iter().map(|nodes| Tet { nodes, negative, positive: 0 }).collect();
+    Partition { surfaces: &domains.surfaces, trees: &domains.trees, nodes, on, next, tets }
+}
+
+/// The cut mesh, ready to be improved: manifold, without fragments, nodes held by the surfaces of their boundary faces alone; and
+/// the volume that was left out.
+fn prepared<'a>(partition: Partition<'a>, options: &Options) -> (Shaping<'a>, f64) {
+    let mut domain = partition.domains();
+    let mut tets: Vec<[u32; 4]> = partition.tets.iter().map(|t| t.nodes).collect();
+    let mut dropped = 0.0;
+    // Of a periodic cell components hold together by images.
+    if options.of != Of::All && !options.periodic {
+        let mut mesh = TetMesh { nodes: partition.nodes.clone(), tets, zones: Vec::new() };
+        dropped = crate::mesher::repair(&mut mesh);
+        tets = mesh.tets;
+        domain = vec![0; tets.len()];
+    }
+    let mut on = vec![0; partition.on.len()];
+    for (f, ..) in interfaces(&tets, &domain) {
+        let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & partition.on[*n as usize]);
+        f.iter().for_each(|n| on[*n as usize] |= set);
+    }
+    let nodes = (partition.nodes, on, partition.next);
+    (Shaping::new(partition.surfaces, nodes, (tets, domain)), dropped)
+}
+
+/// The improved mesh with sets, pairs and, of order 2, nodes on edges.
+fn assembled(shaping: Shaping, domains: &Domains, planes: &Planes, bodies: &[String], options: &Options) -> Made {
+    let Shaping { surfaces, mut nodes, mut on, next, tets, domain, .. } = shaping;
+    let mut order: Vec<u32> = (0..tets.len() as u32).filter(|t| tets[*t as usize] != GONE).collect();
+    order.sort_by_key(|t| domain[*t as usize]);
+    let mut tets: Vec<[u32; 4]> = order.iter().map(|t| tets[*t as usize]).collect();
+    let domain: Vec<u8> = order.iter().map(|t| domain[*t as usize]).collect();
+    let next = compacted(&mut nodes, &mut on, next, &mut tets);
+    let faces = faces_on_surfaces(&tets, &domain, &on);
+    let upper = core::array::from_fn(|a| planes[a][1].map_or(0, only));
+    let mut pairs = if options.periodic { cyclic_nodes::pairs(&nodes, &on, &next, upper) } else { Vec::new() };
+    let (mut middles, mut straight) = (Vec::new(), 0);
+    let corners = nodes.len() as u32;
+    if options.order == 2 {
+        let sets: Vec<([u32; 3], SurfaceSet)> =
+            faces.iter().map(|((t, k), set, _)| (FACES[*k as usize].map(|c| tets[*t as usize][c]), *set)).collect();
+        let mids = mid_nodes::mid_nodes(surfaces, &nodes, &next, &tets, &sets);
+        if options.periodic {
+            let along = |n: u32| upper.map(|s: SurfaceSet| on[n as usize] & s != 0);
+            let tied = mid_nodes::tied(&mids, &nodes, &next, along).into_iter();
+            pairs.extend(tied.map(|p| geometry::fe_mesh::Pair {
+                node: p.node + corners,
+                image: p.image + corners,
+                ..p
+            }));
+        }
+        nodes.extend(&mids.nodes);
+        middles = mids.of.into_iter().map(|t| t.map(|n| n + corners)).collect();
+        straight = mids.straight;
+    }
+    let period = if options.periodic {
+        core::array::from_fn(|a| {
+            let at = |side: usize| planes[a][side].and_then(|s| surfaces[s].plane).map_or(0.0, |p| p.at);
+            at(1) - at(0)
+        })
+    } else {
+        [0.0; 3]
+    };
+    let names = domains.names.iter().map(|n| n.to_string()).collect();
+    let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, sets: Vec::new(), pairs, period };
+    named_sets::add_sets(&mut mesh, domains, &faces, planes, bodies);
+    let deviation = deviation(&mesh, &faces, domains);
+    let pieces = TetMesh { nodes: Vec::new(), tets: mesh.tets.clone(), zones: Vec::new() }.pieces().0;
+    Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] }
+}
+
+/// Removes nodes that no tetrahedron has; gives the cycles of images among the others.
+fn compacted(nodes: &mut Vec<Vec3>, on: &mut Vec<SurfaceSet>, next: Vec<u32>, tets: &mut [[u32; 4]]) -> Vec<u32> {
+    let mut to = vec![u32::MAX; nodes.len()];
+    tets.iter().flatten().for_each(|n| to[*n as usize] = 0);
+    let mut count = 0;
+    for n in to.iter_mut().filter(|n| **n == 0) {
+        *n = count;
+        count += 1;
+    }
+    let mut cycles = vec![0; count as usize];
+    for n in (0..to.len()).filter(|n| to[*n] != u32::MAX) {
+        let after = partition::images(&next, n as u32).skip(1).find(|m| to[*m as usize] != u32::MAX);
+        cycles[to[n] as usize] = to[after.unwrap_or(n as u32) as usize];
+        (nodes[to[n] as usize], on[to[n] as usize]) = (nodes[n], on[n]);
+    }
+    nodes.truncate(count as usize);
+    on.truncate(count as usize);
+    tets.iter_mut().flatten().for_each(|n| *n = to[*n as usize]);
+    cycles
+}
+
+/// The faces of the boundary and between domains: tetrahedron and corner, surfaces, whether only one tetrahedron has them; of two
+/// the one of the first domain.
+fn faces_on_surfaces(tets: &[[u32; 4]], domain: &[u8], on: &[SurfaceSet]) -> Vec<((u32, u8), SurfaceSet, bool)> {
+    let mut found: Vec<((u32, u8), SurfaceSet, bool)> = interfaces(tets, domain)
+        .into_par_iter()
+        .map(|(f, at, outer)| {
+            let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & on[*n as usize]);
+            ((at / 4, (at % 4) as u8), set, outer)
+        })
+        .collect();
+    found.par_sort_unstable_by_key(|f| f.0);
+    found
+}
+
+/// The greatest distance of faces from their surfaces, at corners, edges and centroids.
+fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], domains: &Domains) -> f64 {
+    let mut by_surface: Vec<(usize, (u32, u8))> = faces
+        .iter()
+        .filter_map(|(f, set, _)| {
+            let curved = |s: &usize| domains.surfaces[*s].plane.is_none();
+            members(*set).find(curved).filter(|_| members(*set).all(|s| curved(&s))).map(|s| (s, *f))
+        })
+        .collect();
+    by_surface.par_sort_unstable();
+    let greatest = |chunk: &[(usize, (u32, u8))]| {
+        let mut most = 0.0f64;
+        for same in chunk.chunk_by(|a, b| a.0 == b.0) {
+            let points: Vec<Vec3> = same
+                .iter()
+                .flat_map(|(_, f)| {
+                    let [p, q, r] = mesh.face(*f).map(|n| mesh.nodes[n as usize]);
+                    let mean = |of: &[Vec3]| -> Vec3 {
+                        core::array::from_fn(|k| of.iter().map(|p| p[k]).sum::<f64>() / of.len() as f64)
+                    };
+                    match mesh.face_middles(*f) {
+                        Some(m) => {
+                            let [a, b, c] = m.map(|n| mesh.nodes[n as usize]);
+                            // The centroid of a quadratic triangle.
+                            let at = core::array::from_fn(|k| (4.0 * (a[k] + b[k] + c[k]) - p[k] - q[k] - r[k]) / 9.0);
+                            [p, q, r, a, b, c, at]
+                        }
+                        None => [p, q, r, mean(&[p, q]), mean(&[q, r]), mean(&[p, r]), mean(&[p, q, r])],
+                    }
+                })
+                .collect();
+            most = distances(&domains.surfaces[same[0].0], &points).fold(most, |m, d| m.max(d.abs()));
+        }
+        most
+    };
+    by_surface.par_chunks(256).map(greatest).reduce(|| 0.0, f64::max)
+}

@@ -1,0 +1,118 @@
+//! Nodes of the boundary shifted so that the volume between its flat faces and the surface balances.
+//!
+//! A chord cuts a corner: the volume between a triangle and the surface is, to fourth order, a third of its area times the sum
+//! of the distances at the midpoints of its edges (the rule is exact for quadratics). Each node moves along the normal by the mean
+//! distance over the faces around it, which moves as much volume.
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::node_surfaces::{SurfaceSet, balanced, members};
+use super::partition::images;
+use super::shaping::{GONE, GOOD, Shaping};
+use crate::implicit::Surface;
+use crate::mesher::shape;
+use geometry::math::{Vec3, add, cross, norm, scale, sub};
+use geometry::tetmesh::FACES;
+
+/// Faces of the boundary and between domains, each once: its nodes, four times its tetrahedron (of the first domain) and the opposite
+/// corner, and whether no other tetrahedron has it.
+pub(super) fn interfaces(tets: &[[u32; 4]], domain: &[u8]) -> Vec<([u32; 3], u32, bool)> {
+    let mut faces: Vec<([u32; 3], u32)> = tets
+        .par_iter()
+        .enumerate()
+        .filter(|(_, t)| **t != GONE)
+        .flat_map_iter(|(i, t)| {
+            FACES.iter().enumerate().map(move |(k, f)| {
+                let mut key = f.map(|c| t[c]);
+                key.sort_unstable();
+                (key, (4 * i + k) as u32)
+            })
+        })
+        .collect();
+    faces.par_sort_unstable();
+    let differs =
+        |same: &[([u32; 3], u32)]| same.len() == 1 || domain[same[0].1 as usize / 4] != domain[same[1].1 as usize / 4];
+    let first = |same: &[([u32; 3], u32)]| {
+        let at = same.iter().map(|f| f.1).min_by_key(|f| (domain[*f as usize / 4], *f)).unwrap_or(0);
+        (same[0].0, at, same.len() == 1)
+    };
+    faces.chunk_by(|a, b| a.0 == b.0).filter(|same| differs(same)).map(first).collect()
+}
+
+/// Signed distances of points from a surface, to first order.
+pub(super) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Item = f64> + use<> {
+    let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    surface.field.gradients(points, &mut v, &mut g);
+    v.into_iter().zip(g).map(|(v, g)| v / norm(g).max(f64::MIN_POSITIVE))
+}
+
+impl Shaping<'_> {
+    /// Shifts nodes on curved surfaces so that the volume of each domain is right to fourth order.
+    pub fn balance(&mut self) {
+        let faces = interfaces(&self.tets, &self.domain);
+        // (surface, edge) of each face on a curved surface.
+        let of = |f: &[u32; 3]| {
+            let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
+            let curved = members(set).find(|s| self.surfaces[*s].plane.is_none());
+            curved.filter(|_| members(set).all(|s| self.surfaces[s].plane.is_none()))
+        };
+        let faces: Vec<([u32; 3], usize)> = faces.par_iter().filter_map(|(f, ..)| of(f).map(|s| (*f, s))).collect();
+        let mut edges: Vec<(usize, [u32; 2])> =
+            faces.par_iter().flat_map_iter(|([a, b, c], s)| [[*a, *b], [*a, *c], [*b, *c]].map(|e| (*s, e))).collect();
+        edges.par_sort_unstable();
+        edges.dedup();
+        let found: Vec<f64> = edges
+            .par_chunks(256)
+            .flat_map_iter(|chunk| {
+                let mut out = Vec::with_capacity(chunk.len());
+                for same in chunk.chunk_by(|a, b| a.0 == b.0) {
+                    let at = |n: u32| self.nodes[n as usize];
+                    let points: Vec<Vec3> = same.iter().map(|(_, [a, b])| scale(add(at(*a), at(*b)), 0.5)).collect();
+                    out.extend(distances(&self.surfaces[same[0].0], &points));
+                }
+                out
+            })
+            .collect();
+        let distance = |s: usize, e: [u32; 2]| edges.binary_search(&(s, e)).map_or(0.0, |i| found[i]);
+        // (area, area times mean distance) at each node on each surface, added in the order of the faces.
+        let mut sums: FxHashMap<(u32, usize), [f64; 2]> = FxHashMap::default();
+        for ([a, b, c], s) in &faces {
+            let [p, q, r] = [a, b, c].map(|n| self.nodes[*n as usize]);
+            let area = norm(cross(sub(q, p), sub(r, p)));
+            let mean = (distance(*s, [*a, *b]) + distance(*s, [*a, *c]) + distance(*s, [*b, *c])) / 3.0;
+            for n in [a, b, c] {
+                let first = images(&self.next, *n).min().unwrap_or(*n);
+                let sum = sums.entry((first, *s)).or_default();
+                *sum = [sum[0] + area, sum[1] + area * mean];
+            }
+        }
+        let mut at: Vec<((u32, usize), [f64; 2])> = sums.into_iter().collect();
+        at.sort_unstable_by_key(|a| a.0);
+        let by_node: Vec<&[((u32, usize), [f64; 2])]> = at.chunk_by(|a, b| a.0.0 == b.0.0).collect();
+        let shifts: Vec<(u32, Vec3)> = by_node
+            .par_iter()
+            .filter_map(|of| {
+                let n = of[0].0.0;
+                let wanted: Vec<(usize, f64)> = of.iter().map(|((_, s), [area, sum])| (*s, -sum / area)).collect();
+                let by = balanced(self.surfaces, self.on[n as usize], self.nodes[n as usize], &wanted)?;
+                Some((n, by))
+            })
+            .collect();
+        for (n, by) in shifts {
+            let all: Vec<u32> = images(&self.next, n).collect();
+            let shifted = |s: &Self| {
+                let of = all.iter().flat_map(|n| s.around[*n as usize].iter());
+                of.map(|t| shape(s.corners(*t)) / s.shapes[*t as usize].min(GOOD)).fold(f64::INFINITY, f64::min)
+            };
+            all.iter().for_each(|n| self.nodes[*n as usize] = add(self.nodes[*n as usize], by));
+            // No shape below GOOD gets worse.
+            if shifted(self) < 1.0 {
+                all.iter().for_each(|n| self.nodes[*n as usize] = sub(self.nodes[*n as usize], by));
+            }
+        }
+        let nodes = &self.nodes;
+        let shape_of = |t: &[u32; 4]| if *t == GONE { f64::INFINITY } else { shape(t.map(|n| nodes[n as usize])) };
+        self.shapes = self.tets.par_iter().map(shape_of).collect();
+    }
+}

@@ -1,0 +1,83 @@
+//! What is meshed: domains over common surfaces, and whose each surface is.
+
+use crate::csg_tree::{CsgSolid, CsgTree};
+use crate::implicit::Surface;
+use crate::solid::{Solid, Space};
+use geometry::fault::Fault;
+
+/// What is meshed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// The solid.
+    Solid,
+    /// What is left of the region.
+    Pore,
+    /// The space on the lower side of a sheet.
+    Lower,
+    /// The space on the upper side of a sheet.
+    Upper,
+    /// All of the region: the wall and both spaces of a sheet, else solid and pore, with common nodes.
+    All,
+}
+
+impl Of {
+    /// All, by their names.
+    pub const NAMES: [(&'static str, Of); 5] =
+        [("solid", Of::Solid), ("pore", Of::Pore), ("lower", Of::Lower), ("upper", Of::Upper), ("all", Of::All)];
+}
+
+/// Domains over common surfaces; no two overlap.
+pub(super) struct Domains {
+    pub names: Vec<&'static str>,
+    pub surfaces: Vec<Surface>,
+    pub trees: Vec<CsgTree>,
+    /// The number of surfaces of the region, which come first.
+    pub region: usize,
+    /// The number of the first surface of the lattice, which come last.
+    pub lattice: usize,
+    /// What is solid whatever the lattice says.
+    pub filled: Vec<CsgSolid>,
+}
+
+impl Domains {
+    /// # Errors
+    /// A side of what is no sheet.
+    pub fn new(solid: &Solid, of: Of) -> Result<Domains, Fault> {
+        let sheet = solid.field.as_ref().is_some_and(|f| f.faces().is_some());
+        let (names, surfaces, trees) = match of {
+            Of::Lower | Of::Upper | Of::All if sheet || of != Of::All => {
+                let spaces = solid.spaces().map_err(|f| Fault { at: "of".into(), ..f })?;
+                let chosen: &[Space] = match of {
+                    Of::Lower => &[Space::Lower],
+                    Of::Upper => &[Space::Upper],
+                    _ => &Space::ALL,
+                };
+                let names = chosen.iter().map(|s| ["WALL", "LOWER", "UPPER"][*s as usize]).collect();
+                let trees = chosen.iter().map(|s| spaces.trees[*s as usize].clone()).collect();
+                (names, spaces.surfaces, trees)
+            }
+            _ => {
+                let (surfaces, tree) = solid.surfaces();
+                let region = surfaces.iter().take_while(|s| s.cut).count();
+                let pore = CsgTree::Intersection(vec![region_of(&tree, region), tree.clone().inverse()]);
+                match of {
+                    Of::Solid => (vec!["SOLID"], surfaces, vec![tree]),
+                    Of::Pore => (vec!["PORE"], surfaces, vec![pore]),
+                    _ => (vec!["SOLID", "PORE"], surfaces, vec![tree, pore]),
+                }
+            }
+        };
+        let region = surfaces.iter().take_while(|s| s.cut).count();
+        let filled: Vec<CsgSolid> = if solid.field.is_some() { solid.filled.clone() } else { Vec::new() };
+        let lattice = region + filled.iter().map(|b| b.surfaces.len()).sum::<usize>();
+        Ok(Domains { names, surfaces, trees, region, lattice, filled })
+    }
+}
+
+/// The part of a solid's tree that is the region: its first member, which names the first `count` surfaces.
+fn region_of(tree: &CsgTree, count: usize) -> CsgTree {
+    match tree {
+        CsgTree::Intersection(of) if count > 0 => of.first().cloned().unwrap_or(CsgTree::FULL),
+        _ => CsgTree::FULL,
+    }
+}
