@@ -192,6 +192,12 @@ PLAIN = option("--voxels", action="store_true", help="plain voxels: solid if the
 WRITTEN = ", ".join(f".{suffix}" + (" (binary)" if row.binary else "") for suffix, row in MESHES.items() if row.writes)
 DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for standard input", "DESIGN", True)
 DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
+MEASURED = file(
+    "file",
+    (*DESIGNS, *MESH_READS, *TET_READS),
+    "a design, a mesh or a file of tetrahedra; - is a design on standard input",
+    stdin=True,
+)
 JSON = option("--json", action="store_true", help="print the figures as JSON on stdout")
 THREADS = option("--threads", type=COUNT, metavar="N", help="threads (default: all); the result is the same for any number")
 PROGRESS = option(
@@ -436,11 +442,12 @@ COMMANDS = {
         "A design is measured while it is meshed, tile by tile; with --region or --thickness it is held in memory.\n"
         "A mesh file has a solid fraction and pores only against a region.\n"
         "For a design with a blend the transitions are printed too: pieces, loose and weakly attached components, necks.\n"
+        "Of a file of tetrahedra: elements, volume, dihedral angles, sets.\n"
         "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
         "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
         "  trabecula measure part.toml --thickness --step 0.05 --histogram part.svg",
-        DESIGN_OR_MESH,
+        MEASURED,
         file(
             "--region",
             (*DESIGNS, *MESH_READS),

@@ -12,7 +12,7 @@ from .camera import VIEWS, section_plane, towards
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, is_design, kind_of
+from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, TET_READS, is_design, kind_of
 from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, stdin_text, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -362,6 +362,8 @@ def volume(args) -> None:
 def measure(args) -> None:
     """``trabecula measure``."""
     check_measure(args)
+    if kind_of(args.file) in TET_READS:
+        return measure_tets(args)
     solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:
         raise Refused("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
@@ -409,6 +411,37 @@ def measure(args) -> None:
     print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
     for transition in found:
         print(transition)
+
+
+def measure_tets(args) -> None:
+    """``trabecula measure`` of a file of tetrahedra: volume, dihedral angles, sets of elements."""
+    import numpy as np
+
+    from .tets import TetMesh
+
+    if args.region or args.thickness or args.dangling or args.transitions or args.edge or args.per_cell:
+        raise Refused(f"{args.file} holds tetrahedra: of the options --json alone applies")
+    made = TetMesh.read(args.file, split=True)
+    quality = made.report().quality
+    zones = np.asarray(made.zones)
+    sets = {name: {"elements": int(np.isin(zones, numbers).sum())} for name, numbers in made.zone_names.items()}
+    figures = {
+        "elements": quality.tets,
+        "nodes": quality.nodes,
+        "volume": quality.volume,
+        "min_angle": quality.dihedral.min,
+        "max_angle": quality.dihedral.max,
+        "pieces": quality.pieces,
+        "bounds": quality.bounds,
+        "sets": sets,
+    }
+    settle()
+    if args.json:
+        return put_json(figures | {"warnings": warned()})
+    print(f"{quality.tets} tetrahedra, {quality.nodes} nodes, volume {figure(quality.volume)} mm³")
+    print(f"dihedral angles {quality.dihedral.min:.2f} to {quality.dihedral.max:.2f} degrees, pieces {quality.pieces}")
+    for name, of in sets.items():
+        print(f"set {name}: {of['elements']} elements")
 
 
 def check_measure(args) -> None:

@@ -651,7 +651,8 @@ class Solid(Seen):
         """Tetrahedra that conform to all surfaces, edges and corners of the solid, for finite elements.
 
         One size: ``edge`` (mm), the longest edge of most tetrahedra; ``per_cell``, edges along the smallest wavelength;
-        ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the wavelength.
+        ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the
+        wavelength.
 
         ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Linear ones have the volume of the
         solid to fourth order: their nodes are shifted off curved surfaces by about half the distance of a chord.
@@ -708,8 +709,8 @@ class Solid(Seen):
         # Four of a tetrahedron's six edges are shorter than the longest, by half the root of three.
         if SHORT_EDGE * size > thin:
             raise ValueError(
-                f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at {where};"
-                f" use {rounded_down(thin / SHORT_EDGE):g} mm or less"
+                f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at "
+                f"{where}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
             )
         if size > self.wavelength / 4:
             raise ValueError(f"an edge of {size:.4g} mm is more than a quarter of the wavelength, {self.wavelength:g} mm")

@@ -12,12 +12,14 @@ use geometry::fe_mesh::FeMesh;
 use geometry::math::{Aabb, Vec3};
 use geometry::progress::{Progress, Stopped};
 use geometry::tetmesh::{FACES, TetMesh};
+use geometry::union_find::unite;
 use rayon::prelude::*;
 
 use crate::solid::Solid;
 
 mod body_centred;
 mod chord_balance;
+mod crease_nodes;
 mod cyclic_nodes;
 mod domains;
 mod flips;
@@ -32,7 +34,7 @@ use body_centred::Cubes;
 use chord_balance::{distances, interfaces};
 use domains::Domains;
 pub use domains::Of;
-use node_surfaces::{MOST, SurfaceSet, members, only};
+use node_surfaces::{HELD, MOST, SurfaceSet, members, only};
 use partition::{Partition, Tet};
 use shaping::{GONE, Shaping};
 
@@ -125,6 +127,9 @@ pub fn volume_mesh(
         );
         return Err(Stopped::Refused(Fault::new("edge", m)));
     }
+    if !options.periodic {
+        shaping.follow_creases(step);
+    }
     if !shaping.improve(&goes_on) {
         return Err(Stopped::Interrupted);
     }
@@ -177,20 +182,61 @@ fn prepared<'a>(partition: Partition<'a>, options: &Options) -> (Shaping<'a>, f6
     let mut domain = partition.domains();
     let mut tets: Vec<[u32; 4]> = partition.tets.iter().map(|t| t.nodes).collect();
     let mut dropped = 0.0;
+    let mut faces = interfaces(&tets, &domain, &|n| partition.on[n as usize] != 0);
     // Of a periodic cell components hold together by images.
-    if options.of != Of::All && !options.periodic {
+    let one = options.of != Of::All && !options.periodic;
+    if one && (components(&tets, partition.nodes.len()) > 1 || pinched(&faces)) {
         let mut mesh = TetMesh { nodes: partition.nodes.clone(), tets, zones: Vec::new() };
         dropped = crate::mesher::repair(&mut mesh);
         tets = mesh.tets;
         domain = vec![0; tets.len()];
+        faces = interfaces(&tets, &domain, &|_| true);
     }
     let mut on = vec![0; partition.on.len()];
-    for (f, ..) in interfaces(&tets, &domain) {
+    for (f, ..) in faces {
         let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & partition.on[*n as usize]);
-        f.iter().for_each(|n| on[*n as usize] |= set);
+        f.iter().for_each(|n| on[*n as usize] |= if set == 0 { HELD } else { set });
     }
     let nodes = (partition.nodes, on, partition.next);
     (Shaping::new(partition.surfaces, nodes, (tets, domain)), dropped)
+}
+
+/// The number of components that are connected by nodes.
+fn components(tets: &[[u32; 4]], nodes: usize) -> usize {
+    let mut root: Vec<u32> = (0..nodes as u32).collect();
+    let mut used = vec![false; nodes];
+    for t in tets {
+        t.iter().for_each(|n| used[*n as usize] = true);
+        for n in &t[1..] {
+            unite(&mut root, t[0], *n);
+        }
+    }
+    (0..nodes as u32).filter(|n| used[*n as usize] && root[*n as usize] == *n).count()
+}
+
+/// Whether the boundary touches itself: by Euler's formula for the faces around each node, which are one fan unless a node has more
+/// edges than faces, or an edge more than two faces.
+fn pinched(faces: &[([u32; 3], u32, bool)]) -> bool {
+    // (node, opposite edge) of each face.
+    let mut links: Vec<(u32, [u32; 2])> =
+        faces.par_iter().flat_map_iter(|([a, b, c], ..)| [(*a, [*b, *c]), (*b, [*a, *c]), (*c, [*a, *b])]).collect();
+    links.par_sort_unstable();
+    let by_node: Vec<&[(u32, [u32; 2])]> = links.chunk_by(|a, b| a.0 == b.0).collect();
+    by_node.par_iter().any(|link| {
+        // One closed cycle through the neighbours?
+        let mut at = link[0].1[1];
+        let mut before = 0;
+        for count in 1..=link.len() {
+            let next = (0..link.len()).find(|i| *i != before && link[*i].1.contains(&at));
+            if at == link[0].1[0] {
+                return count != link.len();
+            }
+            let Some(i) = next else { return true };
+            let [p, q] = link[i].1;
+            (at, before) = (if p == at { q } else { p }, i);
+        }
+        true
+    })
 }
 
 /// The improved mesh with sets, pairs and, of order 2, nodes on edges.
@@ -235,7 +281,7 @@ fn assembled(shaping: Shaping, domains: &Domains, planes: &Planes, bodies: &[Str
     let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, sets: Vec::new(), pairs, period };
     named_sets::add_sets(&mut mesh, domains, &faces, planes, bodies);
     let deviation = deviation(&mesh, &faces, domains);
-    let pieces = TetMesh { nodes: Vec::new(), tets: mesh.tets.clone(), zones: Vec::new() }.pieces().0;
+    let pieces = components(&mesh.tets, mesh.nodes.len());
     Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] }
 }
 
@@ -263,7 +309,7 @@ fn compacted(nodes: &mut Vec<Vec3>, on: &mut Vec<SurfaceSet>, next: Vec<u32>, te
 /// The faces of the boundary and between domains: tetrahedron and corner, surfaces, whether only one tetrahedron has them; of two
 /// the one of the first domain.
 fn faces_on_surfaces(tets: &[[u32; 4]], domain: &[u8], on: &[SurfaceSet]) -> Vec<((u32, u8), SurfaceSet, bool)> {
-    let mut found: Vec<((u32, u8), SurfaceSet, bool)> = interfaces(tets, domain)
+    let mut found: Vec<((u32, u8), SurfaceSet, bool)> = interfaces(tets, domain, &|n| on[n as usize] != 0)
         .into_par_iter()
         .map(|(f, at, outer)| {
             let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & on[*n as usize]);
@@ -311,3 +357,7 @@ fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], domains: &D
     };
     by_surface.par_chunks(256).map(greatest).reduce(|| 0.0, f64::max)
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

@@ -16,14 +16,19 @@ use geometry::math::{Vec3, add, cross, norm, scale, sub};
 use geometry::tetmesh::FACES;
 
 /// Faces of the boundary and between domains, each once: its nodes, four times its tetrahedron (of the first domain) and the opposite
-/// corner, and whether no other tetrahedron has it.
-pub(super) fn interfaces(tets: &[[u32; 4]], domain: &[u8]) -> Vec<([u32; 3], u32, bool)> {
+/// corner, and whether no other tetrahedron has it. Only faces whose nodes all `may` be on one are searched.
+pub(super) fn interfaces(
+    tets: &[[u32; 4]],
+    domain: &[u8],
+    may: &(impl Fn(u32) -> bool + Sync),
+) -> Vec<([u32; 3], u32, bool)> {
     let mut faces: Vec<([u32; 3], u32)> = tets
         .par_iter()
         .enumerate()
         .filter(|(_, t)| **t != GONE)
         .flat_map_iter(|(i, t)| {
-            FACES.iter().enumerate().map(move |(k, f)| {
+            let on = t.map(may);
+            FACES.iter().enumerate().filter(move |(_, f)| f.iter().all(|c| on[*c])).map(move |(k, f)| {
                 let mut key = f.map(|c| t[c]);
                 key.sort_unstable();
                 (key, (4 * i + k) as u32)
@@ -50,7 +55,7 @@ pub(super) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Ite
 impl Shaping<'_> {
     /// Shifts nodes on curved surfaces so that the volume of each domain is right to fourth order.
     pub fn balance(&mut self) {
-        let faces = interfaces(&self.tets, &self.domain);
+        let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
         // (surface, edge) of each face on a curved surface.
         let of = |f: &[u32; 3]| {
             let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);

@@ -3,7 +3,7 @@
 //!
 //! The triangulation of the ring is optimal by dynamic programming (Klincsek 1980; Freitag, Ollivier-Gooch 1997).
 
-use super::node_surfaces::SurfaceSet;
+use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use crate::mesher::shape;
 use geometry::math::{norm, sub};
@@ -193,7 +193,7 @@ impl Shaping<'_> {
     /// Collapses the edge from `n` to `m`, onto `m`, if that improves the worst shape at `n`.
     fn collapse(&mut self, n: u32, m: u32) -> bool {
         let [on_n, on_m] = [n, m].map(|n| self.on[n as usize]);
-        if on_n & !on_m != 0 || self.next[n as usize] != n {
+        if on_n & (!on_m | HELD) != 0 || self.next[n as usize] != n {
             return false;
         }
         let at = self.at_edge([n, m]);
@@ -276,7 +276,7 @@ impl Shaping<'_> {
     }
 
     /// Replaces tetrahedra by others, of these domains; the numbers of those that are gone are used again.
-    fn replace_each(&mut self, gone: &[u32], made: &[[u32; 4]], domains: &[u8]) {
+    pub fn replace_each(&mut self, gone: &[u32], made: &[[u32; 4]], domains: &[u8]) {
         for t in gone {
             for n in core::mem::replace(&mut self.tets[*t as usize], GONE) {
                 self.around[n as usize].retain(|o| o != t);

@@ -18,8 +18,6 @@ const LEAST: f64 = 0.2;
 /// What was made.
 pub(super) struct MidNodes {
     pub nodes: Vec<Vec3>,
-    /// The surfaces of each.
-    pub on: Vec<SurfaceSet>,
     /// The edge of each, by corners.
     pub edges: Vec<[u32; 2]>,
     /// Those of each tetrahedron, numbered from 0, in the order of `EDGES`.
@@ -100,7 +98,7 @@ pub(super) fn mid_nodes(
         all.into_iter().for_each(|e| shifts[e as usize] = [0.0; 3]);
     }
     let nodes = edges.iter().zip(&shifts).map(|(e, by)| add(middle(*e), *by)).collect();
-    MidNodes { nodes, on, edges, of, straight }
+    MidNodes { nodes, edges, of, straight }
 }
 
 /// Pairs of edges' nodes, numbered from 0: each is tied to that of the image that lies in no upper plane. `along` says in which upper

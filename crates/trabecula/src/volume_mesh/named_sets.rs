@@ -2,7 +2,7 @@
 
 use super::cyclic_nodes::PLANES;
 use super::domains::Domains;
-use super::node_surfaces::{SurfaceSet, only};
+use super::node_surfaces::{HELD, SurfaceSet, only};
 use crate::field::Field;
 use geometry::fe_mesh::{FeMesh, FeSet};
 use geometry::math::{Vec3, add, scale};
@@ -17,9 +17,9 @@ pub(super) fn add_sets(
     planes: &[[Option<usize>; 2]; 3],
     bodies: &[String],
 ) {
-    let below = |n: usize| if n >= 128 { SurfaceSet::MAX } else { (1 << n) - 1 };
+    let below = |n: usize| -> SurfaceSet { (1 << n) - 1 };
     let region = below(domains.region);
-    let lattice = !below(domains.lattice);
+    let lattice = !below(domains.lattice) & !HELD;
     let several = domains.names.len() > 1;
     for (axis, sides) in planes.iter().enumerate() {
         for (side, s) in sides.iter().enumerate() {

@@ -4,7 +4,9 @@ use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, dot, inverse, norm, scale, sub};
 
 /// Most surfaces of a solid.
-pub(super) const MOST: usize = 128;
+pub(super) const MOST: usize = 127;
+/// The set of nodes that stay where they are: where tetrahedra were removed, the boundary follows no surface.
+pub(super) const HELD: SurfaceSet = 1 << MOST;
 /// Newton steps.
 const STEPS: usize = 12;
 /// Greatest distance from a surface left out for its dependent gradient, as a fraction of the reach.
@@ -93,7 +95,7 @@ fn exact(surfaces: &[Surface], set: SurfaceSet, mut p: Vec3) -> Vec3 {
 /// The position on all surfaces of a set near `p`, by Newton's method with shortest steps; `None` if it is farther than
 /// `reach` (mm) from `p`, or there are more than three surfaces.
 pub(super) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -> Option<Vec3> {
-    if set.count_ones() > 3 {
+    if set.count_ones() > 3 || set & HELD != 0 {
         return None;
     }
     let mut q = exact(surfaces, set, p);
@@ -115,6 +117,9 @@ pub(super) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -
 
 /// The part of a displacement that is tangent to all surfaces of a set at `p`.
 pub(super) fn tangent(surfaces: &[Surface], set: SurfaceSet, p: Vec3) -> Tangent {
+    if set & HELD != 0 {
+        return Tangent::Fixed;
+    }
     let (of, n) = sampled(surfaces, set, p);
     let unit = |g: Vec3| {
         let l = norm(g);
@@ -155,6 +160,9 @@ impl Tangent {
 
 /// The displacement of a node on a set of surfaces by given distances (mm) along their gradients; nothing along those without.
 pub(super) fn balanced(surfaces: &[Surface], set: SurfaceSet, p: Vec3, wanted: &[(usize, f64)]) -> Option<Vec3> {
+    if set & HELD != 0 {
+        return None;
+    }
     let (mut of, n) = sampled(surfaces, set, p);
     for (i, s) in members(set).take(3).enumerate() {
         let by = wanted.iter().find(|w| w.0 == s).map_or(0.0, |w| w.1);

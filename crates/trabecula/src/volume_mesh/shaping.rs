@@ -11,8 +11,10 @@ use geometry::tetmesh::FACES;
 
 /// Shapes better than this are left as they are: dihedral angles of 22 to 149 degrees.
 pub(super) const GOOD: f64 = 4.2;
+/// For shapes worse than this all directions are tried: dihedral angles of 15 to 159 degrees.
+const POOR: f64 = 1.9;
 /// Rounds of moves, collapses and flips.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 8;
 /// Passes of moves in each.
 const PASSES: usize = 3;
 /// Step lengths tried, as fractions of the mean edge at the node.
@@ -166,9 +168,12 @@ impl<'a> Shaping<'a> {
         let along = tangent(self.surfaces, on, start);
         let (directions, edge) = directions;
         let (mut best, mut best_by) = (before * GAIN, None);
+        let many = if before < POOR { 26 } else { 0 };
+        let everywhere = (0..27).filter(|i| *i != 13).take(many).map(|i: i32| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
+        let everywhere: Vec<Vec3> = everywhere.map(|d| d.map(f64::from)).collect();
         for step in STEPS {
-            for d in directions {
-                let d = along.part(d);
+            for d in directions.iter().chain(&everywhere) {
+                let d = along.part(*d);
                 let length = norm(d);
                 if length < 1e-3 {
                     continue;

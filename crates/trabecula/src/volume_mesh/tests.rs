@@ -1,0 +1,96 @@
+//! Laws of volume meshes.
+
+use super::*;
+use crate::design::{Design, NoFiles};
+use geometry::progress::Silent;
+
+fn built(region: &str, cell: &str, part: &str) -> crate::design::Built {
+    let text = format!(
+        "schema = 1\nunits = \"mm\"\nregion.{region}\n[lattice.a]\ncell = \"{cell}\"\npart = \"{part}\"\n\
+         map.affine.wavelength = 4\nlevel.fraction = 0.3\n"
+    );
+    Design::from_toml(&text).and_then(|d| d.build(&NoFiles)).expect("a design")
+}
+
+fn made(region: &str, options: &Options) -> Made {
+    built(region, "gyroid", "sheet").volume_mesh(options, &Silent).expect("a mesh")
+}
+
+const BOX: &str = "box = { min = [0, 0, 0], max = [4, 4, 4] }";
+
+fn options(edge: f64) -> Options {
+    Options { edge, of: Of::Solid, order: 1, periodic: false }
+}
+
+#[test]
+fn meshes_conform_and_do_not_intersect_themselves() {
+    for region in
+        [BOX, "sphere.radius = 2.2", "cylinder = { base = [0, 0, 0], axis = [1, 1, 2], radius = 2, height = 3 }"]
+    {
+        let mesh = made(region, &options(0.25)).mesh;
+        let (_, checked) = mesh.corners().checked().expect("a mesh without mistakes");
+        assert_eq!((checked.pinched, checked.turned, checked.unused), (0, false, 0), "{region}");
+        let (least, most) = mesh.angles();
+        assert!(least > 12.0 && most < 160.0, "{region}: {least} {most}");
+    }
+}
+
+#[test]
+fn the_volume_is_of_fourth_order() {
+    let off = |edge: f64| {
+        let made = made(BOX, &Options { periodic: true, ..options(edge) });
+        (made.mesh.volume() / 19.2 - 1.0).abs()
+    };
+    // A third of the edge would divide it by 81; half of that shows the order.
+    let (coarse, fine) = (off(4.0 / 12.0), off(4.0 / 36.0));
+    assert!(coarse < 1e-3 && fine < coarse / 40.0, "{coarse:e} {fine:e}");
+}
+
+#[test]
+fn nodes_on_curved_surfaces_of_quadratic_meshes_lie_on_them() {
+    let design = built(BOX, "gyroid", "sheet");
+    let made = design.volume_mesh(&Options { order: 2, ..options(0.3) }, &Silent).expect("a mesh");
+    let mesh = made.mesh;
+    let lattice = mesh.set("LATTICE").expect("its own surface");
+    let points: Vec<Vec3> = lattice.nodes.iter().map(|n| mesh.nodes[*n as usize]).collect();
+    let mut values = vec![0.0; points.len()];
+    crate::field::Field::values(&design.solid, &points, &mut values);
+    let on = values.iter().filter(|v| v.abs() < 1e-9).count();
+    assert!(on + made.straight >= points.len(), "{on} of {}, {} straight", points.len(), made.straight);
+    // The least det J at corners and edges is the fifth of the straight one's that is asked for.
+    for i in 0..mesh.tets.len() {
+        assert!((0..4).all(|c| mesh.jacobian(i, core::array::from_fn(|k| f64::from(u8::from(k == c)))) > 0.0));
+    }
+}
+
+#[test]
+fn domains_fill_the_region() {
+    for (cell, part, names) in [("gyroid", "sheet", 3), ("primitive", "lower", 2)] {
+        let all = Options { of: Of::All, ..options(0.3) };
+        let mesh = built(BOX, cell, part).volume_mesh(&all, &Silent).expect("a mesh").mesh;
+        // Sums of a hundred thousand volumes.
+        assert!((mesh.volume() - 64.0).abs() < 1e-10 && mesh.domains.len() == names);
+        assert!(mesh.domain.windows(2).all(|d| d[0] <= d[1]));
+    }
+}
+
+#[test]
+fn edges_of_a_mesh_region_are_edges_of_the_mesh() {
+    // A cube, turned so that no plane of it is one of the grid, given by its triangles.
+    use crate::region::Region;
+    use geometry::mesh::Mesh;
+    let cube = geometry::tetmesh::TetMesh {
+        nodes: (0..8).map(|i| core::array::from_fn(|a| f64::from(i >> a & 1) * 3.0)).collect(),
+        tets: geometry::tetmesh::CUBE.map(|t| t.map(|i| i as u32)).to_vec(),
+        zones: Vec::new(),
+    };
+    let turn = geometry::math::rotation([20.0, 30.0, 40.0]);
+    let Mesh { vertices, triangles } = cube.boundary();
+    let turned = Mesh { vertices: vertices.iter().map(|p| geometry::math::apply(&turn, *p)).collect(), triangles };
+    let region: Region =
+        std::sync::Arc::new(crate::region::MeshRegion::new(turned, geometry::repair::Repair::Auto).expect("closed"));
+    let solid = Solid::new(region, None, 3.0);
+    let made = volume_mesh(&solid, &[], &options(0.3), &Silent).expect("a mesh");
+    // Edges and corners are kept: nothing is cut off but where a tetrahedron would be badly shaped.
+    assert!((made.mesh.volume() / 27.0 - 1.0).abs() < 2e-4, "{}", made.mesh.volume());
+}
