@@ -194,7 +194,7 @@ DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for stand
 DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
 MEASURED = file(
     "file",
-    (*DESIGNS, *MESH_READS, *TET_READS),
+    (*DESIGNS, *MESH_READS, *VOLUME_WRITES),
     "a design, a mesh or a file of tetrahedra; - is a design on standard input",
     stdin=True,
 )

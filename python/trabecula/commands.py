@@ -12,7 +12,7 @@ from .camera import VIEWS, section_plane, towards
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, TET_READS, is_design, kind_of
+from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, VOLUME_WRITES, is_design, kind_of
 from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, stdin_text, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -362,7 +362,7 @@ def volume(args) -> None:
 def measure(args) -> None:
     """``trabecula measure``."""
     check_measure(args)
-    if kind_of(args.file) in TET_READS:
+    if kind_of(args.file) in VOLUME_WRITES:
         return measure_tets(args)
     solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:

@@ -123,10 +123,17 @@ impl Shaping<'_> {
             }
             let corner = index.creases.corners.iter().map(|c| (norm(sub(c.0, p)), c.0));
             let corner = corner.filter(|c| c.0 < reach && self.on[n] == only(s)).min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((off, at)) = corner {
-                moves.push((0, off, n, at));
-            } else if let Some(at) = index.meeting(p, self.on[n] & !only(s), self.surfaces, reach) {
-                moves.push((1, norm(sub(at, p)), n, at));
+            let found = match corner {
+                Some((off, at)) => Some((0, off, at)),
+                None => {
+                    let at = index.meeting(p, self.on[n] & !only(s), self.surfaces, reach);
+                    at.map(|at| (1, norm(sub(at, p)), at))
+                }
+            };
+            if let Some((rank, off, at)) = found
+                && !self.crosses(&self.around[n], self.on[n], p, at)
+            {
+                moves.push((rank, off, n, at));
             }
         }
         moves.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
@@ -144,6 +151,16 @@ impl Shaping<'_> {
                 self.shapes[t as usize] = shape(self.corners(t));
             }
         }
+    }
+
+    /// Whether a point moved from `p` to `to` would pass through another of the surfaces of nodes about some tetrahedra.
+    fn crosses(&self, around: &[u32], own: SurfaceSet, p: Vec3, to: Vec3) -> bool {
+        let nodes = around.iter().flat_map(|t| self.tets[*t as usize]);
+        let near = nodes.fold(0, |set, n| set | self.on[n as usize]) & !own & !HELD;
+        members(near).any(|s| {
+            let field = &self.surfaces[s].field;
+            (field.value(p) < 0.0) != (field.value(to) < 0.0)
+        })
     }
 
     /// Bisects boundary edges on a surface that cut across a crease, the farthest from the surface first.
@@ -164,7 +181,10 @@ impl Shaping<'_> {
                 continue;
             }
             let both = self.on[e[0] as usize] & self.on[e[1] as usize] & !HELD & !only(s);
-            if let Some(to) = index.meeting(*p, both, self.surfaces, 0.5 * length) {
+            let own = both | only(s);
+            if let Some(to) = index.meeting(*p, both, self.surfaces, 0.5 * length)
+                && !self.crosses(&self.around[e[0] as usize], own, *p, to)
+            {
                 crossed.push((off.abs() / length, *e, to, both | only(s) | HELD));
             }
         }

@@ -109,7 +109,7 @@ impl Shaping<'_> {
             return false;
         }
         let set = [a, b, c, d].into_iter().fold(SurfaceSet::MAX, |s, n| s & self.on[n as usize]);
-        if set.count_ones() != 1 || (self.on[a as usize] & self.on[b as usize]).count_ones() != 1 {
+        if set.count_ones() != 1 || set == HELD || (self.on[a as usize] & self.on[b as usize]).count_ones() != 1 {
             return false;
         }
         let surface = &self.surfaces[set.trailing_zeros() as usize];
