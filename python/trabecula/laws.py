@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .design import Design, Lattice
+from .errors import DesignWarning
 from .files import extension, whole_file
 from .formats import LAW_WRITES
 from .given import number, positive, whole
@@ -162,18 +164,21 @@ def law(
     notes: dict[float, list[str]] = {}
     for i, fraction in enumerate(fractions):
         lattice = Lattice(cell, part, affine(wavelength=1.0), {"fraction": float(fraction)})
-        solid = Design(box(size=[1, 1, 1]), lattice).build()
+        with warnings.catch_warnings():
+            # That a cell falls apart is said by its properties, in ``notes``.
+            warnings.simplefilter("ignore", DesignWarning)
+            solid = Design(box(size=[1, 1, 1]), lattice).build()
         for j, key in enumerate(k for k in PROPERTIES if k in properties):
             done, total = i * len(properties) + j, count * len(properties)
             work = threads, _part(progress, done, total)
             try:
-                values, warnings = _FOUND[key](solid, n, nu, work)
+                values, said = _FOUND[key](solid, n, nu, work)
             except ValueError as why:
-                values, warnings = {}, [f"{key}: {why}"]
+                values, said = {}, [f"{key}: {why}"]
             for name, value in values.items():
                 columns[name][i] = np.nan if value is None else value
-            if warnings:
-                notes.setdefault(float(fraction), []).extend(w for w in warnings)
+            if said:
+                notes.setdefault(float(fraction), []).extend(said)
     fits = {name: made for name in FITTED if name in columns and (made := _power(fractions, columns[name]))}
     return Law(cell, part, n, nu, columns, fits, notes)
 

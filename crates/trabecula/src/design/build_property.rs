@@ -22,6 +22,10 @@ use std::sync::Arc;
 
 /// Solid fractions between which a level is sought.
 const FRACTIONS: [f64; 2] = [0.03, 0.97];
+/// Those between which most are found.
+const LIKELY: [f64; 2] = [0.15, 0.6];
+/// Logarithms of ratios beyond this say no more than the direction.
+const FAR: f64 = 7.0;
 /// Voxels along a coarse cell.
 const COARSE: usize = 16;
 /// Relative difference to what was asked for at which the search ends, on coarse and on fine voxels.
@@ -85,7 +89,7 @@ impl Property<'_> {
         unit_cell::of_lattice("", &Arc::new(lattice))
     }
 
-    /// The property at a fraction, 0 where the cell has none.
+    /// The property at a fraction: 0 where a cell falls apart or lets nothing through.
     fn value(&self, fraction: f64, n: usize) -> Result<f64, DesignError> {
         let cell = self.at(fraction)?;
         let (axes, _) = upper_edges(&transpose(&cell.edges));
@@ -106,7 +110,8 @@ impl Property<'_> {
             _ => {
                 let made = cell.permeability(n, None, &Silent);
                 let along = apply(&axes, self.along);
-                made.map_or(0.0, |made| dot(along, apply(&made.k, along)))
+                // On voxels that no wall is seen by, nothing holds the flow.
+                made.map_or(f64::INFINITY, |made| dot(along, apply(&made.k, along)))
             }
         };
         Ok(found.max(0.0))
@@ -158,12 +163,30 @@ impl Property<'_> {
         }
     }
 
+    /// Two fractions and the properties there, between which `asked` lies if it does between any.
+    fn bracket(&self, asked: f64, n: usize) -> Result<([f64; 2], [f64; 2]), DesignError> {
+        let [low, high] = self.range();
+        let [mut a, mut b] = [LIKELY[0].clamp(low, high), LIKELY[1].clamp(low, high)];
+        let [mut at_a, mut at_b] = [self.value(a, n)?, self.value(b, n)?];
+        let grows = self.grows();
+        while a > low && (asked < at_a) == grows && asked != at_a {
+            (b, at_b) = (a, at_a);
+            a = (0.6 * a).max(low);
+            at_a = self.value(a, n)?;
+        }
+        while b < high && (asked > at_b) == grows && asked != at_b {
+            (a, at_a) = (b, at_b);
+            b = (1.25 * b).min(high);
+            at_b = self.value(b, n)?;
+        }
+        Ok(([a, b], [at_a, at_b]))
+    }
+
     /// Where the property is `asked` on coarse voxels, and the slope there, in logarithms: by false position (Illinois). Refuses what it does not
     /// reach.
     fn coarse_root(&self, asked: f64) -> Result<(f64, f64), DesignError> {
         let n = COARSE.min(self.fine());
-        let range = self.range();
-        let ends = [self.value(range[0], n)?, self.value(range[1], n)?];
+        let (range, ends) = self.bracket(asked, n)?;
         let (grows, most) = (self.grows(), ends[0].max(ends[1]));
         if !(ends[0].min(ends[1]) <= asked && asked <= most) {
             let above = asked > most;
@@ -176,7 +199,7 @@ impl Property<'_> {
             );
             return Err(DesignError::new(&self.path, message));
         }
-        let far = |v: f64| (v.max(1e-12 * most) / asked).ln();
+        let far = |v: f64| (v / asked).ln().clamp(-FAR, FAR);
         let sign = if grows { 1.0 } else { -1.0 };
         let ([mut a, mut b], [mut fa, mut fb]) = (range.map(f64::ln), ends.map(far));
         let mut slope = (fb - fa) / (b - a);

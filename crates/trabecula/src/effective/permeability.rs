@@ -91,7 +91,7 @@ impl UnitCell {
             edges: self.edges,
             pore_nodes: across,
             grids: flows.iter().map(grid).collect(),
-            warnings: self.doubts(&k, n, across, if cube { 0.0 } else { strain }),
+            warnings: self.doubts(&k, n, across, &finest.grid, if cube { 0.0 } else { strain }),
             k,
         })
     }
@@ -128,7 +128,7 @@ impl UnitCell {
     }
 
     /// What may be wrong.
-    fn doubts(&self, k: &Mat3, n: usize, across: Option<f64>, strain: f64) -> Vec<Warning> {
+    fn doubts(&self, k: &Mat3, n: usize, across: Option<f64>, grid: &CubicGrid, strain: f64) -> Vec<Warning> {
         let mut said = Vec::new();
         let closed: Vec<&str> = (0..3).filter(|i| k[*i][*i] == 0.0).map(|i| ["x", "y", "z"][i]).collect();
         if !closed.is_empty() {
@@ -139,6 +139,13 @@ impl UnitCell {
             said.push(format!(
                 "the hydraulic diameter is {across:.1} steps of the grid across; below {ACROSS} the figures may be off by more than the error \
                  says: take n = {need}"
+            ));
+        }
+        // The two sides of a sheet are apart however thin its wall is.
+        if let Some(wall) = self.wall.map(|w| w / grid.step).filter(|w| *w < 2.0 && !self.sheet) {
+            let need = 8 * ((n as f64 * 2.0 / wall / 8.0).ceil() as usize);
+            said.push(format!(
+                "the thinnest wall or neck is {wall:.1} steps of the grid across; below 2 links may pass through it: take n = {need}"
             ));
         }
         if strain > STRAINED {
@@ -177,6 +184,11 @@ impl UnitCell {
             let share = |of: f64| (done + of * cost(&grid)) / total;
             let part = |from: f64, to: f64| Stage { whole: progress, from: share(from), to: share(to) };
             let space = PoreSpace::new(solids, &grid, &part(0.0, 0.1))?;
+            if space.grid.walls.is_empty() && space.grid.porosity() > 0.0 {
+                let message =
+                    format!("no wall is as thick as a step of {} to the cell; take more nodes", grid.shape[0]);
+                return Err(Stopped::Refused(Fault::new("n", message)));
+            }
             let porosity = space.grid.porosity();
             let radius = porosity * work(&grid.shape) * grid.step * grid.step / space.area.max(grid.step * grid.step);
             let viscosity = (radius / SOONEST).clamp(0.5, 4.0);
