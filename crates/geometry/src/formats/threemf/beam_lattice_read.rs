@@ -112,9 +112,6 @@ impl Lattice {
             "beam" => {
                 let ends = [s.required(tag, "v1")?, s.required(tag, "v2")?];
                 let (first, second) = (positive(s, tag, "r1")?, positive(s, tag, "r2")?);
-                if first.is_none() && second.is_some() {
-                    return Err(s.fault(format!("beam {} has r2 and no r1", self.beams.len())));
-                }
                 if ends[0] == ends[1] {
                     return Err(s.fault(format!("both ends of beam {} are vertex {}", self.beams.len(), ends[0])));
                 }
@@ -186,7 +183,9 @@ impl Lattice {
             let Some(found) = earlier.get(&mesh) else {
                 return wrong(format!("{name} is {mesh}; no object before this one has that id"));
             };
-            if found.lattice.is_some() || !found.components.is_empty() || found.kind != "model" {
+            // Files of the consortium name a mesh with beams where nothing is clipped.
+            let used = name != "clippingmesh" || self.clip.as_ref().is_some_and(|c| c.1 != "none");
+            if used && (found.lattice.is_some() || !found.components.is_empty() || found.kind != "model") {
                 return wrong(format!("{name} is {mesh}; it must be a mesh of type model without beams"));
             }
         }
@@ -196,20 +195,16 @@ impl Lattice {
 
 /// Reads the beams that the build places, in mm; if it places none, all where they are defined. Meshes are left out.
 pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
-    match lattices(bytes, Which::Placed) {
-        Ok(graph) if !graph.beams.is_empty() => Ok(graph),
-        placed => match lattices(bytes, Which::Lattices) {
-            Ok(mut graph) if !graph.beams.is_empty() => {
-                graph.remarks.push("the build places no beams: read where they are defined".into());
-                Ok(graph)
-            }
-            _ => {
-                placed?;
-                let message = "the file has no beam lattice; a mesh is read as a region ([region.mesh])";
-                Err(Fault::new("", message))
-            }
-        },
+    let placed = lattices(bytes, Which::Placed)?;
+    if !placed.beams.is_empty() {
+        return Ok(placed);
     }
+    let mut defined = lattices(bytes, Which::Lattices)?;
+    if defined.beams.is_empty() {
+        return Err(Fault::new("", "the file has no beam lattice; a mesh is read as a region ([region.mesh])"));
+    }
+    defined.remarks.push("the build places no beams: read where they are defined".into());
+    Ok(defined)
 }
 
 /// The beams of some of the objects.

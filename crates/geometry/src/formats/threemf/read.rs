@@ -155,7 +155,7 @@ impl<'a> Package<'a> {
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut joiner = Joiner::default();
-    let lattices = place_all(bytes, Which::Placed, &mut |placed| {
+    let held = place_all(bytes, Which::Placed, &mut |placed| {
         let mirrored = determinant(&placed.matrix) < 0.0;
         for &[a, b, c] in &placed.object.triangles {
             let t = if mirrored { [a, c, b] } else { [a, b, c] };
@@ -164,7 +164,11 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         Ok(())
     })?;
     let mesh = joiner.finish();
-    if mesh.triangles.is_empty() && lattices > 0 {
+    if held.items == 0 {
+        let objects = counted(held.objects, "object");
+        return Err(Fault::new("", format!("{objects}, but the build places none of them")));
+    }
+    if mesh.triangles.is_empty() && held.lattices > 0 {
         return Err(Fault::new("", "the file holds beams and no triangle; beams are read with [beams.NAME] and path"));
     }
     Ok(mesh)
@@ -179,12 +183,22 @@ pub(super) enum Which {
     Lattices,
 }
 
-/// Gives objects (supports left out) where they are, and the number of beam lattices in the file.
+/// Numbers of what a file holds.
+pub(super) struct Held {
+    /// Objects of the main model.
+    objects: usize,
+    /// Uses of them by the build.
+    items: usize,
+    /// Beam lattices.
+    lattices: usize,
+}
+
+/// Gives objects (supports left out) where they are, and what there is.
 pub(super) fn place_all(
     bytes: &[u8],
     which: Which,
     take: &mut dyn FnMut(&Placed) -> Result<(), Fault>,
-) -> Result<usize, Fault> {
+) -> Result<Held, Fault> {
     let mut package = Package::open(bytes)?;
     let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
     let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
@@ -195,14 +209,8 @@ pub(super) fn place_all(
         ids.sort_unstable();
         main.items = ids.into_iter().map(|id| Use { path: String::new(), id, placement: Placement::NONE }).collect();
     }
-    if main.items.is_empty() {
-        return Err(Fault::new(
-            "",
-            format!("{}, but the build places none of them", counted(main.objects.len(), "object")),
-        ));
-    }
     let mut files = HashMap::new();
-    let (unit, items) = (main.unit, main.items.len());
+    let (unit, items, objects) = (main.unit, main.items.len(), main.objects.len());
     let mut waiting: Vec<String> = outside(&main).collect();
     files.insert(String::new(), main);
     while let Some(path) = waiting.pop() {
@@ -219,7 +227,7 @@ pub(super) fn place_all(
     for i in 0..items {
         placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
-    Ok(files.values().map(beam_lattice_read::count).sum())
+    Ok(Held { objects, items, lattices: files.values().map(beam_lattice_read::count).sum() })
 }
 
 /// The path of the model from the package's relationships.
