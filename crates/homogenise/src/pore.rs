@@ -29,7 +29,7 @@ pub const VELOCITIES: [[i32; 3]; 19] = [
 
 /// The number of the opposite velocity.
 pub const fn opposite(q: usize) -> usize {
-    if q == 0 { 0 } else { (q - 1 ^ 1) + 1 }
+    if q == 0 { 0 } else { ((q - 1) ^ 1) + 1 }
 }
 
 /// A link from a node of the pore that a wall crosses.

@@ -36,7 +36,7 @@ impl CubicGrid {
     pub fn near(edges: &Mat3, n: usize) -> CubicGrid {
         let (axes, upper) = upper_edges(edges);
         let mean = determinant(edges).abs().cbrt();
-        if (0..9).all(|i| (upper[i / 3][i % 3] - if i % 4 == 0 { mean } else { 0.0 }).abs() <= 1e-9 * mean) {
+        if (0..9).all(|i| (upper[i / 3][i % 3] - if i / 3 == i % 3 { mean } else { 0.0 }).abs() <= 1e-9 * mean) {
             return CubicGrid { shape: [n; 3], lean: [0; 3], step: mean / n as f64, axes, strain: 0.0 };
         }
         let wanted = n as f64 * upper[0][0] / mean;
@@ -48,7 +48,7 @@ impl CubicGrid {
             (0..3).for_each(|i| whole[i][i] = shape[i]);
             let step = mean / shape.iter().product::<f64>().cbrt();
             let change = product(&whole.map(|row| row.map(|v| v * step)), &inverse(&upper));
-            let off = |i: usize| change[i / 3][i % 3] - if i % 4 == 0 { 1.0 } else { 0.0 };
+            let off = |i: usize| change[i / 3][i % 3] - if i / 3 == i % 3 { 1.0 } else { 0.0 };
             let strain = (0..9).map(off).map(f64::abs).fold(0.0, f64::max);
             // Grids of a half and a quarter of the steps should have the same proportions.
             let odd = if whole.iter().flatten().any(|v| v % 4.0 != 0.0) { 2e-3 } else { 0.0 };
