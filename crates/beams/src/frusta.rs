@@ -61,7 +61,7 @@ impl Quadors {
             let axis = scale(sub(to, from), 1.0 / norm(sub(to, from)));
             let nodes: Vec<u32> = (chain.iter())
                 .map(|[z, _]| match *z {
-                    z if z == 0.0 => ends[0],
+                    0.0 => ends[0],
                     z if z == pencil.length => ends[1],
                     z => {
                         lattice.nodes.push(add(from, scale(axis, z)));

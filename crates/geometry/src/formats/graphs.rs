@@ -34,14 +34,19 @@ pub struct BeamGraph {
     pub remarks: Vec<String>,
 }
 
+/// Reads a graph from the bytes of a file.
+type Read = fn(&[u8]) -> Result<BeamGraph, Fault>;
+/// Writes a graph to a file.
+type Write = fn(&BeamGraph, &mut dyn io::Write) -> io::Result<()>;
+
 /// A format of graphs. A new one is a file in this folder and a row in [`GRAPH_FORMATS`].
 pub struct GraphFormat {
     /// End of the file's name, in small letters, without the dot.
     pub suffix: &'static str,
     /// What it is.
     pub title: &'static str,
-    read: Option<fn(&[u8]) -> Result<BeamGraph, Fault>>,
-    write: Option<fn(&BeamGraph, &mut dyn io::Write) -> io::Result<()>>,
+    read: Option<Read>,
+    write: Option<Write>,
     /// What of a graph is lost in it.
     pub lost: Lost,
 }

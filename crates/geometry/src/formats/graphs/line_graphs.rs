@@ -81,18 +81,18 @@ pub fn write_vtu_lines(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()>
         out.write_all(b"<PointData>\n")?;
         open(out, "Float64", "radius", 1)?;
         graph.radii.iter().try_for_each(|r| writeln!(out, "{r}"))?;
-        write!(out, "{close}</PointData>\n")?;
+        writeln!(out, "{close}</PointData>")?;
     }
     if !graph.beam_radii.is_empty() {
         out.write_all(b"<CellData>\n")?;
         open(out, "Float64", "radius", 2)?;
         graph.beam_radii.iter().try_for_each(|[r, s]| writeln!(out, "{r} {s}"))?;
-        write!(out, "{close}</CellData>\n")?;
+        writeln!(out, "{close}</CellData>")?;
     }
     out.write_all(b"<Points>\n")?;
     open(out, "Float64", "Points", 3)?;
     graph.nodes.iter().try_for_each(|[x, y, z]| writeln!(out, "{x} {y} {z}"))?;
-    write!(out, "{close}</Points>\n<Cells>\n")?;
+    writeln!(out, "{close}</Points>\n<Cells>")?;
     open(out, "UInt32", "connectivity", 1)?;
     graph.beams.iter().try_for_each(|[a, b]| writeln!(out, "{a} {b}"))?;
     out.write_all(close.as_bytes())?;
@@ -101,7 +101,7 @@ pub fn write_vtu_lines(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()>
     out.write_all(close.as_bytes())?;
     open(out, "UInt8", "types", 1)?;
     (0..cells).try_for_each(|_| writeln!(out, "{LINE}"))?;
-    write!(out, "{close}</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")
+    writeln!(out, "{close}</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
 }
 
 /// Reads line cells of an unstructured grid or of poly data; arrays named `radius` of points or cells are radii.

@@ -193,7 +193,7 @@ pub fn read(bytes: &[u8]) -> Result<BeamGraph, Fault> {
                 "ROD" | "TUBE" | "TUBE2" => {
                     let radius = positive(card.real(8)?, "the radius of the section").map_err(|m| card.fault(m))?;
                     sections.insert(card.id(0)?, radius);
-                    if card.word(3).to_ascii_uppercase() != "ROD" {
+                    if !card.word(3).eq_ignore_ascii_case("ROD") {
                         graph.remarks.push("tubes are read as solid beams of their outer radius".into());
                     }
                 }
