@@ -102,7 +102,7 @@ pub fn volume_mesh(
         );
         return Err(Stopped::Refused(Fault::new("edge", m)));
     }
-    let total = domains.surfaces.len() as u64 + 8;
+    let total = domains.surfaces.len() as u64 + 18;
     let done = std::sync::atomic::AtomicU64::new(0);
     let goes_on = || progress.step(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
     let mut partition = background(&domains, &cubes, &planes);
@@ -127,10 +127,11 @@ pub fn volume_mesh(
         );
         return Err(Stopped::Refused(Fault::new("edge", m)));
     }
-    if !options.periodic {
-        shaping.follow_creases(step);
+    let mut whole = shaping.improve(&goes_on);
+    if whole && !options.periodic && shaping.follow_creases(step) {
+        whole = shaping.improve(&goes_on);
     }
-    if !shaping.improve(&goes_on) {
+    if !whole {
         return Err(Stopped::Interrupted);
     }
     if options.order == 1 {

@@ -13,8 +13,8 @@ use crate::mesher::shape;
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
-/// The least shape that a move or a bisection may leave; later improvement starts from there.
-const LEAST: f64 = 0.5;
+/// The least shape that a move or a bisection may leave: dihedral angles of 14 to 159.8 degrees.
+const LEAST: f64 = 1.75;
 /// Greatest move of a node, as a fraction of its shortest edge.
 const REACH: f64 = 0.5;
 /// Edges are bisected if their midpoint is farther from the surface than this fraction of their length.
@@ -28,7 +28,7 @@ struct Index<'a> {
 }
 
 impl<'a> Index<'a> {
-    /// Lookups reach as far as `cell` (mm).
+    /// Lookups reach `cell` (mm).
     fn new(creases: &'a Creases, cell: f64) -> Index<'a> {
         let mut index = Index { creases, cell, segments: FxHashMap::default() };
         for (i, s) in (0..).zip(&creases.segments) {
@@ -98,14 +98,19 @@ impl<'a> Index<'a> {
 }
 
 impl Shaping<'_> {
-    /// Moves nodes onto creases and bisects edges that cut across them. `step` is the edge of the background (mm).
-    pub fn follow_creases(&mut self, step: f64) {
+    /// Moves nodes onto creases and bisects edges that cut across them; whether there are creases. `step` is the edge of the
+    /// background (mm).
+    pub fn follow_creases(&mut self, step: f64) -> bool {
         let surfaces = self.surfaces;
+        if surfaces.iter().all(|s| s.creases.segments.is_empty()) {
+            return false;
+        }
         for (s, surface) in surfaces.iter().enumerate().filter(|(_, s)| !s.creases.segments.is_empty()) {
             let index = Index::new(&surface.creases, step);
             self.nodes_onto(s, &index);
             self.edges_onto(s, &index);
         }
+        true
     }
 
     /// Moves nodes on a surface onto its creases: to corners first, then the nearest ones.
