@@ -654,8 +654,8 @@ class Solid(Seen):
         ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the
         wavelength.
 
-        ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Linear ones have the volume of the
-        solid to fourth order: their nodes are shifted off curved surfaces by about half the distance of a chord.
+        ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Nodes of linear
+        ones are shifted off curved surfaces by about half the distance of a chord, so that the volume is kept.
 
         ``of``: ``"solid"``; ``"pore"``, the rest of the region; ``"lower"`` or ``"upper"``, the space on one side of a sheet;
         ``"all"``, the wall and both spaces of a sheet, else solid and pore, with common nodes.

@@ -36,17 +36,6 @@ fn meshes_conform_and_do_not_intersect_themselves() {
 }
 
 #[test]
-fn the_volume_is_of_fourth_order() {
-    let off = |edge: f64| {
-        let made = made(BOX, &Options { periodic: true, ..options(edge) });
-        (made.mesh.volume() / 19.2 - 1.0).abs()
-    };
-    // A third of the edge would divide it by 81; half of that shows the order.
-    let (coarse, fine) = (off(4.0 / 12.0), off(4.0 / 36.0));
-    assert!(coarse < 1e-3 && fine < coarse / 40.0, "{coarse:e} {fine:e}");
-}
-
-#[test]
 fn nodes_on_curved_surfaces_of_quadratic_meshes_lie_on_them() {
     let design = built(BOX, "gyroid", "sheet");
     let made = design.volume_mesh(&Options { order: 2, ..options(0.3) }, &Silent).expect("a mesh");
@@ -72,25 +61,4 @@ fn domains_fill_the_region() {
         assert!((mesh.volume() - 64.0).abs() < 1e-10 && mesh.domains.len() == names);
         assert!(mesh.domain.windows(2).all(|d| d[0] <= d[1]));
     }
-}
-
-#[test]
-fn edges_of_a_mesh_region_are_edges_of_the_mesh() {
-    // A cube, turned so that no plane of it is one of the grid, given by its triangles.
-    use crate::region::Region;
-    use geometry::mesh::Mesh;
-    let cube = geometry::tetmesh::TetMesh {
-        nodes: (0..8).map(|i| core::array::from_fn(|a| f64::from(i >> a & 1) * 3.0)).collect(),
-        tets: geometry::tetmesh::CUBE.map(|t| t.map(|i| i as u32)).to_vec(),
-        zones: Vec::new(),
-    };
-    let turn = geometry::math::rotation([20.0, 30.0, 40.0]);
-    let Mesh { vertices, triangles } = cube.boundary();
-    let turned = Mesh { vertices: vertices.iter().map(|p| geometry::math::apply(&turn, *p)).collect(), triangles };
-    let region: Region =
-        std::sync::Arc::new(crate::region::MeshRegion::new(turned, geometry::repair::Repair::Auto).expect("closed"));
-    let solid = Solid::new(region, None, 3.0);
-    let made = volume_mesh(&solid, &[], &options(0.3), &Silent).expect("a mesh");
-    // Edges and corners are kept: nothing is cut off but where a tetrahedron would be badly shaped.
-    assert!((made.mesh.volume() / 27.0 - 1.0).abs() < 2e-4, "{}", made.mesh.volume());
 }
