@@ -22,7 +22,7 @@ mod smooth;
 mod tet_shape;
 mod work;
 
-pub use region_fit::{Fit, Uncovered, fit, uncovered};
+pub use region_fit::{Fit, Uncovered, fit};
 pub use tet_shape::ANGLES;
 use work::{Around, Work};
 
