@@ -178,7 +178,7 @@ def spacing(word: str = "--edge", *more):
 def of_cell(known: tuple[str, ...]):
     """The options of what is found of a periodic cell."""
     return (
-        option("-o", "--output", nargs="+", type=ending(known), metavar="OUT", help=f"files to write ({dotted(known)})"),
+        file("-o --output", known, f"files to write ({dotted(known)})", "OUT", nargs="+", action="extend"),
         option("--n", type=VOXELS, default=64, metavar="N", help="voxels along the cell's edge (default: 64)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     )

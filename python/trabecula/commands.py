@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 
@@ -19,7 +18,7 @@ from .parts import part_files, write_parts
 from .shown import look
 from .solid import Solid
 from .starter import starter
-from .terminal import Progress, figure, say, settle, warn, warned
+from .terminal import Progress, figure, put_json, say, settle, warn, warned
 from .texts import counted, table, voids
 
 __all__ = [
@@ -510,81 +509,9 @@ def sweep(args) -> None:
 
 def slice(args) -> None:
     """``trabecula slice``."""
-    import numpy  # noqa: F401  wanted by drawings; see `terminal` for why no import waits until then
+    from .slicing import sliced
 
-    if args.output:
-        if args.z is not None and kind_of(args.output) != "svg":
-            raise Refused(f"{args.output}: a section is drawn as .svg; other formats take --layer")
-        check_place(args.output)
-        keep_file(args.design, args.output)
-    solid = build(args.design, tell=not args.json)
-    if args.layer is not None:
-        return layers(solid, args)
-    if args.beams or args.chord or any(solid.quadors(name).whole for name in solid.beams):
-        return arcs(solid, args)
-    section(solid, args)
-
-
-def layers(solid: Solid, args) -> None:
-    """``trabecula slice --layer``."""
-    start = time.perf_counter()
-    wanted = (args.layer, args.tolerance, args.start, args.stop, args.step, args.threads, args.adaptive, args.least)
-    made = solid.layers(*wanted)
-    with Progress("slicing", args.progress) as progress:
-        report = made.save(
-            args.output, binary=args.binary, pixel=args.pixel, size=args.size, exposure=args.exposure, progress=progress
-        )
-    seconds = round(time.perf_counter() - start, 3)
-    if args.json:
-        return put_json(report.to_dict() | {"seconds": seconds})
-    of = f"at most {args.layer:g} mm" if args.adaptive else f"{args.layer:g} mm"
-    print(f"layers    {counted(report.layers, 'layer')} of {of}" + (f", {report.empty} empty" if report.empty else ""))
-    print(f"volume    {figure(report.volume)} mm³, sections in the middle of layers")
-    print(f"contours  {report.contours}, of {report.points} points")
-    say(f"{args.output}: written in {seconds:g} s")
-
-
-def section(solid: Solid, args) -> None:
-    """``trabecula slice --z`` of any design."""
-    low, high = solid.bounds
-    if not low[2] <= args.z <= high[2]:
-        raise Refused(f"--z {args.z:g} mm is outside the part, which lies from {low[2]:g} to {high[2]:g} mm")
-    start = time.perf_counter()
-    made = solid.layers(high[2] - low[2], args.tolerance, step=args.step).at(args.z)
-    seconds = round(time.perf_counter() - start, 3)
-    points = sum(len(loop) - 1 for loop in made.loops)
-    if args.output:
-        made.write(args.output)
-    if args.json:
-        return put_json({"z": args.z, "area": made.area, "loops": len(made.loops), "points": points, "seconds": seconds})
-    print(f"area   {figure(made.area)} mm²")
-    print(f"loops  {len(made.loops)}, of {points} points")
-    if args.output:
-        say(f"{args.output}: written, {args.tolerance:g} mm off at most")
-
-
-def arcs(solid: Solid, args) -> None:
-    """``trabecula slice --z`` of beams, exactly."""
-    quadors = solid.quadors(args.beams)
-    chord = args.chord or 0.01
-    start = time.perf_counter()
-    cut = quadors.slice(args.z)
-    seconds = round(time.perf_counter() - start, 3)
-    if args.output:
-        cut.write(args.output, chord)
-    curves = sum(len(it["weights"]) for it in cut.loops)
-    figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
-    figures |= {"whole": quadors.whole, "moved": cut.moved, "seconds": seconds}
-    if not quadors.whole:
-        say("the slice is of the beams alone, uncut: the design's region cuts them, or more is added to them")
-    if args.json:
-        return put_json(figures)
-    print(f"area   {figure(cut.area)} mm², exact")
-    print(f"loops  {len(cut.loops)}, of {curves} conic arcs; the plane reaches {cut.hubs} of {len(quadors)} hubs")
-    if cut.moved:
-        print(f"moved  by {cut.moved:g} mm: the plane would touch the surface without cutting it")
-    if args.output:
-        say(f"{args.output}: written, {chord:g} mm off at most")
+    sliced(args)
 
 
 def tets(args) -> None:
@@ -688,7 +615,9 @@ def report(args) -> None:
     title = args.title or name.replace("_", " ").capitalize()
     text = stdin_text() if args.design == STDIN else read_text(args.design)
     settle()
-    write_page(args.output, part_page(solid, made, text, title, balls, warned()))
+    with Progress("lightening", args.progress) as progress:
+        page = part_page(solid, made, text, title, balls, warned(), progress)
+    write_page(args.output, page)
     say(f"{args.output}: {os.path.getsize(args.output) / 1e6:.2g} MB, {made.counts[1]} triangles measured")
 
 
@@ -772,11 +701,6 @@ def doctor(args) -> None:
     if args.json:
         return put_json(found)
     print("\n".join(words(found)))
-
-
-def put_json(figures) -> None:
-    """Figures as JSON on stdout."""
-    print(json.dumps(figures, indent=2))
 
 
 def known_cell(name: str, known: list[str]) -> None:

@@ -36,7 +36,7 @@ def stiffness(args) -> StiffnessReport:
                 f"effective stiffness of {args.design}, solid E = {args.E:g}, nu = {args.nu:g}, fraction {found.fraction:.6g}"
             )
             written(name, CARDS[kind](found, title) if kind in CARDS else table(found.C, AXES, found.C_n))
-    told(found, args)
+    say_found(found, args)
     return found
 
 
@@ -47,7 +47,7 @@ def conductivity(args) -> ConductivityReport:
         found = solid.conductivity(args.n, args.pore, args.voxels, args.threads, progress)
     for name in args.output or ():
         written(name, table(found.k, "123", found.k_n))
-    told(found, args)
+    say_found(found, args)
     return found
 
 
@@ -58,7 +58,7 @@ def permeability(args) -> PermeabilityReport:
         found = solid.permeability(args.n, args.side, args.threads, progress)
     for name in args.output or ():
         written(name, table(found.k, "123", found.k_n))
-    told(found, args)
+    say_found(found, args)
     return found
 
 
@@ -88,7 +88,7 @@ def placed(args):
     return build(args.design, tell=not args.json)
 
 
-def told(found: Found, args) -> None:
+def say_found(found: Found, args) -> None:
     """Says warnings and what was written."""
     for warning in found.warnings:
         warn(warning["message"], warning["path"], not args.json)

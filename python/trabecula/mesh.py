@@ -491,7 +491,8 @@ class Mesh(Picture, Transformed):
 
     def view(self, values: ArrayLike | None = None, label: str = "") -> View:
         """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
-        for each vertex by which it is coloured, ``label`` says what they are, with their unit.
+        for each vertex by which it is coloured, ``label`` says what they are, with their unit. Raises ValueError for any other
+        number of values.
         """
         from .viewer import View
 

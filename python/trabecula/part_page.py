@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -42,15 +42,16 @@ def part_page(
     title: str = "Part",
     thickness: Thickness | None = None,
     warnings: Sequence[Mapping[str, str]] = (),
+    progress: Callable[[int, int], Any] | None = None,
 ) -> str:
     """The page, HTML with nothing outside: the mesh of the solid in a viewer, its verdicts (closed, in one piece, …), its
     figures with units, histograms of wall thickness and pore size, warnings ({path, message}), what ``Solid.report``
-    says, and the text of the design.
+    says, and the text of the design. ``progress(done, total)`` is called while a lighter mesh is made for the viewer.
     """
     body = [
         f"<main>\n<h1>{escape(title)}</h1>",
         f'<p class="under">{_extent(solid)} · {mesh.counts[1]:,} triangles · trabecula {escape(__version__)}</p>',
-        View(mesh).figure(),
+        View(mesh, progress=progress).figure(),
         f'<ul class="verdict">{"".join(_verdicts(mesh))}</ul>',
     ]
     body += [_warning(w) for w in warnings]

@@ -1,4 +1,4 @@
-"""What a person at a terminal sees: messages on stderr, progress, figures with few digits, and what an interrupt does.
+"""What a terminal shows: messages on stderr, figures as JSON, progress, figures with few digits, and what an interrupt does.
 
 Before and after the work of a command an interrupt ends the process on the spot, during the work it is raised: an exception in
 the middle of an import can come out as almost anything, and there is nothing to clean up yet.
@@ -6,6 +6,7 @@ the middle of an import can come out as almost anything, and there is nothing to
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import signal
@@ -13,8 +14,8 @@ import sys
 import time
 
 __all__ = [
-    *("Progress", "fail", "figure", "interrupts_leave", "interrupts_raise", "left", "listen", "outcome", "say", "settle"),
-    *("span", "warn", "warned"),
+    *("Progress", "fail", "figure", "interrupts_leave", "interrupts_raise", "left", "listen", "outcome", "put_json"),
+    *("say", "settle", "span", "warn", "warned"),
 ]
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -116,6 +117,11 @@ def listen(quiet: bool, strict: bool) -> None:
 def warned() -> list[Notice]:
     """What has been warned of, each text once."""
     return list(_voice.notices)
+
+
+def put_json(figures) -> None:
+    """Figures as JSON on stdout."""
+    print(json.dumps(figures, indent=2))
 
 
 def fail(text: str) -> None:

@@ -8,7 +8,7 @@ const CREASE = Math.cos((35 * Math.PI) / 180);
 const VERTEX = `#version 300 es
 in vec3 position; in vec3 normal; in float cut; in float value;
 uniform mat3 turn; uniform vec3 middle; uniform vec2 shift; uniform vec2 zoom; uniform float depth;
-out vec3 place; out vec3 facing; out float isCut; out float amount;
+centroid out vec3 place; centroid out vec3 facing; centroid out float isCut; centroid out float amount;
 void main() {
   vec3 seen = turn * (position - middle);
   place = position; facing = normal; isCut = cut; amount = value;
@@ -17,7 +17,8 @@ void main() {
 
 const FRAGMENT = `#version 300 es
 precision highp float;
-in vec3 place; in vec3 facing; in float isCut; in float amount;
+// At a pixel's centre beyond its triangle the place could lie on the other side of the section.
+centroid in vec3 place; centroid in vec3 facing; centroid in float isCut; centroid in float amount;
 uniform mat3 turn; uniform vec4 plane; uniform int colours; uniform float steep; uniform vec2 span;
 out vec4 colour;
 vec3 scale(float t) {

@@ -14,9 +14,14 @@ from .files import extension, whole_file
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
     from numpy.typing import ArrayLike
 
     from .mesh import Mesh
+
+    Progress = Callable[[int, int], Any]
 
 __all__ = ["STYLE", "View", "script"]
 
@@ -63,13 +68,15 @@ def script() -> str:
 class View:
     """A mesh to turn: by the pointer, fingers or arrow keys; with a section plane, and colours by the faces that the region
     cut, by the angle of overhang, or by ``values``, a number for each vertex that ``label`` names. A notebook shows it;
-    ``save`` makes a page. Of a mesh of more than 150,000 triangles, without values, a lighter one is shown.
+    ``save`` makes a page. Of a mesh of more than 150,000 triangles, without values, a lighter one is shown; while it is made
+    ``progress(done, total)`` is called. Raises ValueError for values that are not one number for each vertex.
     """
 
-    def __init__(self, mesh: Mesh, values: ArrayLike | None = None, label: str = ""):
+    def __init__(self, mesh: Mesh, values: ArrayLike | None = None, label: str = "", progress: Progress | None = None):
         self.mesh = mesh
         self.label = label
         self.values = None if values is None else mesh._at_vertices("values", values)
+        self._progress = progress
 
     @cached_property
     def _light(self) -> Mesh:
@@ -77,7 +84,17 @@ class View:
         mesh = self.mesh
         if mesh.counts[1] <= LIGHT or self.values is not None or mesh.defects or mesh.self_intersections:
             return mesh
-        return mesh.simplified(triangles=LIGHT)
+        return mesh.simplified(triangles=LIGHT, progress=self._progress)
+
+    @cached_property
+    def _span(self) -> tuple[float, float] | None:
+        """The least and the greatest of the finite values."""
+        import numpy as np
+
+        if self.values is None:
+            return None
+        finite = self.values[np.isfinite(self.values)]
+        return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
 
     @cached_property
     def packed(self) -> str:
@@ -93,9 +110,8 @@ class View:
         places = np.rint((mesh.vertices - low) / extent * STEPS).astype("<u2")
         parts = [places.tobytes(), mesh.triangles.astype("<u4").tobytes(), mesh.cut.astype("u1").tobytes()]
         span = None
-        if self.values is not None:
-            finite = self.values[np.isfinite(self.values)]
-            least, most = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+        if self.values is not None and self._span is not None:
+            least, most = self._span
             span = [least, most if most > least else least + 1.0]
             share = (np.nan_to_num(self.values, nan=least) - span[0]) / (span[1] - span[0])
             parts.append(np.rint(share.clip(0, 1) * STEPS).astype("<u2").tobytes())
@@ -115,12 +131,8 @@ class View:
         options = [("0", "region's faces"), ("1", "overhang"), *([("2", label)] if self.values is not None else [])]
         choices = "".join(f'<option value="{v}"{" selected" * (v == chosen)}>{word}</option>' for v, word in options)
         legend = ""
-        if self.values is not None:
-            import numpy as np
-
-            finite = self.values[np.isfinite(self.values)]
-            ends = [f"{v:.4g}" for v in (finite.min(), finite.max())] if finite.size else ["", ""]
-            legend = f"{ends[0]}<i></i>{ends[1]}"
+        if self._span is not None:
+            legend = "{:.4g}<i></i>{:.4g}".format(*self._span)
         return f"""<figure class="viewer" style="--high: {escape(high)}">
 <canvas tabindex="0" role="img"
  aria-label="The part in three dimensions; arrow keys turn it, plus and minus zoom, Home resets"></canvas>

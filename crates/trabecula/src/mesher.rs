@@ -23,7 +23,7 @@ mod tet_shape;
 mod work;
 
 pub(crate) use boundary_repair::repair;
-pub use region_fit::{Fit, Uncovered, fit, uncovered};
+pub use region_fit::{Fit, Uncovered, fit};
 pub use tet_shape::ANGLES;
 pub(crate) use tet_shape::shape;
 use work::{Around, Work};

@@ -96,7 +96,7 @@ mod tests {
     /// Letters keep to their width, differ from each other, and grow with the paper.
     #[test]
     fn letters_are_seen_and_differ() {
-        let letters: Vec<char> = ('0'..='9').chain('a'..='z').chain('A'..='Z').chain("._-%,:()/+=°".chars()).collect();
+        let letters: Vec<char> = ('0'..='9').chain('a'..='z').chain('A'..='Z').chain("._-%,:()/+=°'".chars()).collect();
         for size in [[60, 60], [900, 1200]] {
             let drawn = |letter: char| {
                 let mut paper = Paper::blank(size);

@@ -7,6 +7,7 @@ use super::tet_locator::TetLocator;
 use crate::distance::triangle::Triangle;
 use crate::distance::triangle_bvh::TriangleBvh;
 use crate::math::{Vec3, add, dot, eigen, norm, scale, sub};
+use crate::mesh::Mesh;
 use crate::mesh::surface_samples::SurfaceSample;
 use crate::random::low_discrepancy;
 use crate::union_find;
@@ -99,9 +100,8 @@ pub fn distances(samples: &[SurfaceSample], off: &[f64]) -> Distances {
     Distances { mean, p95: percentile(0.95), p99: percentile(0.99), max: last.0, at: samples[last.1].at }
 }
 
-/// Signed distances (mm) from samples to the boundary of a tetrahedral mesh, negative inside.
-pub fn to_boundary(samples: &[SurfaceSample], mesh: &TetMesh, inside: &TetLocator) -> Vec<f64> {
-    let boundary = mesh.boundary();
+/// Signed distances (mm) from samples to the boundary of a tetrahedral mesh, negative where `inside` says that it covers them.
+pub fn to_boundary(samples: &[SurfaceSample], boundary: &Mesh, inside: &TetLocator) -> Vec<f64> {
     let faces: Vec<Triangle> = (0..boundary.triangles.len()).map(|i| Triangle::new(boundary.corners(i))).collect();
     let tree = TriangleBvh::new(&faces);
     let signed = |s: &SurfaceSample| {

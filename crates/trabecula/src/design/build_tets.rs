@@ -212,14 +212,9 @@ fn mean_size(mesh: &TetMesh) -> f64 {
     (72f64.sqrt() * mesh.volume() / mesh.tets.len().max(1) as f64).cbrt()
 }
 
-/// A number to five digits.
-pub(super) fn five(v: f64) -> f64 {
-    format!("{v:.4e}").parse().unwrap_or(v)
-}
-
-/// A number to three digits.
-fn three(v: f64) -> f64 {
-    format!("{v:.2e}").parse().unwrap_or(v)
+/// A number to a few digits, for a message.
+pub(super) fn rounded(v: f64, digits: usize) -> String {
+    number(format!("{v:.*e}", digits - 1).parse().unwrap_or(v))
 }
 
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
@@ -354,7 +349,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
     };
     let lost: Vec<&LostFeature> = fit.lost.iter().filter(matters).collect();
     if !lost.is_empty() && !strange {
-        let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), number(three(f.size)), at(f.at));
+        let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), at(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
         if lost.len() > NAMED {
             named.push(format!("{} more", lost.len() - NAMED));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::build_cell::orbit_terms;
 use super::build_level::{check_mid, within_wavelength};
-use super::build_tets::{self, TetReport, five};
+use super::build_tets::{self, TetReport, rounded};
 use super::built_report::Varied;
 use super::data::*;
 use super::finish_tiling::{Finish, Finished};
@@ -21,7 +21,7 @@ use crate::kind::DesignError;
 use crate::map::{Ends, Tets};
 use crate::region::{Intersection, MeshRegion, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
-use geometry::fault::{Fault, number};
+use geometry::fault::Fault;
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
@@ -180,8 +180,7 @@ fn common(region: &Region, mesh: &Tets, report: &TetReport, path: &str) -> Resul
 
 /// Says that a region cuts the tetrahedra of a file.
 fn cut(report: &TetReport, file: &str) -> String {
-    let [tets, region] =
-        [Some(report.quality.volume), report.region_volume].map(|v| number(five(v.unwrap_or(f64::NAN))));
+    let [tets, region] = [Some(report.quality.volume), report.region_volume].map(|v| rounded(v.unwrap_or(f64::NAN), 5));
     format!(
         "{file} is not a mesh of this region (its tetrahedra fill {tets} mm³, the region {region} mm³): the lattice fills what they have \
          in common, and its cells are cut at the region's surface; give the region that they are a mesh of to have them end there"

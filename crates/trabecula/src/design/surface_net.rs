@@ -1,11 +1,12 @@
 //! The net of rods on the part's surface that ties the ports of a lattice over tetrahedra.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::map::Tets;
+use crate::map::curved_tets::boundary_edges;
 use crate::map::surface_feet::{edge_feet, feet, sharp_feet};
 use crate::region::Region;
 use crate::tiling::Ports;
@@ -25,8 +26,8 @@ pub(super) struct Net {
     rods: Vec<[u32; 2]>,
 }
 
-/// An edge of the boundary, by its nodes, with the middles of its faces.
-type Edges = BTreeMap<[u32; 2], Vec<Vec3>>;
+/// The middles of the two faces of each edge of the boundary, by its nodes.
+type Edges = HashMap<[u32; 2], [Vec3; 2]>;
 
 impl Net {
     /// The net on the faces of a mesh's boundary that have their middles in `on`, and along the sharp edges of the region there; `None` if
@@ -35,13 +36,7 @@ impl Net {
         let at = |n: u32| map.nodes()[n as usize];
         let third = |f: &[u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, at(*n))), 1.0 / 3.0);
         let all = map.boundary_nodes();
-        let mut edges = Edges::new();
-        for f in &all {
-            for i in 0..3 {
-                let (a, b) = (f[i], f[(i + 1) % 3]);
-                edges.entry([a.min(b), a.max(b)]).or_default().push(third(f));
-            }
-        }
+        let edges: Edges = boundary_edges(map).into_iter().map(|e| (e.nodes, e.sides)).collect();
         let faces: Vec<[u32; 3]> = all.into_iter().filter(|f| on.is_none_or(|on| on.value(third(f)) < 0.0)).collect();
         if faces.is_empty() {
             return None;
@@ -57,7 +52,7 @@ impl Net {
             let flat = (0..3).fold([0.0; 3], |s, i| add(s, scale(at(f[i]), l[i])));
             *known.entry((key.clone(), true)).or_insert_with(|| {
                 let foot = match key[..] {
-                    [(a, _), (b, _)] => on_edge(region, &[flat], &edges[&[a, b]])[0],
+                    [(a, _), (b, _)] => on_edge(region, &[flat], edges.get(&[a, b]))[0],
                     [_] => flat,
                     _ => feet(&**region, &[flat])[0],
                 };
@@ -86,7 +81,7 @@ impl Net {
         }
         for [a, b] in drawn {
             let [p, q] = [a, b].map(|n| end(&mut out, &[n, n, n], &[1.0, 0.0, 0.0]));
-            let inner = on_edge(region, &out.between(p, q), &edges[&[a, b]]);
+            let inner = on_edge(region, &out.between(p, q), edges.get(&[a, b]));
             out.rod(p, q, inner);
         }
         Some(out)
@@ -128,20 +123,20 @@ impl Net {
 fn sharp(map: &Tets, region: &Region, edges: &Edges, of: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
     let (mut some, mut middles, mut sides) = (Vec::new(), Vec::new(), Vec::new());
     for e in of {
-        if let [a, b] = edges[&e][..] {
+        if let Some(of) = edges.get(&e) {
             let [p, q] = e.map(|n| map.nodes()[n as usize]);
             some.push(e);
             middles.push(scale(add(p, q), 0.5));
-            sides.push([a, b]);
+            sides.push(*of);
         }
     }
     sharp_feet(&**region, &middles, &sides).into_iter().map(|(i, _)| some[i]).collect()
 }
 
-/// Points of an edge of the boundary, on the region's surface or its sharp edge.
-fn on_edge(region: &Region, points: &[Vec3], sides: &[Vec3]) -> Vec<Vec3> {
+/// Points of an edge of the boundary, on the region's surface or, where it has two faces, its sharp edge.
+fn on_edge(region: &Region, points: &[Vec3], sides: Option<&[Vec3; 2]>) -> Vec<Vec3> {
     match sides {
-        [a, b] => edge_feet(&**region, points, &vec![[*a, *b]; points.len()]),
-        _ => feet(&**region, points),
+        Some(sides) => edge_feet(&**region, points, &vec![*sides; points.len()]),
+        None => feet(&**region, points),
     }
 }

@@ -323,7 +323,7 @@ fn middle([a, b]: [Vec3; 2], s: f64) -> Vec3 {
 }
 
 /// The edges of the boundary that have two faces, ascending.
-fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
+pub(crate) fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
     let mut halves: Vec<([u32; 2], [u32; 3])> = Vec::new();
     for f in map.boundary_nodes() {
         for i in 0..3 {

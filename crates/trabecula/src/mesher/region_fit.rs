@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::isosurface_stuffing::values;
 use crate::field::Field;
-use geometry::math::{Vec3, dot, scale, sub};
+use crate::map::surface_feet::feet;
+use geometry::math::{Vec3, norm, sub};
 use geometry::mesh::Mesh;
 use geometry::mesh::surface_samples::SurfaceSample;
 use geometry::tetmesh::TetMesh;
@@ -62,7 +63,7 @@ pub fn fit(
     let locator = TetLocator::new(mesh);
     let step = spacing(surface);
     let samples = on_surface(region, surface.samples(step), step);
-    let off = to_boundary(&samples, mesh, &locator);
+    let off = to_boundary(&samples, &boundary, &locator);
     let uncovered = uncovered(&locator, region, inside);
     Fit {
         to_part: distances(&own, &values(region, &own.iter().map(|s| s.at).collect::<Vec<_>>())),
@@ -75,35 +76,21 @@ pub fn fit(
     }
 }
 
-/// Samples of a surface that is near the region's, moved onto it by Newton's method; those that do not come to it stay.
+/// Samples of a surface that is near the region's, moved onto it; those that do not come nearer to it, or are `reach` (mm) off, stay.
 fn on_surface(region: &dyn Field, mut samples: Vec<SurfaceSample>, reach: f64) -> Vec<SurfaceSample> {
-    const STEPS: usize = 4;
-    const BATCH: usize = 256;
-    samples.par_chunks_mut(BATCH).for_each(|samples| {
-        let start: Vec<Vec3> = samples.iter().map(|s| s.at).collect();
-        let mut points = start.clone();
-        let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-        for _ in 0..STEPS {
-            region.gradients(&points, &mut v, &mut g);
-            for ((p, v), g) in points.iter_mut().zip(&v).zip(&g) {
-                *p = sub(*p, scale(*g, v / dot(*g, *g).max(f64::MIN_POSITIVE)));
-            }
+    let start: Vec<Vec3> = samples.iter().map(|s| s.at).collect();
+    let moved = feet(region, &start);
+    let [before, after] = [&start, &moved].map(|points| values(region, points));
+    for (i, s) in samples.iter_mut().enumerate() {
+        if after[i].abs() < before[i].abs() && norm(sub(moved[i], s.at)) < reach {
+            s.at = moved[i];
         }
-        let mut before = vec![0.0; points.len()];
-        region.values(&start, &mut before);
-        region.values(&points, &mut v);
-        for (k, s) in samples.iter_mut().enumerate() {
-            let moved = sub(points[k], s.at);
-            if v[k].abs() < before[k].abs() && dot(moved, moved) < reach * reach {
-                s.at = points[k];
-            }
-        }
-    });
+    }
     samples
 }
 
 /// The part of a region that no tetrahedron covers, by points inside it.
-pub fn uncovered(mesh: &TetLocator, region: &dyn Field, inside: &[Vec3]) -> Uncovered {
+fn uncovered(mesh: &TetLocator, region: &dyn Field, inside: &[Vec3]) -> Uncovered {
     let left: Vec<Vec3> = inside.par_iter().filter(|p| !mesh.covers(**p)).copied().collect();
     let depths = values(region, &left);
     let deep = (0..left.len()).fold(0, |m, i| if depths[i] < depths[m] { i } else { m });

@@ -158,12 +158,19 @@ mod tests {
         };
         for (name, fraction) in [("diamond", 0.25), ("primitive", 0.4), ("iwp", 0.3), ("diamond_sheet", 0.3)] {
             let (ports, share, count) = of(name, fraction);
-            println!("{name} {ports:?} {share} {count:?} {:?}", ports.lines());
             assert!(ports.at_edges || !ports.inside.is_empty(), "{name}");
-            assert!(ports.area > 0.0 && ports.area.is_finite());
+            if !ports.at_edges {
+                // Within the face: as many as are counted there, and their areas are the face's.
+                assert_eq!(ports.inside.len(), count, "{name}");
+                assert!((ports.area * count as f64 - share).abs() < 1e-9, "{name}: {ports:?} {share}");
+            }
+            let (lines, edges) = ports.lines();
+            assert!(edges || lines.len() == 3 * ports.inside.len(), "{name}: {lines:?}");
+            for [from, to] in lines {
+                // From a port to the face's edge, within the face.
+                assert!(ports.inside.contains(&from) || from == [1.0 / 3.0; 3], "{name}");
+                assert!(to.contains(&0.0) && (to.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {to:?}");
+            }
         }
-        let (ports, ..) = of("diamond", 0.25);
-        let (lines, edges) = ports.lines();
-        assert!(!lines.is_empty() || edges);
     }
 }
