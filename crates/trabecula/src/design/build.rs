@@ -104,7 +104,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut solid = Solid::new(region.clone(), Some(field), wavelength);
     solid.transition = blend.as_ref().and_then(|b| b.width);
     let skins = d.skin.iter().map(|_| "SKIN".to_string());
-    let keeps = d.keep.0.iter().map(|(name, _)| format!("KEEP_{name}"));
+    let keeps = d.keep.0.keys().map(|name| format!("KEEP_{name}"));
     let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).collect();
     let solid = filled.into_iter().chain(nets).fold(solid, Solid::with);
     let figures = OnceLock::new();

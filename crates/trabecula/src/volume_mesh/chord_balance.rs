@@ -1,7 +1,7 @@
 //! Nodes of the boundary shifted so that the volume between its flat faces and the surface balances.
 //!
-//! A chord cuts a corner: the volume between a triangle and the surface is, to fourth order, a third of its area times the sum
-//! of the distances at the midpoints of its edges (the rule is exact for quadratics). Each node moves along the normal by the mean
+//! A chord cuts a corner: the volume between a triangle and the surface is a third of its area times the sum of the distances at
+//! the midpoints of its edges, up to higher order (the rule is exact for quadratics). Each node moves along the normal by the mean
 //! distance over the faces around it, which moves as much volume.
 
 use rayon::prelude::*;
@@ -53,7 +53,7 @@ pub(super) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Ite
 }
 
 impl Shaping<'_> {
-    /// Shifts nodes on curved surfaces so that the volume of each domain is right to fourth order.
+    /// Shifts nodes on curved surfaces so that the volume of each domain is right to higher order than its chords.
     pub fn balance(&mut self) {
         let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
         // (surface, edge) of each face on a curved surface.
@@ -95,7 +95,7 @@ impl Shaping<'_> {
         }
         let mut at: Vec<((u32, usize), [f64; 2])> = sums.into_iter().collect();
         at.sort_unstable_by_key(|a| a.0);
-        let by_node: Vec<&[((u32, usize), [f64; 2])]> = at.chunk_by(|a, b| a.0.0 == b.0.0).collect();
+        let by_node: Vec<_> = at.chunk_by(|a, b| a.0.0 == b.0.0).collect();
         let shifts: Vec<(u32, Vec3)> = by_node
             .par_iter()
             .filter_map(|of| {

@@ -146,7 +146,7 @@ impl Shaping<'_> {
                 }
             }
         }
-        if !(best[0][n - 1].0 > bar) {
+        if best[0][n - 1].0 <= bar {
             return None;
         }
         let mut made = Vec::with_capacity(2 * (n - 2));

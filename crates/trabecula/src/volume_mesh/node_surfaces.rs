@@ -58,7 +58,7 @@ fn shortest(of: &[(f64, Vec3)]) -> Option<Vec3> {
     let mut kept: Vec<(f64, Vec3)> = Vec::with_capacity(3);
     for (wanted, g) in of {
         let length = norm(*g);
-        if !(length > 0.0) {
+        if length.is_nan() || length <= 0.0 {
             return None;
         }
         let (w, n) = (wanted / length, scale(*g, 1.0 / length));
@@ -104,7 +104,8 @@ pub(super) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -
         of[..n].iter_mut().for_each(|v| v.0 = -v.0);
         let step = shortest(&of[..n])?;
         q = exact(surfaces, set, add(q, step));
-        if !(norm(sub(q, p)) <= reach) {
+        let moved = norm(sub(q, p));
+        if moved.is_nan() || moved > reach {
             return None;
         }
         if norm(step) <= 1e-11 * reach {
