@@ -348,7 +348,7 @@ CASES = [
     (but(PATTERN, pattern=SWIRL | {"repeat": []}), "pattern.repeat", ["at least 1 item"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 0}]}), "pattern.repeat[0].count", ["at least 1"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 200, "scale": 0.5}]}), "pattern.repeat[0].scale", ["times as large"]),
-    ({}, "", ["exactly one of cell and map; nodes and struts; pattern"]),
+    ({}, "", ["exactly one of cell and map; nodes and struts; path; pattern"]),
 ]
 
 
