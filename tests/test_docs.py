@@ -7,6 +7,7 @@ commands. `python` blocks of a page share their names.
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -63,7 +64,7 @@ def run_toml(text, line):
 
 def run_shell(text):
     for row in text.splitlines():
-        words = row.split()
+        words = shlex.split(row)
         assert words[0] == "trabecula", f"only the command itself may stand in a sh block: {row}"
         command(words[1:])
 
