@@ -666,7 +666,7 @@ class Solid(Seen):
         The same for any number of ``threads``. Raises ValueError for an edge greater than the thinnest wall, a mesh beyond the
         memory there is, a side of what is no sheet, ``periodic`` where the solid is not.
         """
-        from .volumes import OF, TET_BYTES, VolumeMesh
+        from .volumes import OF, TET_BYTES, VolumeMesh, warn_flaws
 
         if of not in OF:
             raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
@@ -681,13 +681,7 @@ class Solid(Seen):
         fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
         core = _core.VolumeMesh.make(self._core, size, of, order, periodic, _threads(threads), progress)
         made = VolumeMesh(core, self._core.design)
-        figures = made.report()
-        if figures.pieces > 1 and of in ("solid", "lower", "upper") and not periodic:
-            warnings.warn(
-                f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another",
-                DesignWarning,
-                stacklevel=2,
-            )
+        warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
         return made
 
     def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import copy
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
 from . import _core
+from .errors import DesignWarning
 from .files import extension, whole_file
 from .formats import VOLUME_WRITES
 from .given import number, positive
 from .mesh import Mesh
+from .texts import counted
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -29,6 +32,8 @@ __all__ = ["VolumeMesh", "VolumeSet"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
+#: Dihedral angles (degrees) outside of which tetrahedra are warned of.
+SHARP, FLAT = 12, 160
 #: Bytes for each tetrahedron: the background, the cut mesh and its faces while they are sorted.
 TET_BYTES = 420
 
@@ -123,3 +128,18 @@ class VolumeMesh:
         title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
         with whole_file(path) as temporary:
             self._core.write((temporary, kind, title), elastic)
+
+
+def warn_flaws(made: VolumeMesh, one: bool) -> None:
+    """Warns of several components, if there should be ``one``, of surfaces that cross, and of badly shaped tetrahedra."""
+    figures, found = made.report(), []
+    if one and figures.pieces > 1:
+        found += [f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another"]
+    crossing = made.boundary().self_intersections
+    if crossing:
+        found += [f"{counted(crossing, 'pair')} of boundary triangles cross, where the void is narrow; use a smaller edge"]
+    if figures.min_angle < SHARP or figures.max_angle > FLAT:
+        angles = f"{figures.min_angle:.1f} to {figures.max_angle:.1f}"
+        found += [f"dihedral angles run from {angles} degrees; a smaller edge mostly brings them to {SHARP} to {FLAT}"]
+    for message in found:
+        warnings.warn(message, DesignWarning, stacklevel=3)

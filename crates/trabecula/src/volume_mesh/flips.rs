@@ -265,8 +265,26 @@ impl Shaping<'_> {
                 return false;
             }
         }
-        // Where both ends are on the boundary, so must the edge be.
-        true
+        // Two edges of the boundary that become one are those of a face that goes.
+        let on = |n: &u32| self.on[*n as usize] != 0;
+        let pinches = on(&m)
+            && on(&n)
+            && ring.iter().filter(|k| on(k)).any(|k| {
+                let mut at = self.around[*k as usize]
+                    .iter()
+                    .filter(|t| [n, m].iter().all(|n| self.tets[**t as usize].contains(n)));
+                let (first, second) = (at.next(), at.next());
+                let domain = |t: Option<&u32>| t.map(|t| self.domain[*t as usize]);
+                domain(first) == domain(second) && self.on_boundary([n, *k]) && self.on_boundary([m, *k])
+            });
+        !pinches
+    }
+
+    /// Whether an edge is one of the boundary or between domains.
+    fn on_boundary(&self, edge: [u32; 2]) -> bool {
+        let at = self.at_edge(edge);
+        at.iter().any(|t| self.domain[*t as usize] != self.domain[at[0] as usize])
+            || self.ring(edge, &at).is_none_or(|(_, closed)| !closed)
     }
 
     /// Replaces tetrahedra of one domain.
