@@ -28,6 +28,7 @@ mod named_sets;
 mod node_surfaces;
 mod partition;
 mod shaping;
+mod slivers;
 mod surface_cuts;
 
 use body_centred::Cubes;
@@ -65,7 +66,7 @@ pub struct Made {
     pub straight: usize,
     /// Connected components.
     pub pieces: usize,
-    /// Volume that was left out: small components, and where the boundary would touch itself (mm³).
+    /// Volume that was left out: small components, flat tetrahedra, and where the boundary would touch itself (mm³).
     pub dropped: f64,
     /// Edges of the background's cubes, stretched so that a whole number fits (mm).
     pub step: Vec3,
@@ -119,7 +120,7 @@ pub fn volume_mesh(
         }
         partition.cut(s, step);
     }
-    let (mut shaping, dropped) = prepared(partition, options);
+    let (mut shaping, mut dropped) = prepared(partition, options);
     if shaping.tets.is_empty() {
         let m = format!(
             "nothing to mesh: no tetrahedron of edge {} mm lies in it; use a smaller edge",
@@ -133,6 +134,9 @@ pub fn volume_mesh(
     }
     if !whole {
         return Err(Stopped::Interrupted);
+    }
+    if options.of != Of::All {
+        dropped += shaping.shell();
     }
     if options.order == 1 {
         shaping.balance();

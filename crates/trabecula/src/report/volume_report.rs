@@ -30,7 +30,7 @@ pub struct VolumeReport {
     pub deviation: f64,
     /// Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted.
     pub straight: usize,
-    /// Volume left out, mm³: small loose components, and tetrahedra where the boundary would touch itself.
+    /// Volume left out, mm³: small loose components, flat tetrahedra, and those where the boundary would touch itself.
     pub dropped: f64,
     /// Number of nodes on upper bounding planes that are tied to their periodic images.
     pub pairs: usize,

@@ -48,7 +48,7 @@ impl Shaping<'_> {
     }
 
     /// The tetrahedra at an edge.
-    fn at_edge(&self, [a, b]: [u32; 2]) -> Vec<u32> {
+    pub fn at_edge(&self, [a, b]: [u32; 2]) -> Vec<u32> {
         let has = |t: &&u32| self.tets[**t as usize].contains(&b);
         self.around[a as usize].iter().filter(has).copied().collect()
     }
@@ -281,7 +281,7 @@ impl Shaping<'_> {
     }
 
     /// Whether an edge is one of the boundary or between domains.
-    fn on_boundary(&self, edge: [u32; 2]) -> bool {
+    pub fn on_boundary(&self, edge: [u32; 2]) -> bool {
         let at = self.at_edge(edge);
         at.iter().any(|t| self.domain[*t as usize] != self.domain[at[0] as usize])
             || self.ring(edge, &at).is_none_or(|(_, closed)| !closed)
