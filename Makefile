@@ -98,7 +98,7 @@ $(WASM): $(STUDIO_SOURCES)
 	  echo "The studio needs Rust's target wasm32-unknown-unknown; add it and run this again:"; \
 	  echo "  rustup target add wasm32-unknown-unknown"; exit 1; }
 	@echo "building the core as WebAssembly (minutes)"
-	@RUSTFLAGS="-C target-feature=+simd128 -C link-arg=-zstack-size=4194304" cargo build --quiet --locked --release \
+	@RUSTFLAGS="-C link-arg=-zstack-size=4194304 -C target-feature=+simd128" cargo build --quiet --locked --release \
 	  --manifest-path crates/trabecula-wasm/Cargo.toml --target wasm32-unknown-unknown --target-dir target/wasm
 	@touch $@
 

@@ -1,6 +1,6 @@
 """Puts the studio together: one page without anything outside it, from its sources in studio/, the viewer and the core as WebAssembly.
 
-    python scripts/studio_page.py CORE.wasm PAGE.html...
+python scripts/studio_page.py CORE.wasm PAGE.html...
 """
 
 import base64

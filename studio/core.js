@@ -27,7 +27,8 @@ class Core {
       this.waiting.delete(data.id);
       if (!("broken" in data)) return done(data);
       // A mistake of ours leaves the core in no state to go on from.
-      refuse(new Error(`internal error in the core: ${data.broken}`));
+      refuse(new Error(data.broken ? `internal error in the core: ${data.broken}`
+        : "the work needs more memory than a page can have; use a larger grid spacing, or the command `trabecula mesh`"));
       this.restart();
     };
     await this.send({ module: this.module });

@@ -158,6 +158,7 @@ function wrong(error) {
   text.setAttribute("aria-invalid", "true");
   state.line = error.line;
   lines();
+  document.body.classList.add("wrong");
   $("mesh").disabled = true;
   say("the design has an error");
 }
@@ -167,6 +168,7 @@ function right() {
   text.removeAttribute("aria-invalid");
   state.line = null;
   lines();
+  document.body.classList.remove("wrong");
   $("mesh").disabled = false;
 }
 
@@ -196,7 +198,8 @@ async function stop() {
 }
 
 async function mesh() {
-  if (state.meshing || $("mesh").disabled) return;
+  if (state.asked || $("mesh").disabled) return;
+  state.asked = true;
   while (state.busy) await pause(20);
   state.busy = state.meshing = true;
   for (const id of ["progress", "cancel"]) $(id).hidden = false;
@@ -206,14 +209,18 @@ async function mesh() {
   try {
     const per = +$("edge").value;
     const { head, body, ms } = await core.ask({ do: "mesh", edge: per > 0 ? per : null, per_cell: null });
-    if (head.error) { $("error").textContent = head.error.text; $("error").hidden = false; return; }
+    if (head.error) {
+      $("error").textContent = head.error.text;
+      $("error").hidden = false;
+      return say("no mesh");
+    }
     if (head.drawn) draw(head.triangles, body);
     made(head, ms);
   } catch (error) {
     if (error.name !== "stopped") throw error;
     state.stale = true;
   } finally {
-    state.busy = state.meshing = false;
+    state.busy = state.meshing = state.asked = false;
     for (const id of ["progress", "cancel"]) $(id).hidden = true;
     $("mesh").hidden = false;
   }
@@ -230,6 +237,7 @@ function made(head, ms) {
     ["closed", it.closed ? "yes" : "no"], ["Euler number", it.euler],
     ["hydraulic diameter", it.hydraulic_diameter && number(it.hydraulic_diameter), "mm"],
   ]);
+  $("notes").replaceChildren(...head.notes.map((words) => Object.assign(document.createElement("li"), { textContent: words })));
   $("made").hidden = false;
   say(`mesh made in ${(ms / 1000).toFixed(2)} s${head.drawn ? "" : "; too large to be drawn: the picture stays"}`);
   document.body.dataset.meshed = head.triangles;
@@ -297,7 +305,7 @@ async function fromAddress() {
   }
 }
 
-// The design that `trabecula studio DESIGN` serves, with the files that it names.
+// The design that `trabecula studio DESIGN` serves, with the files that it names; these are there after a reload too.
 async function fromCommand() {
   if (!new URLSearchParams(location.search).has("design")) return null;
   const given = await (await fetch("design.json")).json();
@@ -329,11 +337,13 @@ async function begin() {
     if (e.key === "Escape" && state.meshing) stop().catch(broken);
   });
   if (!screen_) document.querySelector("figure.viewer").classList.add("still");
-  text.value = (await fromAddress()) ?? START;
+  const own = await fromAddress();
+  text.value = own ?? START;
   lines();
   await core.restart();
   controls.fill((await core.ask({ do: "catalogue" })).head);
-  if (location.hash.length < 4) text.value = (await fromCommand()) ?? text.value;
+  const served = await fromCommand();
+  text.value = own ?? served ?? START;
   lines();
   changed();
 }

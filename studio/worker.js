@@ -40,6 +40,8 @@ onmessage = async ({ data }) => {
     const { head, body } = ask(data.request, data.bytes || new Uint8Array());
     postMessage({ id: data.id, head, body, ms: performance.now() - start }, [body]);
   } catch (error) {
-    postMessage({ id: data.id, broken: imports.words || error.message });
+    // Where memory is at its end there are no words.
+    const words = imports.words || (error instanceof WebAssembly.RuntimeError ? "" : error.message);
+    postMessage({ id: data.id, broken: words || "" });
   }
 };

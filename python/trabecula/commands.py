@@ -23,7 +23,20 @@ from .texts import counted, table, voids
 
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new"),
-    *("permeability", "render", "report", "schema", "simplify", "slice", "stiffness", "studio", "sweep", "tets", "volume", "voxels"),
+    *(
+        "permeability",
+        "render",
+        "report",
+        "schema",
+        "simplify",
+        "slice",
+        "stiffness",
+        "studio",
+        "sweep",
+        "tets",
+        "volume",
+        "voxels",
+    ),
 ]
 
 

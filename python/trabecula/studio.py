@@ -39,9 +39,7 @@ def given(design: str) -> tuple[dict, list[str]]:
     except DesignError:
         named = []
     folder = os.path.dirname(os.path.abspath(design))
-    listed = [
-        {"name": os.path.relpath(path, folder).replace(os.sep, "/"), "url": f"files/{i}"} for i, path in enumerate(named)
-    ]
+    listed = [{"name": os.path.relpath(path, folder).replace(os.sep, "/"), "url": f"files/{i}"} for i, path in enumerate(named)]
     name = os.path.splitext(os.path.basename(design))[0]
     return {"name": name, "text": text, "files": listed}, named
 

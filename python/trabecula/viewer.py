@@ -30,6 +30,7 @@ LIGHT = 150_000
 #: Steps of positions and values: what 16 bits hold.
 STEPS = 65535
 
+
 def script() -> str:
     """The program of the viewer, JavaScript."""
     return files(__package__).joinpath("viewer.js").read_text(encoding="utf-8")
