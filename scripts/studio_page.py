@@ -1,4 +1,4 @@
-"""Puts the studio together: one page without anything outside it, from its sources in studio/, the viewer and the core as WebAssembly.
+"""Puts the studio together: one page with nothing outside it, from its sources in studio/, the viewer and the core as wasm.
 
 python scripts/studio_page.py CORE.wasm PAGE.html...
 """

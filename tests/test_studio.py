@@ -324,8 +324,9 @@ def test_a_mesh_is_cancelled_and_the_page_goes_on(browser):
 
 def test_a_phone_has_no_sideways_scroll_and_all_controls_have_names(browser):
     with served() as url, opened(browser, url) as page:
-        unnamed = """[...document.querySelectorAll("button, input:not([hidden]), select, textarea")].filter((e) =>
-            !e.getAttribute("aria-label") && !e.closest("label")?.textContent.trim() && !e.textContent.trim()).map((e) => e.outerHTML)"""
+        unnamed = """[...document.querySelectorAll("button, input:not([hidden]), select, textarea")]
+            .filter((e) => ![e.ariaLabel, e.closest("label")?.textContent, e.textContent].some((t) => t?.trim()))
+            .map((e) => e.outerHTML)"""
         assert page.evaluate(unnamed) == []
         page.set_viewport_size({"width": 390, "height": 800})
         page.wait_for_timeout(200)
