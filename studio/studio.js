@@ -21,21 +21,22 @@ fraction = 0.3
 const MESHES = ["stl", "3mf", "ply", "obj", "off"];
 /** Milliseconds that a picture may take while something moves, and at rest. */
 const MOVING = 100, AT_REST = 700;
-const LEAST = 2000, MOST = 600000;
+const LEAST = 12000, MOST = 600000;
 
 const core = new Core();
 const text = $("text");
 const screen_ = viewer(document.querySelector("figure.viewer"));
 const state = { name: "design", stale: false, busy: false, meshing: false, cells: 12000, bounds: null, opened: false };
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
-const controls = new Controls(async (changes) => {
-  // One change after another: each is made in the text that the last one left.
-  controls.queue = (controls.queue || Promise.resolve()).then(async () => {
-    if (state.meshing) await stop();
-    const { head } = await core.ask({ do: "edit", text: text.value, changes });
-    if (head.error) return wrong(head.error);
-    write(head.text);
-  }).catch(broken);
+// What controls have changed and the text does not have yet: of each value the last change.
+const pending = new Map();
+const controls = new Controls((changes) => {
+  for (const change of changes) {
+    const place = change.path.join(".");
+    pending.delete(place);
+    pending.set(place, change);
+  }
+  changed();
 });
 
 function write(words) {
@@ -63,7 +64,7 @@ async function live() {
   try {
     while (state.stale) {
       state.stale = false;
-      await show();
+      if (await edited()) await show();
     }
   } catch (error) {
     if (error.name !== "stopped") throw error;
@@ -74,6 +75,18 @@ async function live() {
   if (state.stale) return live();
 }
 
+// Brings what controls have changed into the text.
+async function edited() {
+  if (!pending.size) return true;
+  const changes = [...pending.values()];
+  pending.clear();
+  const { head } = await core.ask({ do: "edit", text: text.value, changes });
+  if (head.error) { wrong(head.error); return false; }
+  text.value = head.text;
+  lines();
+  return true;
+}
+
 async function show() {
   const { head } = await core.ask({ do: "open", text: text.value });
   if (head.error) return wrong(head.error);
@@ -82,35 +95,38 @@ async function show() {
   controls.read(head.data, head.bounds);
   state.warnings = head.warnings;
   keep();
-  if (state.stale) return;
-  const ms = await picture(state.cells, "preview");
+  // While something moves there is a picture of each text that was read: a newer one waits for it.
+  const ms = await picture(state.cells, true);
   state.cells = Math.max(LEAST, Math.min(MOST / 6, state.cells * Math.max(0.4, Math.min(2.5, MOVING / ms))));
   await pause(state.opened ? 150 : 0);
+  if (state.stale) return;
+  if (state.partly) await picture(state.cells, false);
   if (state.stale) return;
   const figures = (await core.ask({ do: "figures" })).head;
   controls.facts = figures;
   facts(figures);
   if (state.stale) return;
   const finer = Math.min(MOST, (state.used * AT_REST) / Math.max(ms, 20));
-  if (finer > 1.5 * state.used) await picture(finer, "picture");
+  if (finer > 1.5 * state.used) await picture(finer, false);
   state.opened = true;
 }
 
-async function picture(cells, what) {
-  const { head, body, ms } = await core.ask({ do: "picture", cells });
+async function picture(cells, moving) {
+  const { head, body, ms } = await core.ask({ do: "picture", cells, part: moving && state.opened });
   if (head.error) { wrong(head.error); return MOVING; }
-  draw(head.triangles, body);
-  state.used = head.cells;
+  draw(head, body);
+  [state.used, state.partly] = [head.cells, head.part];
+  const what = head.part ? "the middle of the part" : "picture";
   say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`);
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
   return ms;
 }
 
-function draw(triangles, body) {
+function draw({ vertices, triangles }, body) {
   if (!screen_ || !body.byteLength) return;
   const [min, max] = state.bounds;
-  const position = new Float32Array(body, 0, 9 * triangles), normal = new Int16Array(body, 36 * triangles, 12 * triangles);
-  screen_.show({ min, max, span: null }, { position, normal });
+  const position = new Float32Array(body, 0, 3 * vertices), normal = new Int16Array(body, 12 * vertices, 4 * vertices);
+  screen_.show({ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) });
 }
 
 // --- figures ---------------------------------------------------------------------------------------------------------
@@ -214,7 +230,7 @@ async function mesh() {
       $("error").hidden = false;
       return say("no mesh");
     }
-    if (head.drawn) draw(head.triangles, body);
+    if (head.drawn) draw(head, body);
     made(head, ms);
   } catch (error) {
     if (error.name !== "stopped") throw error;

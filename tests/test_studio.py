@@ -189,7 +189,7 @@ def test_the_page_designs_meshes_and_saves_what_the_command_does(browser, tmp_pa
     with served(tmp_path / "box.toml") as url, opened(browser, url) as page:
         assert page.input_value("#text") == BOX
         assert int(page.get_attribute("figure.viewer", "data-drawn")) > 1000
-        # A slider changes the text and nothing else in it; the picture follows.
+        # A slider changes its value and nothing else in the text; the picture follows.
         before = page.evaluate("+document.body.dataset.pictures")
         page.focus("#amount")
         for _ in range(4):
@@ -305,6 +305,23 @@ def test_mistakes_stand_at_their_line_and_files_are_dropped_in(browser, tmp_path
         page.wait_for_function("text.value.startsWith('# kept')", timeout=20_000)
         settled(page)
         assert page.is_hidden("#error")
+
+
+def test_the_picture_follows_a_slider_that_does_not_rest(browser):
+    """Changes come faster than pictures: none is queued, pictures go on, and the last change is what stays."""
+    move = """async () => {
+        const slider = document.getElementById("amount"), before = +document.body.dataset.pictures;
+        for (let i = 0; i < 60; i++) {
+            slider.value = 0.2 + 0.005 * i;
+            slider.dispatchEvent(new Event("input", { bubbles: true }));
+            await new Promise((done) => setTimeout(done, 25));
+        }
+        return +document.body.dataset.pictures - before; }"""
+    with served() as url, opened(browser, url) as page:
+        assert page.evaluate(move) >= 1
+        settled(page)
+        assert "fraction = 0.495\n" in page.input_value("#text")
+        assert page.evaluate("pending.size") == 0
 
 
 def test_a_mesh_is_cancelled_and_the_page_goes_on(browser):

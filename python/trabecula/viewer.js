@@ -128,14 +128,21 @@ function roundLength(of) {
   return [5, 2, 1].map((m) => m * power).find((v) => v <= of);
 }
 
-// A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays by
-// corner, and leaves the camera and the section where they are.
+// Whether the processor draws: smoothing edges then takes as long as all else.
+function drawnBySoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const known = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  return !!known && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
+}
+
+// A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays: of each
+// corner, or of vertices with an `index`. The camera and the section stay where they are.
 function viewer(figure) {
   const canvas = figure.querySelector("canvas");
-  const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
+  const gl = canvas.getContext("webgl2", { antialias: !drawnBySoftware(), alpha: true, preserveDrawingBuffer: true });
   if (!gl) return null;
-  const shader = program(gl), buffers = {};
-  let head = { min: [0, 0, 0], max: [1, 1, 1], span: null }, count = 0, size = 1, middle = [0, 0, 0];
+  const shader = program(gl), buffers = {}, indices = gl.createBuffer();
+  let head = { min: [0, 0, 0], max: [1, 1, 1], span: null }, count = 0, indexed = false, size = 1, middle = [0, 0, 0];
   for (const [name, width, type] of [["position", 3, gl.FLOAT], ["normal", 4, gl.SHORT], ["value", 1, gl.FLOAT]]) {
     const at = gl.getAttribLocation(shader, name);
     buffers[name] = gl.createBuffer();
@@ -149,7 +156,10 @@ function viewer(figure) {
 
   function show(shown, of) {
     head = shown;
-    count = of.position.length / 3;
+    indexed = !!of.index;
+    count = indexed ? of.index.length : of.position.length / 3;
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+    if (indexed) gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, of.index, gl.DYNAMIC_DRAW);
     for (const name in buffers) {
       const data = of[name] && of[name].length ? of[name] : null;
       const at = gl.getAttribLocation(shader, name);
@@ -202,7 +212,8 @@ function viewer(figure) {
     gl.uniform1i(uniform("colours"), state.colours);
     gl.uniform1f(uniform("steep"), Math.cos((state.steep * Math.PI) / 180));
     gl.uniform2fv(uniform("span"), head.span || [0, 1]);
-    gl.drawArrays(gl.TRIANGLES, 0, count);
+    if (indexed) gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+    else gl.drawArrays(gl.TRIANGLES, 0, count);
     marks(rows, (2 * reach()) / side, a);
   }
 

@@ -1,4 +1,4 @@
-//! A mesh as the arrays that a graphics card draws: three corners for each triangle, one after another.
+//! A mesh as the arrays that a graphics card draws.
 
 use geometry::math::{Vec3, cross, dot, norm, sub};
 use geometry::surface_mesh::SurfaceMesh;
@@ -8,9 +8,18 @@ const CREASE: f64 = 0.819_152_044_288_992;
 /// One, as a 16-bit number of a normal.
 const ONE: f64 = 32767.0;
 
-/// Of each corner its position (3 × f32, mm); then of each its normal and whether its triangle is cut (4 × i16, 32767 is one).
-/// A normal is the mean of those of the triangles around the vertex that lie within 35° of the corner's own, by area.
-pub fn corners(surface: &SurfaceMesh) -> Vec<u8> {
+/// Arrays for drawing.
+pub struct Arrays {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Of each vertex its position (3 × f32, mm); then of each its normal and whether its triangles are cut (4 × i16, 32767 is one);
+    /// then of each triangle its vertices (3 × u32).
+    pub bytes: Vec<u8>,
+}
+
+/// The arrays of a surface. A vertex occurs once for each of its normals. A normal is the mean of those of the triangles around the
+/// vertex that lie within 35° of the corner's own, by area.
+pub fn arrays(surface: &SurfaceMesh) -> Arrays {
     let mesh = &surface.mesh;
     let normals: Vec<Vec3> = (0..mesh.triangles.len())
         .map(|t| {
@@ -20,10 +29,8 @@ pub fn corners(surface: &SurfaceMesh) -> Vec<u8> {
         .collect();
     let lengths: Vec<f64> = normals.iter().map(|n| norm(*n).max(1e-300)).collect();
     let around = Around::of(&mesh.triangles, mesh.vertices.len());
-    let mut bytes = Vec::with_capacity(mesh.triangles.len() * 60);
-    for v in mesh.triangles.as_flattened() {
-        bytes.extend(mesh.vertices[*v as usize].iter().flat_map(|x| (*x as f32).to_le_bytes()));
-    }
+    let mut found = Found::new(mesh.vertices.len());
+    let mut index = Vec::with_capacity(12 * mesh.triangles.len());
     for (t, corners) in mesh.triangles.iter().enumerate() {
         let cut = if surface.cut[t] { ONE } else { 0.0 };
         for v in corners {
@@ -36,10 +43,47 @@ pub fn corners(surface: &SurfaceMesh) -> Vec<u8> {
             }
             let length = norm(sum).max(1e-300);
             let [x, y, z] = sum.map(|c| c / length * ONE);
-            bytes.extend([x, y, z, cut].iter().flat_map(|c| (c.round() as i16).to_le_bytes()));
+            index.extend(found.number(*v, [x, y, z, cut].map(|c| c.round() as i16)).to_le_bytes());
         }
     }
-    bytes
+    let positions = found.vertices.iter().flat_map(|v| mesh.vertices[*v as usize]);
+    let mut bytes: Vec<u8> = positions.flat_map(|x| (x as f32).to_le_bytes()).collect();
+    bytes.extend(found.normals.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
+    bytes.extend(index);
+    Arrays { vertices: found.vertices.len(), bytes }
+}
+
+/// No vertex.
+const NONE: u32 = u32::MAX;
+
+/// Vertices with one normal each: those of a vertex of the mesh are a chain.
+struct Found {
+    first: Vec<u32>,
+    next: Vec<u32>,
+    vertices: Vec<u32>,
+    normals: Vec<[i16; 4]>,
+}
+
+impl Found {
+    fn new(vertices: usize) -> Found {
+        Found { first: vec![NONE; vertices], next: Vec::new(), vertices: Vec::new(), normals: Vec::new() }
+    }
+
+    /// The number of a vertex of the mesh with this normal.
+    fn number(&mut self, v: u32, normal: [i16; 4]) -> u32 {
+        let mut at = self.first[v as usize];
+        while at != NONE && self.normals[at as usize] != normal {
+            at = self.next[at as usize];
+        }
+        if at == NONE {
+            at = self.vertices.len() as u32;
+            self.next.push(self.first[v as usize]);
+            self.first[v as usize] = at;
+            self.vertices.push(v);
+            self.normals.push(normal);
+        }
+        at
+    }
 }
 
 /// The triangles around each vertex.

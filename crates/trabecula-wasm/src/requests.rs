@@ -1,6 +1,7 @@
 //! What a page can ask, and the answers.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use geometry::formats::{self, Metadata};
 use geometry::progress::{Progress, Silent, Stopped};
@@ -9,16 +10,20 @@ use serde::Deserialize;
 use serde_json::{Value as Json, json};
 use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::extract;
+use trabecula::region::{Cuboid, Intersection, Region};
 use trabecula::report::{IslandsReport, MeshReport};
 use trabecula::surface_maker::{Figures, Made, Options};
 
-use crate::corners::corners;
+use crate::corners::arrays;
 use crate::edit::{Change, edit};
 use crate::host;
 use crate::resolution::{self, Resolution};
 
 /// Triangles of a mesh above which it is not drawn, and a picture of it must do.
 const DRAWN: usize = 1_500_000;
+
+/// How many times the grid cells that are asked for make a picture of the whole wait.
+const FAR: f64 = 5.0;
 
 /// A request. Bytes may follow.
 #[derive(Debug, Deserialize)]
@@ -34,8 +39,12 @@ enum Request {
     Open { text: String },
     /// The figures of the design, as `trabecula check --json`.
     Figures,
-    /// Arrays of the surface on about this number of grid cells.
-    Picture { cells: f64 },
+    /// Arrays of the surface on about this number of grid cells; of a middle part of it, if that is allowed and the whole takes many more.
+    Picture {
+        cells: f64,
+        #[serde(default)]
+        part: bool,
+    },
     /// The surface as `trabecula mesh` makes it: its figures, and its arrays.
     Mesh { edge: Option<f64>, per_cell: Option<f64> },
     /// That surface as the bytes of a file.
@@ -139,7 +148,7 @@ impl Session {
             Request::Edit { text, changes } => Ok((json!({ "text": edit(&text, &changes)? }), Vec::new())),
             Request::Open { text } => self.open(&text),
             Request::Figures => self.figures(),
-            Request::Picture { cells } => picture(self.built()?, cells),
+            Request::Picture { cells, part } => picture(self.built()?, cells, part),
             Request::Mesh { edge, per_cell } => self.mesh(edge, per_cell),
             Request::Write { suffix } => self.write(&suffix),
         }
@@ -199,14 +208,14 @@ impl Session {
             Resolution::Grid(edge) => (Some(edge), None),
             Resolution::Chord(chord) => (None, Some(chord)),
         };
+        let drawn = (triangles <= DRAWN).then(|| arrays(&surface));
         let head = json!({
-            "figures": figures, "triangles": triangles, "edge": spacing, "chord": chord, "drawn": triangles <= DRAWN,
+            "figures": figures, "vertices": drawn.as_ref().map(|a| a.vertices), "triangles": triangles, "edge": spacing, "chord": chord, "drawn": drawn.is_some(),
             "islands": IslandsReport::from(&made.components), "open": built.is_open(),
             "notes": notes,
         });
-        let arrays = if triangles <= DRAWN { corners(&surface) } else { Vec::new() };
         self.made = Some(surface);
-        Ok((head, arrays))
+        Ok((head, drawn.map_or_else(Vec::new, |a| a.bytes)))
     }
 
     fn write(&self, suffix: &str) -> Answer {
@@ -230,16 +239,42 @@ fn surface(built: &Built, resolution: Resolution, progress: &dyn Progress) -> Re
     })
 }
 
-fn picture(built: &Built, cells: f64) -> Answer {
+fn picture(built: &Built, cells: f64, part: bool) -> Answer {
     let resolution = resolution::of_picture(built, cells);
-    let made = surface(built, resolution, &Silent)?;
-    let surface = if built.is_open() { made.surface.uncapped() } else { made.surface };
-    let (edge, used) = match resolution {
+    let (edge, whole) = match resolution {
         Resolution::Grid(edge) => (Some(edge), resolution::cells(built, edge)),
         Resolution::Chord(_) => (None, cells),
     };
-    let head = json!({ "triangles": surface.mesh.triangles.len(), "edge": edge, "cells": used });
-    Ok((head, corners(&surface)))
+    let middle = match edge {
+        Some(edge) if part && whole > FAR * cells => middle(built, edge, (cells / whole).cbrt())?,
+        _ => None,
+    };
+    let (surface, partly) = match middle {
+        Some(surface) => (surface, true),
+        None => (surface(built, resolution, &Silent)?.surface, false),
+    };
+    let surface = if built.is_open() { surface.uncapped() } else { surface };
+    let drawn = arrays(&surface);
+    let head = json!({
+        "triangles": surface.mesh.triangles.len(), "vertices": drawn.vertices, "edge": edge,
+        "cells": if partly { cells } else { whole }, "part": partly,
+    });
+    Ok((head, drawn.bytes))
+}
+
+/// The surface in a box in the middle of the region's bounds, this share of them along each axis; `None` where nothing is there.
+fn middle(built: &Built, edge: f64, share: f64) -> Result<Option<SurfaceMesh>, Refused> {
+    let Built { solid, .. } = built;
+    let bounds = solid.region.bounds();
+    let at = |side: f64| {
+        [0, 1, 2].map(|a| 0.5 * (bounds.min[a] + bounds.max[a] + side * share * (bounds.max[a] - bounds.min[a])))
+    };
+    let window: Region = Arc::new(Cuboid::new(at(-1.0), at(1.0)).map_err(Stopped::Refused)?);
+    let both = Intersection::new(vec![solid.region.clone(), window]).map_err(Stopped::Refused)?;
+    let (field, filled) = (solid.field.clone(), solid.filled.clone());
+    let cropped = trabecula::Solid { region: Arc::new(both), field, filled, ..*solid };
+    let surface = extract::surface(&cropped, edge, &Silent)?;
+    Ok((!surface.mesh.triangles.is_empty()).then_some(surface))
 }
 
 /// The volume of the region, mm³: exact where it is known, else of its surface at about the spacing of the mesh.
