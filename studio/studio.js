@@ -96,8 +96,7 @@ async function show() {
   state.warnings = head.warnings;
   keep();
   // While something moves there is a picture of each text that was read: a newer one waits for it.
-  const ms = await picture(state.cells, true);
-  state.cells = Math.max(LEAST, Math.min(MOST / 6, state.cells * Math.max(0.4, Math.min(2.5, MOVING / ms))));
+  await picture(state.cells, true);
   await pause(state.opened ? 150 : 0);
   if (state.stale) return;
   if (state.partly) await picture(state.cells, false);
@@ -106,25 +105,24 @@ async function show() {
   controls.facts = figures;
   facts(figures);
   if (state.stale) return;
-  const finer = Math.min(MOST, (state.used * AT_REST) / Math.max(ms, 20));
+  const finer = Math.min(MOST, (state.used * AT_REST) / Math.max(state.ms, 20));
   if (finer > 1.5 * state.used) await picture(finer, false);
   state.opened = true;
 }
 
 async function picture(cells, moving) {
   const { head, body, ms } = await core.ask({ do: "picture", cells, part: moving && state.opened });
-  if (head.error) { wrong(head.error); return MOVING; }
-  draw(head, body);
-  [state.used, state.partly] = [head.cells, head.part];
-  const what = head.part ? "the middle of the part" : "picture";
+  if (head.error) return wrong(head.error);
+  draw(head, body, head.bounds);
+  [state.used, state.partly, state.ms] = [head.cells, head.part, ms];
+  state.cells = Math.max(LEAST, Math.min(MOST / 6, (head.cells * MOVING) / Math.max(ms, 1)));
+  const what = head.part ? "the middle, while it changes," : "picture";
   say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`);
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
-  return ms;
 }
 
-function draw({ vertices, triangles }, body) {
+function draw({ vertices, triangles }, body, [min, max]) {
   if (!screen_ || !body.byteLength) return;
-  const [min, max] = state.bounds;
   const position = new Float32Array(body, 0, 3 * vertices), normal = new Int16Array(body, 12 * vertices, 4 * vertices);
   screen_.show({ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) });
 }
@@ -150,11 +148,12 @@ function rows(body, all) {
 function facts(it) {
   const some = (v) => v !== null && v !== undefined;
   const table = [];
-  for (const [name, l] of [...Object.entries(it.lattices), ...Object.entries(it.beams)]) {
-    const many = Object.keys(it.lattices).length + Object.keys(it.beams).length > 1 ? `${name}: ` : "";
-    const rest = l.part === "sheet" || !l.part ? "thinnest wall" : "narrowest neck";
+  const all = [["lattice", it.lattices], ["beams", it.beams]].flatMap(([kind, of]) => Object.entries(of).map(([name, l]) => [kind, name, l]));
+  for (const [kind, name, l] of all) {
+    const many = all.length > 1 ? `${name}: ` : "";
+    const thinnest = kind === "beams" ? "thinnest beam" : l.part === "sheet" ? "thinnest wall" : "narrowest neck";
     table.push([`${many}solid fraction`, some(l.fraction) && span(l.fraction), "", "of the cell on the torus"]);
-    table.push([`${many}${some(l.radius) ? "thinnest beam" : rest}`, some(l.thickness) && span(l.thickness), "mm"]);
+    table.push([`${many}${thinnest}`, some(l.thickness) && span(l.thickness), "mm"]);
     table.push([`${many}pore`, some(l.pore) && span(l.pore), "mm", "largest ball that passes between neighbouring cells"]);
     table.push([`${many}level t`, some(l.iso) && span(l.iso)]);
     if (l.connected_fraction) table.push([`${many}one piece`, `fraction ${l.connected_fraction.map((r) => r.map(number).join(" – ")).join(", ") || "never"}`, "", "fractions in which the periodic solid is one piece"]);
@@ -230,7 +229,7 @@ async function mesh() {
       $("error").hidden = false;
       return say("no mesh");
     }
-    if (head.drawn) draw(head, body);
+    if (head.drawn) draw(head, body, state.bounds);
     made(head, ms);
   } catch (error) {
     if (error.name !== "stopped") throw error;

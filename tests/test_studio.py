@@ -324,6 +324,18 @@ def test_the_picture_follows_a_slider_that_does_not_rest(browser):
         assert page.evaluate("pending.size") == 0
 
 
+def test_of_a_large_part_the_middle_is_shown_while_it_changes(browser):
+    with served() as url, opened(browser, url) as page:
+        large = page.input_value("#text").replace("[18, 18, 18]", "[90, 90, 90]")
+        assert "error" not in ask(page, do_="open", text=large)
+        found = ask(page, do_="picture", cells=12000, part=True)
+        # 12 steps of 0.5 mm on the wavelength, and a box of as many of them as were asked for, from the middle out.
+        assert found["part"] and found["edge"] == 0.5
+        half = 45 * (12000 / 181**3) ** (1 / 3)
+        assert found["bounds"] == [pytest.approx([-half] * 3), pytest.approx([half] * 3)]
+        assert found["triangles"] > 1000
+
+
 def test_a_mesh_is_cancelled_and_the_page_goes_on(browser):
     with served() as url, opened(browser, url) as page:
         page.fill("#edge", "0.06")

@@ -297,6 +297,6 @@ async function view(figure) {
   it.show(mesh.head, corners(mesh));
 }
 
-for (const figure of document.querySelectorAll("figure.viewer:has(script)")) {
-  view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
+for (const figure of document.querySelectorAll("figure.viewer")) {
+  if (figure.querySelector("script")) view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
 }

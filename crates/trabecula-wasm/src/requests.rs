@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use geometry::formats::{self, Metadata};
+use geometry::math::Aabb;
 use geometry::progress::{Progress, Silent, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
 use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::extract;
-use trabecula::region::{Cuboid, Intersection, Region};
+use trabecula::region::{Cuboid, Intersection, Region, Shape};
 use trabecula::report::{IslandsReport, MeshReport};
 use trabecula::surface_maker::{Figures, Made, Options};
 
@@ -249,21 +250,22 @@ fn picture(built: &Built, cells: f64, part: bool) -> Answer {
         Some(edge) if part && whole > FAR * cells => middle(built, edge, (cells / whole).cbrt())?,
         _ => None,
     };
-    let (surface, partly) = match middle {
-        Some(surface) => (surface, true),
-        None => (surface(built, resolution, &Silent)?.surface, false),
+    let partly = middle.is_some();
+    let (surface, bounds) = match middle {
+        Some(found) => found,
+        None => (surface(built, resolution, &Silent)?.surface, built.solid.region.bounds()),
     };
     let surface = if built.is_open() { surface.uncapped() } else { surface };
     let drawn = arrays(&surface);
     let head = json!({
         "triangles": surface.mesh.triangles.len(), "vertices": drawn.vertices, "edge": edge,
-        "cells": if partly { cells } else { whole }, "part": partly,
+        "cells": if partly { cells } else { whole }, "part": partly, "bounds": [bounds.min, bounds.max],
     });
     Ok((head, drawn.bytes))
 }
 
 /// The surface in a box in the middle of the region's bounds, this share of them along each axis; `None` where nothing is there.
-fn middle(built: &Built, edge: f64, share: f64) -> Result<Option<SurfaceMesh>, Refused> {
+fn middle(built: &Built, edge: f64, share: f64) -> Result<Option<(SurfaceMesh, Aabb)>, Refused> {
     let Built { solid, .. } = built;
     let bounds = solid.region.bounds();
     let at = |side: f64| {
@@ -271,10 +273,11 @@ fn middle(built: &Built, edge: f64, share: f64) -> Result<Option<SurfaceMesh>, R
     };
     let window: Region = Arc::new(Cuboid::new(at(-1.0), at(1.0)).map_err(Stopped::Refused)?);
     let both = Intersection::new(vec![solid.region.clone(), window]).map_err(Stopped::Refused)?;
+    let seen = both.bounds();
     let (field, filled) = (solid.field.clone(), solid.filled.clone());
     let cropped = trabecula::Solid { region: Arc::new(both), field, filled, ..*solid };
     let surface = extract::surface(&cropped, edge, &Silent)?;
-    Ok((!surface.mesh.triangles.is_empty()).then_some(surface))
+    Ok((!surface.mesh.triangles.is_empty()).then_some((surface, seen)))
 }
 
 /// The volume of the region, mm³: exact where it is known, else of its surface at about the spacing of the mesh.
