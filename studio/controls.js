@@ -11,7 +11,7 @@ const AMOUNTS = {
 const SHAPES = {
   box: { size: [20, 20, 20] },
   sphere: { radius: 10 },
-  cylinder: { base: [0, 0, -10], axis: [0, 0, 1], radius: 8, height: 20 },
+  cylinder: { base: [0, 0, -10], radius: 8, height: 20 },
 };
 const tidy = (v) => +(+v).toPrecision(6);
 const isRamp = (v) => v && typeof v === "object" && v.linear && v.linear.stops?.length === 2 && `${v.linear.along}` === "0,0,1";

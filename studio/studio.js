@@ -45,7 +45,9 @@ function write(words) {
   changed();
 }
 
-function say(words) {
+// What pictures say is not read aloud: there are many.
+function say(words, aloud = true) {
+  $("status").ariaLive = aloud ? "polite" : "off";
   $("status").textContent = words;
 }
 
@@ -117,7 +119,7 @@ async function picture(cells, moving) {
   [state.used, state.partly, state.ms] = [head.cells, head.part, ms];
   state.cells = Math.max(LEAST, Math.min(MOST / 6, (head.cells * MOVING) / Math.max(ms, 1)));
   const what = head.part ? "the middle, while it changes," : "picture";
-  say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`);
+  say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`, false);
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
 }
 
@@ -308,6 +310,17 @@ function keep() {
   }, 300);
 }
 
+async function share() {
+  written = await link();
+  history.replaceState(null, "", written);
+  try {
+    await navigator.clipboard.writeText(location.href.replace("?design", ""));
+    say("the address of this design is copied");
+  } catch {
+    say("the address above is that of this design; this browser lets no page copy it");
+  }
+}
+
 async function fromAddress() {
   const found = /#d=([\w-]+)/.exec(location.hash);
   if (!found || location.hash === written) return null;
@@ -339,10 +352,7 @@ async function begin() {
   $("open").addEventListener("click", () => $("file").click());
   $("toml").addEventListener("click", () => download(text.value, `${state.name}.toml`, "text/plain"));
   $("file").addEventListener("change", (e) => { take([...e.target.files]).catch(broken); e.target.value = ""; });
-  $("share").addEventListener("click", async () => {
-    await navigator.clipboard.writeText(location.href.split("#")[0].split("?")[0] + (await link()));
-    say("the address of this design is copied");
-  });
+  $("share").addEventListener("click", () => share().catch(broken));
   addEventListener("dragover", (e) => { e.preventDefault(); document.body.classList.add("over"); });
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) document.body.classList.remove("over"); });
   addEventListener("drop", (e) => { e.preventDefault(); document.body.classList.remove("over"); take([...e.dataTransfer.files]).catch(broken); });

@@ -1,6 +1,7 @@
 """The studio: its server, and in a browser the page itself: what it shows, meshes and saves is what the command does."""
 
 import contextlib
+import difflib
 import hashlib
 import json
 import threading
@@ -271,6 +272,40 @@ def test_other_designs_have_the_bytes_of_the_command(browser, tmp_path, name):
         found = ask(page, do_="mesh", edge=None, per_cell=None)
         assert "error" not in found, found
         assert ask(page, do_="write", suffix="stl")["sum"] == sum_of(tmp_path / "command.stl")
+
+
+#: What is changed, and what the text then is; "+" and "-" are lines that come and go.
+EDITS = {
+    "a number with its comment": (
+        [(["region", "box", "size"], [7, 6, 5.5])],
+        "-region.box.size = [6, 6, 6] # kept too +region.box.size = [7, 6, 5.5] # kept too",
+    ),
+    "in braces": (
+        [(["lattice", "core", "map", "affine", "wavelength"], 4.25)],
+        "-map.affine = { wavelength = 6 } +map.affine = { wavelength = 4.25 }",
+    ),
+    "another amount": (
+        [(["lattice", "core", "level", "fraction"], None), (["lattice", "core", "level", "thickness"], 0.5)],
+        "-level.fraction = 0.3 +level.thickness = 0.5",
+    ),
+    "a grade": (
+        [(["lattice", "core", "level", "fraction"], {"linear": {"along": [0, 0, 1], "stops": [[-3, 0.2], [3, 0.4]]}})],
+        "-level.fraction = 0.3 +level.fraction = { linear = { along = [0, 0, 1], stops = [[-3, 0.2], [3, 0.4]] } }",
+    ),
+    "a new table": ([(["skin"], {"thickness": 0.5})], "+ +[skin] +thickness = 0.5"),
+}
+
+
+def test_a_change_leaves_all_else_in_the_text_as_it_is(browser):
+    with served() as url, opened(browser, url) as page:
+        for name, (changes, difference) in EDITS.items():
+            listed = [{"path": path, "value": value, "heading": True} for path, value in changes]
+            made = ask(page, do_="edit", text=BOX, changes=listed)
+            lines = [d for d in difflib.ndiff(BOX.splitlines(), made["text"].splitlines()) if d[0] in "+-"]
+            assert " ".join(d[0] + d[2:] for d in lines) == difference, name
+            assert "error" not in ask(page, do_="open", text=made["text"]), name
+        refused = ask(page, do_="edit", text=BOX, changes=[{"path": ["schema", "a", "b"], "value": 1}])
+        assert refused["error"]["text"] == "a is in the way: what holds it is no table"
 
 
 def test_mistakes_stand_at_their_line_and_files_are_dropped_in(browser, tmp_path):
