@@ -82,6 +82,10 @@ async function edited() {
   if (!pending.size) return true;
   const changes = [...pending.values()];
   pending.clear();
+  if (text.value.trimStart().startsWith("{")) {
+    say("controls change designs in TOML; this one is JSON, and is changed in its text");
+    return true;
+  }
   const { head } = await core.ask({ do: "edit", text: text.value, changes });
   if (head.error) { wrong(head.error); return false; }
   text.value = head.text;
