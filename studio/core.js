@@ -25,11 +25,12 @@ class Core {
       if ("progress" in data) return this.onprogress(data.progress);
       const { done, refuse } = this.waiting.get(data.id);
       this.waiting.delete(data.id);
+      this.since = performance.now();
       if (!("broken" in data)) return done(data);
       // A mistake of ours leaves the core in no state to go on from.
       refuse(new Error(data.broken ? `internal error in the core: ${data.broken}`
         : "the work needs more memory than a page can have; use a larger grid spacing, or the command `trabecula mesh`"));
-      this.restart();
+      this.restart().catch(() => {});
     };
     await this.send({ module: this.module });
     for (const [name, bytes] of this.files) await this.send({ request: { do: "file", name }, bytes });
@@ -37,6 +38,7 @@ class Core {
 
   send(message) {
     const id = this.next++;
+    if (!this.waiting.size) this.since = performance.now();
     return new Promise((done, refuse) => {
       this.waiting.set(id, { done, refuse });
       this.worker.postMessage({ ...message, id });
@@ -47,6 +49,11 @@ class Core {
   async ask(request, bytes) {
     await this.ready;
     return this.send({ request, bytes });
+  }
+
+  // Milliseconds for which the worker has been at one request.
+  get busy() {
+    return this.waiting.size ? performance.now() - this.since : 0;
   }
 
   async file(name, bytes) {

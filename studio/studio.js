@@ -21,6 +21,8 @@ fraction = 0.3
 const MESHES = ["stl", "3mf", "ply", "obj", "off"];
 /** Milliseconds that a picture may take while something moves, and at rest. */
 const MOVING = 100, AT_REST = 700;
+/** Milliseconds after which work on an older text is given up. */
+const PATIENCE = 1500;
 const LEAST = 12000, MOST = 600000;
 
 const core = new Core();
@@ -56,7 +58,10 @@ function say(words, aloud = true) {
 function changed() {
   state.stale = true;
   $("made").hidden = true;
+  if (!state.ready) return;
   if (state.meshing) return void stop().catch(broken);
+  // What takes long is not waited for, since it is of an older text.
+  if (core.busy > PATIENCE) core.restart().catch(broken);
   live().catch(broken);
 }
 
@@ -106,13 +111,14 @@ async function show() {
   await pause(state.opened ? 150 : 0);
   if (state.stale) return;
   if (state.partly) await picture(state.cells, false);
+  const partly = state.partly;
   if (state.stale) return;
   const figures = (await core.ask({ do: "figures" })).head;
   controls.facts = figures;
   facts(figures);
   if (state.stale) return;
   const finer = Math.min(MOST, (state.used * AT_REST) / Math.max(state.ms, 20));
-  if (finer > 1.5 * state.used) await picture(finer, false);
+  if (!partly && finer > 1.5 * state.used) await picture(finer, false);
   state.opened = true;
 }
 
@@ -122,7 +128,7 @@ async function picture(cells, moving) {
   draw(head, body, head.bounds);
   [state.used, state.partly, state.ms] = [head.cells, head.part, ms];
   state.cells = Math.max(LEAST, Math.min(MOST / 6, (head.cells * MOVING) / Math.max(ms, 1)));
-  const what = head.part ? "the middle, while it changes," : "picture";
+  const what = !head.part ? "picture" : moving ? "the middle, while it changes," : "the middle (the whole has too many triangles for a picture)";
   say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`, false);
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
 }
@@ -374,6 +380,7 @@ async function begin() {
   const served = await fromCommand();
   text.value = own ?? served ?? START;
   lines();
+  state.ready = true;
   changed();
 }
 

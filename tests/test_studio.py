@@ -369,6 +369,12 @@ def test_of_a_large_part_the_middle_is_shown_while_it_changes(browser):
         half = 45 * (12000 / 181**3) ** (1 / 3)
         assert found["bounds"] == [pytest.approx([-half] * 3), pytest.approx([half] * 3)]
         assert found["triangles"] > 1000
+        # At rest too, where the whole has too many triangles; the page stays in hand.
+        write(page, large.replace("[90, 90, 90]", "[900, 900, 900]"))
+        assert page.inner_text("#status").startswith("the middle (")
+        page.click("#mesh")
+        page.wait_for_selector("#error:not([hidden])", timeout=60_000)
+        assert "million triangles do not fit into the memory of a page" in page.inner_text("#error")
 
 
 def test_a_mesh_is_cancelled_and_the_page_goes_on(browser):

@@ -26,6 +26,10 @@ const DRAWN: usize = 1_500_000;
 /// How many times the grid cells that are asked for make a picture of the whole wait.
 const FAR: f64 = 5.0;
 
+/// Grid cells of a picture above which its triangles are estimated first, and the most triangles of one.
+const MANY: f64 = 1e6;
+const LARGEST: f64 = 2e6;
+
 /// A request. Bytes may follow.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
@@ -40,7 +44,8 @@ enum Request {
     Open { text: String },
     /// The figures of the design, as `trabecula check --json`.
     Figures,
-    /// Arrays of the surface on about this number of grid cells; of a middle part of it, if that is allowed and the whole takes many more.
+    /// Arrays of the surface on about this number of grid cells; of a middle part of it, if that is allowed and the whole takes many more,
+    /// or if the whole has too many triangles for a picture.
     Picture {
         cells: f64,
         #[serde(default)]
@@ -241,13 +246,19 @@ fn surface(built: &Built, resolution: Resolution, progress: &dyn Progress) -> Re
 }
 
 fn picture(built: &Built, cells: f64, part: bool) -> Answer {
-    let resolution = resolution::of_picture(built, cells);
+    let resolution = resolution::of_picture(built, cells, LARGEST);
     let (edge, whole) = match resolution {
         Resolution::Grid(edge) => (Some(edge), resolution::cells(built, edge)),
         Resolution::Chord(_) => (None, cells),
     };
+    let share = match edge {
+        Some(_) if part && whole > FAR * cells => cells / whole,
+        // Triangles grow as cells do, where the lattice is about as dense.
+        Some(_) if whole > MANY => resolution::need(built, resolution).map_or(1.0, |n| LARGEST / n.triangles),
+        _ => 1.0,
+    };
     let middle = match edge {
-        Some(edge) if part && whole > FAR * cells => middle(built, edge, (cells / whole).cbrt())?,
+        Some(edge) if share < 1.0 => middle(built, edge, share.cbrt())?,
         _ => None,
     };
     let partly = middle.is_some();
@@ -259,7 +270,7 @@ fn picture(built: &Built, cells: f64, part: bool) -> Answer {
     let drawn = arrays(&surface);
     let head = json!({
         "triangles": surface.mesh.triangles.len(), "vertices": drawn.vertices, "edge": edge,
-        "cells": if partly { cells } else { whole }, "part": partly, "bounds": [bounds.min, bounds.max],
+        "cells": if partly { share * whole } else { whole }, "part": partly, "bounds": [bounds.min, bounds.max],
     });
     Ok((head, drawn.bytes))
 }

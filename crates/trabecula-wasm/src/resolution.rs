@@ -1,10 +1,14 @@
 //! At which resolution a mesh is made: what `trabecula mesh` takes, so that both give the same bytes; and the coarser one of a
 //! picture that is made while a number changes.
 
+use geometry::fault::Fault;
+use trabecula::SurfaceMaker;
 use trabecula::design::Built;
 
 /// Bytes that a surface may take of the 4 GB that a page can have: half of them, since it is drawn and written too.
 const MEMORY: f64 = 1.5e9;
+/// Triangles are counted with at most this number of grid steps on the smallest wavelength, and scaled from there.
+const COUNTED: f64 = 16.0;
 /// Grid steps on the smallest wavelength of a picture, at least and at most. Fewer show another lattice, and save no time: both sides
 /// of a wall are then in one grid cell, which is the dearer one.
 const PICTURE: [f64; 2] = [12.0, 48.0];
@@ -18,33 +22,53 @@ pub enum Resolution {
     Chord(f64),
 }
 
-/// The resolution of a mesh: what is asked for, else that of the command.
+/// The resolution of a mesh: what is asked for, else that of the command. An error if the mesh does not fit into a page.
 pub fn of_mesh(built: &Built, edge: Option<f64>, per_cell: Option<f64>) -> Result<Resolution, String> {
-    if let (None, None, Some(chord)) = (edge, per_cell, built.default_chord()) {
-        return Ok(Resolution::Chord(chord));
-    }
     let wavelength = built.solid.wavelength;
-    let asked = edge.or(per_cell.map(|n| wavelength / n));
-    if asked.is_some_and(|v| !(v.is_finite() && v > 0.0)) {
-        return Err("the grid spacing must be a number greater than 0".into());
-    }
-    let spacing = asked.unwrap_or_else(|| usual(built));
-    if spacing > wavelength / 2.0 {
+    let resolution = match (edge.or(per_cell.map(|n| wavelength / n)), built.default_chord()) {
+        (Some(edge), _) if !(edge.is_finite() && edge > 0.0) => {
+            return Err("the grid spacing must be a number greater than 0".into());
+        }
+        (Some(edge), _) => Resolution::Grid(edge),
+        (None, Some(chord)) => Resolution::Chord(chord),
+        (None, None) => Resolution::Grid(usual(built)),
+    };
+    if let Resolution::Grid(spacing) = resolution
+        && spacing > wavelength / 2.0
+    {
         return Err(format!(
             "grid spacing {spacing} mm is more than half the smallest wavelength, {wavelength} mm: the lattice is not resolved"
         ));
     }
-    let counted = spacing.max(wavelength / 16.0);
-    let need = built.surface().estimate(counted).map_err(|f| f.to_string())?;
-    let times = (counted / spacing).powi(2);
-    if need.memory * times > MEMORY {
+    let need = need(built, resolution).map_err(|f| f.to_string())?;
+    if need.memory > MEMORY {
         return Err(format!(
-            "about {:.2} million triangles do not fit into the memory of a page; use a larger spacing, or the command: \
+            "about {:.0} million triangles do not fit into the memory of a page; use a larger spacing, or the command: \
              trabecula mesh design.toml -o part.stl",
-            need.triangles * times / 1e6
+            need.triangles / 1e6
         ));
     }
-    Ok(Resolution::Grid(spacing))
+    Ok(resolution)
+}
+
+/// About what a surface takes.
+pub struct Need {
+    /// Number of triangles.
+    pub triangles: f64,
+    /// Memory, bytes.
+    memory: f64,
+}
+
+/// About what a surface takes; counted on a coarser grid, if need be, and scaled from there.
+pub fn need(built: &Built, resolution: Resolution) -> Result<Need, Fault> {
+    let (found, times) = match resolution {
+        Resolution::Grid(spacing) => {
+            let counted = spacing.max(built.solid.wavelength / COUNTED);
+            (built.surface().estimate(counted)?, (counted / spacing).powi(2))
+        }
+        Resolution::Chord(chord) => (built.beam_surface()?.estimate(chord)?, 1.0),
+    };
+    Ok(Need { triangles: found.triangles * times, memory: found.memory * times })
 }
 
 /// The grid spacing of a mesh for which none is asked, mm.
@@ -52,10 +76,11 @@ pub fn usual(built: &Built) -> f64 {
     built.coarser_spacing().map_or_else(|| built.report().spacing, |c| c.spacing)
 }
 
-/// The resolution of a picture of about this number of grid cells.
-pub fn of_picture(built: &Built, cells: f64) -> Resolution {
-    if let Some(chord) = built.default_chord() {
-        return Resolution::Chord(8.0 * chord);
+/// The resolution of a picture of about this number of grid cells, or of beams with at most this number of triangles.
+pub fn of_picture(built: &Built, cells: f64, triangles: f64) -> Resolution {
+    let patches = built.default_chord().map(|chord| Resolution::Chord(8.0 * chord));
+    if let Some(found) = patches.filter(|p| need(built, *p).is_ok_and(|n| n.triangles <= triangles)) {
+        return found;
     }
     let wavelength = built.solid.wavelength;
     let volume: f64 = extents(built).iter().product();
