@@ -22,7 +22,7 @@ const MESHES = ["stl", "3mf", "ply", "obj", "off"];
 /** Milliseconds that a picture may take while something moves, and at rest. */
 const MOVING = 100, AT_REST = 700;
 /** Milliseconds after which work on an older text is given up. */
-const PATIENCE = 1500;
+const PATIENCE = 3000;
 const LEAST = 12000, MOST = 600000;
 
 const core = new Core();
