@@ -5,6 +5,7 @@
 #   make campaign  thousands of random designs and damaged meshes instead of dozens, every damage in every part
 #   make bench   our command beside other tools (those that are installed)
 #   make tidy    formatters and linters
+#   make studio  the studio, one page with the core as WebAssembly: build/studio/index.html, and for the next package
 #   make docs    remakes the generated pages and figures under docs/
 #
 # PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
@@ -21,10 +22,11 @@ PYTEST := $(BIN)/python -m pytest -q -n auto
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
-    $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
-      \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
+    $(shell find crates python -type f -not -path '*/tests/*' -not -path 'crates/trabecula-wasm/*' -not -path '*/__pycache__/*' \
+      \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name '*.js' -o -name '*.css' -o -name studio.html \
+         -o -name py.typed \))
 
-.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs clean
+.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy studio docs clean
 .DELETE_ON_ERROR:
 
 all: $(VENV)/.release
@@ -83,6 +85,26 @@ demo/hip_stem.png: $(VENV)/.release $(DEMO) $(PART) scripts/demo_summary.py
 	@$(BIN)/python scripts/demo_summary.py demo > demo/summary.txt
 	@mv demo/hip_stem.part.png $@
 
+# --- the studio -------------------------------------------------------------------------------------------------------
+
+WASM := target/wasm/wasm32-unknown-unknown/release/trabecula_wasm.wasm
+STUDIO_SOURCES := $(shell find crates -type f -not -path '*/tests/*' \( -name '*.rs' -o -name '*.toml' \)) \
+    crates/trabecula-wasm/Cargo.lock
+
+studio: build/studio/index.html
+
+$(WASM): $(STUDIO_SOURCES)
+	@rustc --target wasm32-unknown-unknown --print target-libdir 2>/dev/null | xargs test -d || { \
+	  echo "The studio needs Rust's target wasm32-unknown-unknown; add it and run this again:"; \
+	  echo "  rustup target add wasm32-unknown-unknown"; exit 1; }
+	@echo "building the core as WebAssembly (minutes)"
+	@RUSTFLAGS="-C link-arg=-zstack-size=4194304 -C target-feature=+simd128" cargo build --quiet --locked --release \
+	  --manifest-path crates/trabecula-wasm/Cargo.toml --target wasm32-unknown-unknown --target-dir target/wasm
+	@touch $@
+
+build/studio/index.html: $(WASM) scripts/studio_page.py $(wildcard studio/*) python/trabecula/viewer.js python/trabecula/viewer.css
+	@$(PYTHON) scripts/studio_page.py $(WASM) python/trabecula/studio.html $@
+
 # --- checks -----------------------------------------------------------------------------------------------------------
 
 test: core-test python-test docs-test
@@ -108,7 +130,8 @@ docs-test: $(VENV)/.test-tools
 	$(PYTEST) tests/test_docs.py
 
 tidy: $(VENV)/.ruff
-	@if cargo fmt --version >/dev/null 2>&1; then echo "cargo fmt"; cargo fmt --all --check; \
+	@if cargo fmt --version >/dev/null 2>&1; then echo "cargo fmt"; cargo fmt --all --check && \
+	  cargo fmt --manifest-path crates/trabecula-wasm/Cargo.toml --check; \
 	  else echo "NOT CHECKED: rustfmt is not installed (rustup component add rustfmt)"; fi
 	@if cargo clippy --version >/dev/null 2>&1; then echo "cargo clippy"; \
 	  cargo clippy --quiet --locked --workspace --all-targets -- -D warnings; \

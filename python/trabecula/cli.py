@@ -88,6 +88,7 @@ POINTS = number("a whole number", lambda v: 2 <= v <= 1000, " from 2 to 1000", i
 SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")
 VOXELS = number("a whole number", lambda v: 8 <= v <= 4096, " from 8 to 4096", int)
 FRAMES = number("a whole number", lambda v: 2 <= v <= 720, " from 2 to 720", int)
+PORT = number("a port", lambda v: 0 <= v <= 65535, " from 0 to 65535", int)
 SECONDS = number("a time in s", lambda v: v > 0, " greater than 0")
 #: A closed mesh has at least 4 triangles.
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
@@ -542,6 +543,13 @@ COMMANDS = {
         "Print the JSON Schema of designs, by which an editor completes and checks them.",
         "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"
         "example:\n  trabecula schema > design.json",
+    ),
+    "studio": (
+        "Design in the browser: a page of this machine with live picture, figures, mesh and files.",
+        "The page needs no network.\n\nexamples:\n  trabecula studio\n  trabecula studio part.toml",
+        file("design", DESIGNS, "design file to open (.toml, .json)", "DESIGN", nargs="?"),
+        option("--port", type=PORT, default=0, metavar="N", help="port to serve it at (default: any that is free)"),
+        option("--no-open", dest="open", action="store_false", help="open no browser: print the address alone"),
     ),
     "report": (
         "Write a report of a design as one HTML page: the part to turn, with sections; figures, wall thickness, warnings.",

@@ -23,7 +23,20 @@ from .texts import counted, table, voids
 
 __all__ = [
     *("cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new"),
-    *("permeability", "render", "report", "schema", "simplify", "slice", "stiffness", "sweep", "tets", "volume", "voxels"),
+    *(
+        "permeability",
+        "render",
+        "report",
+        "schema",
+        "simplify",
+        "slice",
+        "stiffness",
+        "studio",
+        "sweep",
+        "tets",
+        "volume",
+        "voxels",
+    ),
 ]
 
 
@@ -691,6 +704,23 @@ def of_cell(args) -> None:
     if args.json:
         return put_json(found.to_dict())
     print("\n".join(effective.LINES[args.command](found)))
+
+
+def studio(args) -> None:
+    """``trabecula studio``."""
+    import webbrowser
+
+    from .studio import Studio
+
+    with Studio(args.design, args.port) as server:
+        print(server.url, flush=True)
+        say("the studio is served at this address, to this machine alone; Ctrl-C ends it")
+        if args.open:
+            webbrowser.open(server.url)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            say("ended")
 
 
 def doctor(args) -> None:

@@ -1,17 +1,17 @@
-// A viewer of one closed mesh, without any library: turn, move, zoom; a section plane; colours.
-// The page has, for each viewer, <figure class="viewer"> with a canvas and <script type="application/octet-stream"> of the mesh:
+// A viewer of closed meshes, without any library: turn, move, zoom; a section plane; colours.
+// A page has <figure class="viewer"> with a canvas; one that is of a single mesh has <script type="application/octet-stream"> of it:
 // the DEFLATE stream, in base64, of a header of JSON, a line feed, and arrays (see viewer.py).
 "use strict";
 
 const CREASE = Math.cos((35 * Math.PI) / 180);
 
 const VERTEX = `#version 300 es
-in vec3 position; in vec3 normal; in float cut; in float value;
+in vec3 position; in vec4 normal; in float value;
 uniform mat3 turn; uniform vec3 middle; uniform vec2 shift; uniform vec2 zoom; uniform float depth;
 centroid out vec3 place; centroid out vec3 facing; centroid out float isCut; centroid out float amount;
 void main() {
   vec3 seen = turn * (position - middle);
-  place = position; facing = normal; isCut = cut; amount = value;
+  place = position; facing = normal.xyz; isCut = normal.w; amount = value;
   gl_Position = vec4((seen.xy + shift) * zoom, -seen.z * depth, 1.0);
 }`;
 
@@ -71,7 +71,7 @@ async function unpacked(text) {
   return { head, vertices, triangles, cut, values };
 }
 
-// Arrays by corner: normals are the mean of those of the triangles round a vertex that lie within 35° of the corner's own.
+// Arrays by corner: the position; the normal, and whether the triangle is cut, as 16-bit numbers; the value. Normals are the mean of those of the triangles round a vertex that lie within 35° of the corner's own.
 function corners({ head, vertices, triangles, cut, values }) {
   const count = head.triangles;
   const normals = new Float32Array(3 * count);
@@ -88,7 +88,7 @@ function corners({ head, vertices, triangles, cut, values }) {
   }
   const length = (t) => Math.hypot(normals[3 * t], normals[3 * t + 1], normals[3 * t + 2]) || 1e-30;
   const lengths = Float32Array.from({ length: count }, (_, t) => length(t));
-  const of = { position: new Float32Array(9 * count), normal: new Float32Array(9 * count), cut: new Float32Array(3 * count), value: new Float32Array(3 * count) };
+  const of = { position: new Float32Array(9 * count), normal: new Int16Array(12 * count), value: new Float32Array(values ? 3 * count : 0) };
   for (let t = 0; t < count; t++) {
     for (let k = 0; k < 3; k++) {
       const v = triangles[3 * t + k], at = 3 * t + k;
@@ -99,8 +99,8 @@ function corners({ head, vertices, triangles, cut, values }) {
         if (along >= CREASE * lengths[t] * lengths[s]) for (let i = 0; i < 3; i++) sum[i] += normals[3 * s + i];
       }
       of.position.set(vertices.subarray(3 * v, 3 * v + 3), 3 * at);
-      of.normal.set(sum, 3 * at);
-      of.cut[at] = cut[t];
+      const one = 32767 / (Math.hypot(...sum) || 1);
+      of.normal.set([one * sum[0], one * sum[1], one * sum[2], cut[t] ? 32767 : 0], 4 * at);
       if (values) of.value[at] = head.span[0] + (values[v] / 65535) * (head.span[1] - head.span[0]);
     }
   }
@@ -128,27 +128,52 @@ function roundLength(of) {
   return [5, 2, 1].map((m) => m * power).find((v) => v <= of);
 }
 
-async function view(figure) {
+// Whether the processor draws: smoothing edges then takes as long as all else.
+function drawnBySoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const known = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  return !!known && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
+}
+
+// A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays: of each
+// corner, or of vertices with an `index`. The camera and the section stay where they are.
+function viewer(figure) {
   const canvas = figure.querySelector("canvas");
-  const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
-  if (!gl || !("DecompressionStream" in window)) return figure.classList.add("still");
-  const mesh = await unpacked(figure.querySelector("script").textContent);
-  const { head } = mesh;
-  const of = corners(mesh);
-  const shader = program(gl);
-  for (const [name, width] of [["position", 3], ["normal", 3], ["cut", 1], ["value", 1]]) {
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, of[name], gl.STATIC_DRAW);
+  const gl = canvas.getContext("webgl2", { antialias: !drawnBySoftware(), alpha: true, preserveDrawingBuffer: true });
+  if (!gl) return null;
+  const shader = program(gl), buffers = {}, indices = gl.createBuffer();
+  let head = { min: [0, 0, 0], max: [1, 1, 1], span: null }, count = 0, indexed = false, size = 1, middle = [0, 0, 0];
+  for (const [name, width, type] of [["position", 3, gl.FLOAT], ["normal", 4, gl.SHORT], ["value", 1, gl.FLOAT]]) {
     const at = gl.getAttribLocation(shader, name);
-    if (at < 0) continue;
+    buffers[name] = gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[name]);
     gl.enableVertexAttribArray(at);
-    gl.vertexAttribPointer(at, width, gl.FLOAT, false, 0, 0);
+    gl.vertexAttribPointer(at, width, type, type === gl.SHORT, 0, 0);
   }
   const uniform = (name) => gl.getUniformLocation(shader, name);
-  const size = Math.hypot(...[0, 1, 2].map((a) => head.max[a] - head.min[a])) || 1;
-  const middle = [0, 1, 2].map((a) => 0.5 * (head.min[a] + head.max[a]));
   const home = { azimuth: 30, elevation: 25, zoom: 1, shift: [0, 0] };
   const state = { ...home, axis: "", share: 0.5, flip: false, colours: +figure.querySelector("[name=colours]").value, steep: 45 };
+
+  function show(shown, of) {
+    head = shown;
+    indexed = !!of.index;
+    count = indexed ? of.index.length : of.position.length / 3;
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+    if (indexed) gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, of.index, gl.DYNAMIC_DRAW);
+    for (const name in buffers) {
+      const data = of[name] && of[name].length ? of[name] : null;
+      const at = gl.getAttribLocation(shader, name);
+      if (data) {
+        gl.bindBuffer(gl.ARRAY_BUFFER, buffers[name]);
+        gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
+        gl.enableVertexAttribArray(at);
+      } else gl.disableVertexAttribArray(at);
+    }
+    size = Math.hypot(...[0, 1, 2].map((a) => head.max[a] - head.min[a])) || 1;
+    middle = [0, 1, 2].map((a) => 0.5 * (head.min[a] + head.max[a]));
+    draw();
+    figure.dataset.drawn = count / 3;
+  }
 
   // Rows: to the right, up, and towards the eye; azimuth about z, elevation above xy, as in `trabecula render`.
   const turn = () => {
@@ -187,7 +212,8 @@ async function view(figure) {
     gl.uniform1i(uniform("colours"), state.colours);
     gl.uniform1f(uniform("steep"), Math.cos((state.steep * Math.PI) / 180));
     gl.uniform2fv(uniform("span"), head.span || [0, 1]);
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * head.triangles);
+    if (indexed) gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+    else gl.drawArrays(gl.TRIANGLES, 0, count);
     marks(rows, (2 * reach()) / side, a);
   }
 
@@ -261,10 +287,16 @@ async function view(figure) {
   });
   new ResizeObserver(redraw).observe(canvas);
   figure.classList.add("live");
-  draw();
-  figure.dataset.drawn = head.triangles;
+  return { show, draw };
+}
+
+async function view(figure) {
+  const it = "DecompressionStream" in window ? viewer(figure) : null;
+  if (!it) return figure.classList.add("still");
+  const mesh = await unpacked(figure.querySelector("script").textContent);
+  it.show(mesh.head, corners(mesh));
 }
 
 for (const figure of document.querySelectorAll("figure.viewer")) {
-  view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
+  if (figure.querySelector("script")) view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
 }

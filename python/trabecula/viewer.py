@@ -23,46 +23,22 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["STYLE", "View", "script"]
+__all__ = ["View", "script", "style"]
 
 #: Triangles of a page above which a mesh is made lighter.
 LIGHT = 150_000
 #: Steps of positions and values: what 16 bits hold.
 STEPS = 65535
 
-STYLE = """
-:root { color-scheme: light dark; --ink: #1d1f23; --faint: #6a6f78; --paper: #fff; --line: #d8dbe0; --field: #eef1f4; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #e8eaed; --faint: #a0a6b0; --paper: #16181c; --line: #343840; --field: #22262c; } }
-body { margin: 0; font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: var(--ink);
-  background: var(--paper); }
-figure.viewer { margin: 0; position: relative; background: var(--field); border-radius: 6px; overflow: hidden; }
-figure.viewer canvas { width: 100%; height: var(--high, 62vh); min-height: 260px; display: block; touch-action: none;
-  cursor: grab; }
-figure.viewer img { display: none; width: 100%; }
-figure.viewer.still img { display: block; }
-figure.viewer.still canvas, figure.viewer.still .tools, figure.viewer.still .scale, figure.viewer.still svg { display: none; }
-figure.viewer .tools { display: flex; flex-wrap: wrap; gap: .3em 1.2em; align-items: center; padding: .5em .8em;
-  border-top: 1px solid var(--line); font-size: 13px; }
-figure.viewer .tools label { display: flex; gap: .4em; align-items: center; }
-figure.viewer .tools output { min-width: 7em; color: var(--faint); font-variant-numeric: tabular-nums; }
-figure.viewer .scale { position: absolute; right: 16px; top: calc(var(--high, 62vh) - 34px); text-align: center;
-  font-size: 12px; pointer-events: none; }
-figure.viewer .scale i { display: block; height: 5px; border: 1px solid currentColor; border-top: 0; }
-figure.viewer svg.axes { position: absolute; left: 8px; top: calc(var(--high, 62vh) - 78px); width: 70px; height: 70px;
-  pointer-events: none; font-size: 11px; }
-figure.viewer .legend { display: flex; gap: .5em; align-items: center; }
-figure.viewer .legend[hidden], figure.viewer label[hidden] { display: none; }
-figure.viewer .legend i { width: 9em; height: 10px;
-  background: linear-gradient(90deg, #440154, #414487, #2a788e, #22a884, #7ad151, #fde725); }
-@media print { figure.viewer img { display: block; } figure.viewer canvas, figure.viewer .tools, figure.viewer .scale,
-  figure.viewer svg { display: none; } }
-"""
-
 
 def script() -> str:
     """The program of the viewer, JavaScript."""
     return files(__package__).joinpath("viewer.js").read_text(encoding="utf-8")
+
+
+def style() -> str:
+    """The style of the viewer, CSS."""
+    return files(__package__).joinpath("viewer.css").read_text(encoding="utf-8")
 
 
 class View:
@@ -119,7 +95,7 @@ class View:
         return base64.b64encode(zlib.compress(json.dumps(head).encode() + b"\n" + b"".join(parts), 9)).decode()
 
     def figure(self, high: str = "62vh") -> str:
-        """The figure for a page that has ``STYLE`` and ``script()``; ``high`` is its height in CSS."""
+        """The figure for a page that has ``style()`` and ``script()``; ``high`` is its height in CSS."""
         still = base64.b64encode(self.mesh._png).decode()
         lines = "".join(
             f'<g data-part="{name}"><line stroke="{colour}" stroke-width="2"/><text text-anchor="middle" dy=".35em" '
@@ -172,12 +148,12 @@ class View:
         )
 
 
-def page(title: str, body: str, style: str = "") -> str:
+def page(title: str, body: str, more: str = "") -> str:
     """A page of its own with the viewer's style and program."""
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
-        f"<style>{STYLE}{style}</style>\n</head>\n<body>\n{body}\n<script>\n{script()}</script>\n</body>\n</html>\n"
+        f"<style>{style()}{more}</style>\n</head>\n<body>\n{body}\n<script>\n{script()}</script>\n</body>\n</html>\n"
     )
 
 

@@ -80,7 +80,7 @@ fn is_test(path: &Path) -> bool {
     path.components().any(|c| ["tests", "tests.rs", "laws.rs"].iter().any(|t| c.as_os_str() == *t))
 }
 
-const CRATES: [&str; 5] = ["geometry", "beams", "homogenise", "trabecula", "trabecula-py"];
+const CRATES: [&str; 6] = ["geometry", "beams", "homogenise", "trabecula", "trabecula-py", "trabecula-wasm"];
 
 #[test]
 fn modules_import_from_lower_layers_only() {
