@@ -6,6 +6,7 @@
 #   make bench   our command beside other tools (those that are installed)
 #   make tidy    formatters and linters
 #   make docs    remakes the generated pages and figures under docs/
+#   make site    the pages as a site in build/site
 #
 # PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
 # on: `checked`, which has the core in common with the core's tests, or `release`, the wheel that is handed out.
@@ -24,7 +25,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
     $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
       \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
 
-.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs clean
+.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs site clean
 .DELETE_ON_ERROR:
 
 all: $(VENV)/.release
@@ -82,6 +83,15 @@ demo/hip_stem.png: $(VENV)/.release $(DEMO) $(PART) scripts/demo_summary.py
 	$(BIN)/trabecula render demo/hip_stem.stl -o demo/hip_stem.part.png
 	@$(BIN)/python scripts/demo_summary.py demo > demo/summary.txt
 	@mv demo/hip_stem.part.png $@
+
+# The pages of docs/ as a site in build/site: search needs a server, such as `python -m http.server -d build/site`.
+site: $(VENV)/.site
+	$(BIN)/python scripts/site_pages.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
+$(VENV)/.site: $(VENV)/.made
+	@$(PIP) install 'mkdocs>=1.6,<2' 'mkdocs-material>=9.5,<10'
+	@touch $@
 
 # --- checks -----------------------------------------------------------------------------------------------------------
 
