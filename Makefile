@@ -7,6 +7,8 @@
 #   make tidy    formatters and linters
 #   make docs    remakes the generated pages and figures under docs/
 #   make site    the pages as a site in build/site
+#   make wheels  packages for other machines in build/dist
+#   make blender  the extension for Blender in build/blender
 #
 # PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
 # on: `checked`, which has the core in common with the core's tests, or `release`, the wheel that is handed out.
@@ -25,7 +27,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
     $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
       \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
 
-.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs site clean
+.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs site wheels blender clean
 .DELETE_ON_ERROR:
 
 all: $(VENV)/.release
@@ -65,6 +67,26 @@ $(VENV)/.test-tools: $(VENV)/.$(PROFILE) pyproject.toml
 $(VENV)/.ruff: $(VENV)/.made
 	@$(PIP) install 'ruff>=0.8'
 	@touch $@
+
+# Wheels of Linux to hand out, in build/dist: glibc from 2.17 and musl from 1.2 on, linked by zig. One serves Python 3.10 and later.
+TARGETS ?= x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl
+
+wheels: $(addprefix build/dist/.,$(TARGETS))
+	@ls -l build/dist
+
+build/dist/.%: $(VENV)/.zig $(SOURCES)
+	@command -v rustup >/dev/null && rustup target add $* || echo "rustup is missing; the Rust of this system has to have $*"
+	PATH="$(abspath $(BIN)):$$PATH" maturin build --quiet --release --zig --target $* --interpreter python3.10 --out build/dist \
+	  --compatibility $(if $(findstring musl,$*),musllinux_1_2,manylinux2014)
+	@touch $@
+
+$(VENV)/.zig: $(VENV)/.made
+	@$(PIP) install 'maturin[zig]>=1.9,<2'
+	@touch $@
+
+# The extension for Blender, with the wheels that there are in build/dist.
+blender: build/dist/.x86_64-unknown-linux-gnu
+	$(BIN)/python scripts/blender_extension.py
 
 # --- the demo ---------------------------------------------------------------------------------------------------------
 
