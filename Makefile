@@ -7,6 +7,9 @@
 #   make tidy    formatters and linters
 #   make studio  the studio, one page with the core as WebAssembly: build/studio/index.html, and for the next package
 #   make docs    remakes the generated pages and figures under docs/
+#   make site    the pages as a site in build/site
+#   make wheels  packages for other machines in build/dist
+#   make blender  the extension for Blender in build/blender
 #
 # PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
 # on: `checked`, which has the core in common with the core's tests, or `release`, the wheel that is handed out.
@@ -26,7 +29,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
       \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name '*.js' -o -name '*.css' -o -name studio.html \
          -o -name py.typed \))
 
-.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy studio docs clean
+.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy studio docs site wheels blender clean
 .DELETE_ON_ERROR:
 
 all: $(VENV)/.release
@@ -67,6 +70,26 @@ $(VENV)/.ruff: $(VENV)/.made
 	@$(PIP) install 'ruff>=0.8'
 	@touch $@
 
+# Wheels of Linux to hand out, in build/dist: glibc from 2.17 and musl from 1.2 on, linked by zig. One serves Python 3.10 and later.
+TARGETS ?= x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl
+
+wheels: $(addprefix build/dist/.,$(TARGETS))
+	@ls -l build/dist
+
+build/dist/.%: $(VENV)/.zig $(SOURCES)
+	@command -v rustup >/dev/null && rustup target add $* || echo "rustup is missing; the Rust of this system has to have $*"
+	PATH="$(abspath $(BIN)):$$PATH" maturin build --quiet --release --zig --target $* --interpreter python3.10 --out build/dist \
+	  --compatibility $(if $(findstring musl,$*),musllinux_1_2,manylinux2014)
+	@touch $@
+
+$(VENV)/.zig: $(VENV)/.made
+	@$(PIP) install 'maturin[zig]>=1.9,<2'
+	@touch $@
+
+# The extension for Blender, with the wheels that there are in build/dist.
+blender: build/dist/.x86_64-unknown-linux-gnu
+	$(BIN)/python scripts/blender_extension.py
+
 # --- the demo ---------------------------------------------------------------------------------------------------------
 
 DEMO := examples/hip_stem.toml
@@ -104,6 +127,15 @@ $(WASM): $(STUDIO_SOURCES)
 
 build/studio/index.html: $(WASM) scripts/studio_page.py $(wildcard studio/*) python/trabecula/viewer.js python/trabecula/viewer.css
 	@$(PYTHON) scripts/studio_page.py $(WASM) python/trabecula/studio.html $@
+
+# The pages of docs/ as a site in build/site: search needs a server, such as `python -m http.server -d build/site`.
+site: $(VENV)/.site
+	$(BIN)/python scripts/site_pages.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
+$(VENV)/.site: $(VENV)/.made
+	@$(PIP) install 'mkdocs>=1.6,<2' 'mkdocs-material>=9.5,<10'
+	@touch $@
 
 # --- checks -----------------------------------------------------------------------------------------------------------
 

@@ -38,6 +38,11 @@ def named(page):
     return str(page.relative_to(ROOT))
 
 
+def test_every_page_is_in_the_site():
+    pages = set(re.findall(r"^ +- (?:\w+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE))
+    assert pages == {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+
+
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     """An empty folder with the examples in it, and the working directory there."""

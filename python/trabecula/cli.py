@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 
 from .camera import VIEWS
+from .completion import SHELLS, script
 from .formats import (
     BEAM_WRITES,
     CONDUCTIVITY_WRITES,
@@ -146,6 +147,7 @@ def ending(known: tuple[str, ...], stdin: bool = False):
             raise argparse.ArgumentTypeError(f"the name must end in {dotted(known)}; found {found!r}")
         return text
 
+    check.suffixes = known  # as shells complete it
     return check
 
 
@@ -539,6 +541,13 @@ COMMANDS = {
         "example:\n  trabecula doctor",
         JSON,
     ),
+    "completion": (
+        "Print the script by which a shell completes the command.",
+        "examples:\n  trabecula completion bash > ~/.local/share/bash-completion/completions/trabecula\n"
+        "  trabecula completion zsh > ~/.zfunc/_trabecula     (a folder of $fpath)\n"
+        "  trabecula completion fish > ~/.config/fish/completions/trabecula.fish",
+        option("shell", choices=tuple(SHELLS), help="bash, zsh or fish"),
+    ),
     "schema": (
         "Print the JSON Schema of designs, by which an editor completes and checks them.",
         "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"
@@ -650,6 +659,12 @@ def serve(argv: list[str] | None) -> int:
         from . import __version__
 
         print(f"trabecula {__version__}")
+        return 0
+    if args.command == "completion":
+        from . import beams, cell
+
+        known = {"cell": cell.names(), "beams": beams.names(), "name": [*cell.names(), *beams.names()]}
+        print(script(top, args.shell, known), end="")
         return 0
     if args.command == "simplify" and args.tolerance is None and args.triangles is None:
         top.error("simplify needs --tolerance MM, --triangles N, or both")
