@@ -12,7 +12,7 @@ import trabecula
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated"
 STAMP = "<!-- Made by scripts/design_reference.py; do not edit. -->"
-COMMANDS = ["new", "check", "mesh", "simplify", "voxels", "tets", "slice", "measure", "cells", "render"]
+COMMANDS = ["new", "check", "mesh", "simplify", "volume", "voxels", "tets", "slice", "measure", "cells", "render"]
 
 
 def command():
