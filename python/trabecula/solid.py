@@ -700,7 +700,7 @@ class Solid(Seen):
         """Voxels as finite elements: hexahedra over the region's bounds with edges of about ``step`` (mm), stretched so that a
         whole number fits, each with its exact solid fraction.
 
-        Those of which a share of at least ``least`` is solid are elements, as far as they belong to the largest piece by common
+        Those of which a share of at least ``least`` is solid are elements if they belong to the largest piece by common
         faces. A set of the design has the faces whose centres are at most half a voxel outside its region. Raises ValueError
         for a step beyond the memory there is, and where no voxel has that share.
         """

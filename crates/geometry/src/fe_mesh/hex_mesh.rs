@@ -31,7 +31,7 @@ const CORNERS: [[usize; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
 impl HexMesh {
-    /// The voxels of a grid over `bounds`, x fastest, of which a share of at least `least` is solid, as far as they belong to the piece, by
+    /// The voxels of a grid over `bounds`, x fastest, of which a share of at least `least` is solid, where they belong to the piece, by
     /// common faces, with the greatest solid volume. The sets are the faces on each side of the grid, and the rest of the boundary.
     pub fn of(bounds: &Aabb, shape: [usize; 3], fractions: &[f64], least: f64) -> HexMesh {
         let [nx, ny, nz] = shape;

@@ -214,7 +214,7 @@ mod tests {
             let mut text = String::new();
             decimal(&mut text, x);
             let back: f64 = text.parse().unwrap_or(f64::NAN);
-            // Eleven digits after the first remain beside a sign and an exponent of three digits.
+            // Eleven digits after the first remain with a sign and an exponent of three digits.
             assert!(text.len() <= 20 && (back - x).abs() <= 1e-11 * x.abs(), "{x:?}: {text}");
         }
     }
