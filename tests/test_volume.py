@@ -134,6 +134,21 @@ def test_wall_and_both_fluids_fill_the_region_with_common_nodes():
     assert (pairs[:, 0] != pairs[:, 1]).sum() == len(mesh.sets["LATTICE"].faces)
 
 
+def test_the_pore_of_a_part_with_a_skin_has_its_wall_in_a_set(tmp_path):
+    made = solid(region=lt.region.cylinder(base=[0, 0, -2], radius=3, height=4), skin=lt.skin(0.5, open=["+z"]))
+    mesh = made.volume_mesh(edge=0.25, of="pore")
+    on = np.concatenate([mesh.sets[name].faces for name in ("CUT", "LATTICE", "SKIN")])
+    tets = np.sort(np.concatenate([mesh.elements[:, f] for f in CORNERS]), axis=1)
+    _, counts = np.unique(tets, axis=0, return_counts=True)
+    assert len(np.unique(on, axis=0)) == (counts == 1).sum()
+    inner = mesh.nodes[mesh.sets["SKIN"].nodes]
+    radius = np.hypot(inner[:, 0], inner[:, 1])
+    # Nodes of curved surfaces are shifted by about half the distance of a chord, h² / 16 r.
+    assert (np.isclose(radius, 2.5, atol=0.25**2 / 8 / 2.5) | np.isclose(inner[:, 2], -1.5)).all()
+    mesh.write(tmp_path / "case.foam")
+    assert "REST" not in (tmp_path / "constant" / "polyMesh" / "boundary").read_text()
+
+
 @pytest.mark.parametrize("of", ["pore", "lower", "upper"])
 def test_one_side_alone(of):
     mesh = solid().volume_mesh(per_cell=16, of=of)

@@ -44,7 +44,10 @@ pub(super) fn add_sets(
     push(mesh, "LATTICE".into(), own);
     let middle = |t: &[u32; 4]| scale(t.iter().fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize])), 0.25);
     let middles: Vec<Vec3> = mesh.tets.par_iter().map(middle).collect();
+    let mut first = domains.region;
     for (body, name) in domains.filled.iter().zip(bodies) {
+        let own = below(first + body.surfaces.len()) & !below(first);
+        first += body.surfaces.len();
         let mut values = vec![0.0; middles.len()];
         values.par_chunks_mut(1024).zip(middles.par_chunks(1024)).for_each(|(v, p)| body.values(p, v));
         let within = |t: u32| values[t as usize] < 0.0 && mesh.domain[t as usize] == 0;
@@ -56,6 +59,10 @@ pub(super) fn add_sets(
                 mesh.tets[*t as usize].into_iter().chain(middles.into_iter().flatten())
             }));
             mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: of });
+        } else {
+            // Of a fluid the body is a wall.
+            let wall = faces.iter().filter(|(_, set, _)| set & region == 0 && set & own != 0).map(|f| f.0).collect();
+            push(mesh, name.clone(), wall);
         }
     }
 }
