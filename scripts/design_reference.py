@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import trabecula
+from trabecula.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated"
 STAMP = "<!-- Made by scripts/design_reference.py; do not edit. -->"
-COMMANDS = ["new", "check", "mesh", "simplify", "voxels", "tets", "slice", "measure", "cells", "render", "studio"]
 
 
 def command():

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
-    from .volumes import VolumeMesh, VolumeSet
+    from .volumes import VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
@@ -52,6 +52,7 @@ __all__ = [
     "Transitions",
     "VolumeMesh",
     "VolumeSet",
+    "VoxelElements",
     "Voxels",
     "__version__",
     "beams",
@@ -94,6 +95,7 @@ _HOMES = {
     "Thickness": "thickness",
     "Transitions": "transition",
     "VolumeMesh": "volumes",
+    "VoxelElements": "volumes",
     "VolumeSet": "volumes",
     "Voxels": "voxels",
     "objective": "sweeps",

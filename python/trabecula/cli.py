@@ -26,6 +26,7 @@ from .formats import (
     SWEEP_WRITES,
     TET_READS,
     TET_WRITES,
+    VOLUME_READS,
     VOLUME_WRITES,
     VOXEL_WRITES,
     dotted,
@@ -122,6 +123,18 @@ def parts(text: str) -> list[str]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def load(text: str) -> tuple[str, list[float]]:
+    """A set and a force: NAME=FX,FY,FZ."""
+    name, equals, force = text.partition("=")
+    try:
+        found = [float(v) for v in force.split(",")]
+    except ValueError:
+        found = []
+    if not (name.strip() and equals and len(found) == 3 and all(map(math.isfinite, found))):
+        raise argparse.ArgumentTypeError(f"expected a set and a force in N, such as X1=0,0,-100, found {text!r}")
+    return name.strip(), found
+
+
 def names(text: str) -> list[str]:
     """Names by commas."""
     found = [name.strip() for name in text.split(",")]
@@ -197,7 +210,7 @@ DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for stand
 DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
 MEASURED = file(
     "file",
-    (*DESIGNS, *MESH_READS, *VOLUME_WRITES),
+    (*DESIGNS, *MESH_READS, *VOLUME_READS),
     "a design, a mesh or a file of tetrahedra; - is a design on standard input",
     stdin=True,
 )
@@ -319,11 +332,18 @@ COMMANDS = {
     ),
     "volume": (
         "Mesh the inside of a design: tetrahedra with named sets, for finite elements and flow.",
-        "The name of OUT decides the format: .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .vtu (ParaView) or .bdf (Nastran).\n"
+        "The name of OUT decides the format: .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .vtu (ParaView),\n"
+        ".xdmf (with .h5), .bdf (Nastran), .mesh (Medit), or .foam: OpenFOAM's mesh, in m, in the folder constant/polyMesh of\n"
+        "the file's own.\n"
         "Tetrahedra conform to all surfaces, edges and corners. Sets, each of nodes, elements and faces: X0 X1 Y0 Y1 Z0 Z1\n"
-        "(bounding planes), CUT (the region's boundary), LATTICE (the lattice's own surface), SKIN, KEEP_NAME.\n"
-        "The .inp of a --periodic cell has equations and six steps and runs as it is.\n\n"
+        "(bounding planes), CUT (the region's boundary), LATTICE (the lattice's own surface), SKIN, KEEP_NAME, and NAME of\n"
+        "each [set.NAME.REGION] in the design.\n"
+        "The .inp of a --periodic cell has equations and six steps, that of --hold and --load a step: they run as they are.\n"
+        "--voxels makes hexahedra with their solid fractions (.inp, .msh, .vtu). Beams alone are B31 or CBAR elements by\n"
+        "trabecula mesh DESIGN -o OUT.inp --beams.\n\n"
         "examples:\n  trabecula volume part.toml -o part.inp --wall 3 --order 2\n"
+        "  trabecula volume part.toml -o part.inp --edge 0.5 --order 2 --E 114000 --nu 0.34 --hold X0 --load X1=0,-1000,0\n"
+        "  trabecula volume part.toml -o voxels.inp --voxels 0.2\n"
         "  trabecula volume exchanger.toml -o fluids.msh --of all\n"
         "  trabecula volume cell.toml -o rve.inp --periodic --per-cell 32 --E 114000 --nu 0.34",
         *(DESIGN, output(VOLUME_WRITES, f"the mesh to write ({dotted(VOLUME_WRITES)})")),
@@ -331,6 +351,7 @@ COMMANDS = {
             option("--edge", type=LENGTH, metavar="MM", help="longest edge of most tetrahedra, mm"),
             option("--per-cell", type=SAMPLES, metavar="N", help="edges along the smallest wavelength"),
             option("--wall", type=SAMPLES, metavar="N", help="edges through the thinnest wall (default: 2)"),
+            option("--voxels", type=LENGTH, metavar="MM", help="hexahedra of a grid instead, with their exact solid fractions"),
         ],
         option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic tetrahedra"),
         option(
@@ -340,7 +361,16 @@ COMMANDS = {
             help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes",
         ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
+        option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
         option("--sets", type=names, metavar="NAMES", help="sets that must not be empty, by commas"),
+        option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
+        option(
+            "--load",
+            type=load,
+            action="append",
+            metavar="NAME=FX,FY,FZ",
+            help="a uniform traction on a set with this resultant, N, in .inp; may be repeated",
+        ),
         option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid in the file (default: 1)"),
         option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),

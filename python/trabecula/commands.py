@@ -11,7 +11,18 @@ from .camera import VIEWS, section_plane, towards
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, MESH_WRITES, STDIN, STEP_WRITES, VOLUME_WRITES, is_design, kind_of
+from .formats import (
+    DESIGNS,
+    MESH_READS,
+    MESH_WRITES,
+    STDIN,
+    STEP_WRITES,
+    VOLUME_READS,
+    VOXEL_ELEMENT_WRITES,
+    dotted,
+    is_design,
+    kind_of,
+)
 from .inputs import build, closes, design_of, keep_file, keep_inputs, meshed, resolution, same_file, stdin_text, surface
 from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
@@ -350,31 +361,51 @@ def volume(args) -> None:
     """``trabecula volume``."""
     check_place(args.output)
     keep_file(args.design, args.output)
+    check_voxels(args)
     solid = build(args.design, tell=not args.json)
     start = time.perf_counter()
     with Progress("meshing", args.progress) as progress:
-        made = solid.volume_mesh(
-            args.edge, args.per_cell, args.wall, args.order, args.of, args.periodic, args.threads, progress
-        )
+        if args.voxels is not None:
+            made = solid.voxel_elements(args.voxels, args.least or 0.01, args.threads, progress)
+        else:
+            size = args.edge, args.per_cell, args.wall
+            made = solid.volume_mesh(*size, args.order, args.of, args.periodic, args.threads, progress)
     missing = [name for name in args.sets or () if name not in made.report().sets]
     if missing:
         raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
     settle()
-    made.write(args.output, args.E, args.nu)
+    made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()))
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
     if args.json:
         return put_json(figures | {"warnings": warned()})
+    what, quality = "tetrahedra", ""
+    if args.voxels is None:
+        quality = f", dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees"
+    else:
+        what = "hexahedra"
     say(
-        f"{args.output}: {figures['elements']} tetrahedra, {figures['nodes']} nodes, volume {figure(made.volume)} mm³, "
-        f"dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees; sets {', '.join(figures['sets'])}; "
-        f"{figures['seconds']:.2f} s"
+        f"{args.output}: {figures['elements']} {what}, {figures['nodes']} nodes, volume {figure(made.volume)} mm³{quality}; "
+        f"sets {', '.join(figures['sets'])}; {figures['seconds']:.2f} s"
     )
+
+
+def check_voxels(args) -> None:
+    """Refuses options of ``volume`` that do not go together, before any work is done."""
+    if args.voxels is None:
+        if args.least is not None:
+            raise Refused("--least belongs to --voxels; add it")
+        return
+    given = {"--order": args.order != 1, "--of": args.of != "solid", "--periodic": args.periodic}
+    for name in (name for name, is_given in given.items() if is_given):
+        raise Refused(f"{name} is for tetrahedra; leave it out, or --voxels")
+    if kind_of(args.output) not in VOXEL_ELEMENT_WRITES:
+        raise Refused(f"{args.output}: the name of voxels must end in {dotted(VOXEL_ELEMENT_WRITES)}")
 
 
 def measure(args) -> None:
     """``trabecula measure``."""
     check_measure(args)
-    if kind_of(args.file) in VOLUME_WRITES:
+    if kind_of(args.file) in VOLUME_READS:
         return measure_tets(args)
     solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:

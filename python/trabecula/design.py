@@ -106,6 +106,7 @@ class Design:
     need a ``blend``, from the builders of that name, that says where each is. ``beams``, instead of a lattice, is
     {name: Beams}, or one Beams (named ``core``).
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid within the region.
+    ``set`` is {name: region}: the surface within each is a set of volume meshes, to hold or to load.
     ``sweep`` is what varies in ``sweep``: {path of a key: values}, of no effect on this design.
     Nothing is checked before ``build``, the last line that can raise.
     """
@@ -119,6 +120,7 @@ class Design:
     beams: Mapping[str, Beams | dict] | Beams | None = None
     blend: dict | None = None
     sweep: dict | None = None
+    set: Mapping[str, dict] | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
     _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
 
@@ -126,7 +128,8 @@ class Design:
         """The design as plain data: what stands in its file."""
         data = {"schema": self.schema, "units": self.units, "region": self.region}
         more = {"lattice": _by_name(self.lattice), "beams": _by_name(self.beams)}
-        more |= {"blend": self.blend, "skin": self.skin, "keep": self.keep, "sweep": self.sweep}
+        more |= {"blend": self.blend, "skin": self.skin, "keep": self.keep, "set": self.set}
+        more |= {"sweep": self.sweep}
         return copied(data | {k: v for k, v in more.items() if v is not None})
 
     def __eq__(self, other: object) -> bool:
@@ -214,7 +217,7 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None
     beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
-    more = {key: data.get(key) for key in ("skin", "keep", "blend", "sweep")}
+    more = {key: data.get(key) for key in ("skin", "keep", "set", "blend", "sweep")}
     design = Design(data["region"], lattices, data["units"], data["schema"], beams=beams, folder=folder, **more)
     object.__setattr__(design, "_read", read)
     return design

@@ -10,7 +10,18 @@ from . import _core
 __all__ = [
     *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "LAW_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
     *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
-    *("RESULT_READS", "TET_READS", "TET_WRITES", "STDIN", "STEP_WRITES", "SWEEP_WRITES", "VOLUME_WRITES", "VOXEL_WRITES"),
+    *(
+        "RESULT_READS",
+        "TET_READS",
+        "TET_WRITES",
+        "STDIN",
+        "STEP_WRITES",
+        "SWEEP_WRITES",
+        "VOLUME_READS",
+        "VOLUME_WRITES",
+        "VOXEL_ELEMENT_WRITES",
+        "VOXEL_WRITES",
+    ),
     *("dotted", "is_design", "kind_of"),
 ]
 
@@ -52,8 +63,12 @@ class LayerRow(NamedTuple):
 LAYERS = {suffix: LayerRow(*row) for suffix, *row in _core.layer_formats()}
 LAYER_WRITES = tuple(LAYERS)
 #: The formats of volume meshes: suffix, what it is.
-VOLUMES = dict(_core.volume_formats())
+VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, beside the folder constant/polyMesh"}
 VOLUME_WRITES = tuple(VOLUMES)
+#: The formats of voxels as finite elements.
+VOXEL_ELEMENT_WRITES = (*dict(_core.voxel_element_formats()), "xdmf")
+#: Those that are read back.
+VOLUME_READS = ("inp", "msh", "vtu", "bdf", "mesh")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
 MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")

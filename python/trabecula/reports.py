@@ -59,6 +59,7 @@ __all__ = [
     "TrimmedReport",
     "VoidReport",
     "VolumeReport",
+    "VoxelElementsReport",
     "WallSpread",
     "WarningReport",
     "ZoneJoin",
@@ -796,7 +797,7 @@ class SetReport(Report):
     """A named set of a volume mesh."""
 
     elements: int
-    """Number of tetrahedra."""
+    """Number of elements."""
     faces: int
     """Number of faces."""
     nodes: int
@@ -1201,6 +1202,30 @@ class VolumeReport(Report):
     """Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted."""
     volume: float
     """Volume, mm³."""
+
+
+class VoxelElementsReport(Report):
+    """The figures of voxels as finite elements."""
+
+    _parts = {
+        "sets": "SetReport",
+    }
+    _by_name = frozenset(["sets"])
+
+    dropped: float
+    """Solid volume left out, mm³: voxels of a smaller fraction, and pieces other than the largest."""
+    elements: int
+    """Number of hexahedra."""
+    least: float
+    """Smallest solid fraction of a hexahedron."""
+    nodes: int
+    """Number of nodes."""
+    sets: dict[str, SetReport]
+    """The named sets."""
+    step: list[float]
+    """Edges of a hexahedron along x, y, z, mm."""
+    volume: float
+    """Solid volume, mm³: of each hexahedron its solid share."""
 
 
 class WallSpread(Report):

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         StiffnessReport,
         SurfaceReport,
     )
-    from .volumes import VolumeMesh
+    from .volumes import VolumeMesh, VoxelElements
 
     Progress = Callable[[int, int], Any]
 
@@ -683,6 +683,30 @@ class Solid(Seen):
         made = VolumeMesh(core, self._core.design)
         warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
         return made
+
+    def voxel_elements(
+        self,
+        step: float,
+        least: float = 0.01,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> VoxelElements:
+        """Voxels as finite elements: hexahedra over the region's bounds with edges of about ``step`` (mm), stretched so that a
+        whole number fits, each with its exact solid fraction.
+
+        Those of which a share of at least ``least`` is solid are elements if they belong to the largest piece by common
+        faces. A set of the design has the faces whose centres are at most half a voxel outside its region. Raises ValueError
+        for a step beyond the memory there is, and where no voxel has that share.
+        """
+        from .volumes import VOXEL_BYTES, VoxelElements
+
+        size, share = positive("step", step), number("least", least)
+        if not 0 < share <= 1:
+            raise ValueError(f"least is {share:g}; it must be greater than 0 and at most 1")
+        low, high = self.bounds
+        count = math.prod(math.ceil((b - a) / size) for a, b in zip(low, high, strict=True))
+        fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
+        return VoxelElements(_core.VoxelElements.make(self._core, size, share, _threads(threads), progress))
 
     def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
         """The edge (mm) of a request for a volume mesh."""

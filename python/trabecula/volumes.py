@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
+import re
+import shutil
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
 from . import _core
 from .errors import DesignWarning
 from .files import extension, whole_file
-from .formats import VOLUME_WRITES
+from .formats import VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import number, positive
 from .mesh import Mesh
 from .texts import counted
@@ -22,13 +25,13 @@ if TYPE_CHECKING:
     from typing import Any
 
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-    from .reports import VolumeReport
+    from .reports import VolumeReport, VoxelElementsReport
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["VolumeMesh", "VolumeSet"]
+__all__ = ["VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
@@ -36,6 +39,8 @@ OF = ("solid", "pore", "lower", "upper", "all")
 SHARP, FLAT = 12, 160
 #: Bytes for each tetrahedron: the background, the cut mesh and its faces while they are sorted.
 TET_BYTES = 420
+#: Bytes for each voxel of the grid: its fraction, its piece, and nodes and faces of those that are elements.
+VOXEL_BYTES = 120
 
 
 class VolumeSet(NamedTuple):
@@ -49,7 +54,84 @@ class VolumeSet(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-class VolumeMesh:
+class FiniteElements:
+    """What meshes for finite elements have in common: named sets, forces at nodes, files."""
+
+    _core: _core.VolumeMesh | _core.VoxelElements
+    _figures: VolumeReport | VoxelElementsReport
+
+    def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+        """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
+        does to the finite elements, force · ∫ Nᵢ dA / ∫ dA with their shape functions Nᵢ.
+        """
+        found = self._core.forces(self._with_faces("name", name), _resultant(f"the force on {name}", force))
+        assert found is not None  # the set was found
+        return found
+
+    def _with_faces(self, what: str, name: str) -> str:
+        """A name of a set with faces."""
+        if name not in self._figures.sets:
+            raise ValueError(f"{what}: the mesh has no set {name}; it has {', '.join(self._figures.sets)}")
+        if not self._figures.sets[name].faces:
+            raise ValueError(f"{what}: the set {name} has no faces on the boundary")
+        return name
+
+    def _write(
+        self,
+        path: str | os.PathLike[str],
+        kind: str,
+        elastic: tuple[float, float],
+        steps: tuple[Iterable[str], Mapping[str, Sequence[float]] | None],
+        fields: Mapping[str, ArrayLike] | None,
+    ) -> None:
+        """Writes a file; ``steps`` is what is held and what is loaded."""
+        moduli = [positive("E", elastic[0]), number("nu", elastic[1])]
+        hold, load = steps
+        held = [self._with_faces("hold", name) for name in ([hold] if isinstance(hold, str) else hold)]
+        loads = [(self._with_faces("load", k), _resultant(f"the force on {k}", v)) for k, v in (load or {}).items()]
+        if held or loads:
+            self._check_loads(kind, held, loads)
+        if fields and kind not in ("vtu", "xdmf"):
+            raise ValueError(f"fields are written to .vtu and .xdmf, not .{kind}")
+        further = {name: self._field(name, values) for name, values in (fields or {}).items()}
+        if kind == "xdmf":
+            from .xdmf import write
+
+            return write(os.fsdecode(path), self, self._of_elements(), further)  # type: ignore[arg-type]
+        count = self._figures.nodes
+        arrays = [(name, v[0].size, len(v) == count, v.ravel().tolist()) for name, v in further.items()]
+        title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
+        with whole_file(path) as temporary:
+            self._core.write((temporary, kind, title), moduli, held, loads, arrays)
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        """What each element has."""
+        raise NotImplementedError
+
+    def _field(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
+        """A field of a file: a row for each node or element."""
+        import numpy as np
+
+        found = np.asarray(values, dtype=np.float64)
+        counts = self._figures.nodes, self._figures.elements
+        if found.ndim not in (1, 2) or found.shape[0] not in counts or found.size == 0:
+            raise ValueError(
+                f"the field {name} has the shape {found.shape}; it must have a row for each of {counts[0]} nodes or "
+                f"{counts[1]} elements"
+            )
+        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "domain", "fraction"):
+            raise ValueError(f"a field cannot be named {name!r}; use another name")
+        return found
+
+    def _check_loads(self, kind: str, held: list, loads: list) -> None:
+        """Whether what is held and loaded makes a step."""
+        if kind != "inp":
+            raise ValueError(f"hold and load are written to .inp, not .{kind}; the method forces has them at nodes")
+        if not held or not loads:
+            raise ValueError("give both hold and load: a step needs sets that do not move and forces on others")
+
+
+class VolumeMesh(FiniteElements):
     """Tetrahedra that conform to a solid's surfaces, edges and corners. Made by ``Solid.volume_mesh``."""
 
     def __init__(self, core: _core.VolumeMesh, design: str = ""):
@@ -117,17 +199,138 @@ class VolumeMesh:
         """The boundary of all domains together as a closed surface, straight between corners."""
         return Mesh(self._core.boundary())
 
-    def write(self, path: str | os.PathLike[str], E: float = 1.0, nu: float = 0.3) -> None:
-        """Writes .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .vtu (VTK) or .bdf (Nastran), with domains and sets.
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Writes .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .vtu (VTK), .xdmf (with
+        arrays in an .h5 of the same name; needs h5py), .bdf (Nastran) or .mesh (Medit), with domains and sets.
 
-        ``E`` (MPa) and ``nu`` are Young's modulus and Poisson's ratio of the material in .bdf, and in the .inp of a periodic
-        mesh, which has equations, boundary conditions and six steps and runs as it is.
+        .foam, an empty file that ParaView opens, stands for OpenFOAM: the mesh, in m, is the folder constant/polyMesh of the
+        file's own folder, which is replaced. Several domains are cell zones, opposite sides of a periodic mesh cyclic patches.
+        In .foam, .msh2 and .mesh, where a face can belong to one patch or group only, it belongs to the smallest of its sets.
+
+        ``E`` (MPa) and ``nu`` are Young's modulus and Poisson's ratio of the material in .bdf, and in an .inp that runs as it
+        is: that of a periodic mesh, with equations, boundary conditions and six steps, and one with ``load``: resultants (N) of
+        uniform tractions by the names of sets, {"X1": (0, 0, -100)}, while the nodes of the sets ``hold`` do not move.
+
+        ``fields`` are numbers by name, (n,) or (n, k) at nodes or in elements, for .vtu and .xdmf:
+        {"depth": solid.field(mesh.nodes)}.
         """
         kind = extension(path, VOLUME_WRITES)
-        elastic = [positive("E", E), number("nu", nu)]
-        title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
-        with whole_file(path) as temporary:
-            self._core.write((temporary, kind, title), elastic)
+        if kind in ("foam", "mesh") and self._figures.order == 2:
+            raise ValueError(f".{kind} takes linear tetrahedra; make the mesh with order 1")
+        if kind == "foam":
+            if hold or load or fields:
+                raise ValueError("hold, load and fields are not for .foam; give them to the solver")
+            return self._write_case(os.fsdecode(path))
+        self._write(path, kind, (E, nu), (hold, load), fields)
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return {"domain": self.domain}
+
+    def _check_loads(self, kind: str, held: list, loads: list) -> None:
+        super()._check_loads(kind, held, loads)
+        if self._figures.pairs:
+            raise ValueError("a periodic mesh has steps of its own; leave out hold and load")
+        if self.domains not in (["SOLID"], ["WALL"]):
+            raise ValueError(f'the mesh has the domains {", ".join(self.domains)}; loads are for of="solid"')
+
+    def _write_case(self, path: str) -> None:
+        """The mesh of an OpenFOAM case, which has another name until it is whole, and the file that stands for it."""
+        constant = os.path.join(os.path.dirname(os.path.abspath(path)), "constant")
+        whole, made = os.path.join(constant, "polyMesh"), os.path.join(constant, f".polyMesh-{os.getpid()}")
+        os.makedirs(made)
+        try:
+            self._core.write_poly(made)
+            shutil.rmtree(whole, ignore_errors=True)
+            os.replace(made, whole)
+        except BaseException:
+            shutil.rmtree(made, ignore_errors=True)
+            raise
+        with whole_file(path) as temporary, open(temporary, "w", encoding="ascii"):
+            pass
+
+
+class VoxelElements(FiniteElements):
+    """Voxels as finite elements: hexahedra of a regular grid, each with its solid fraction, in one piece. Made by
+    ``Solid.voxel_elements``.
+    """
+
+    def __init__(self, core: _core.VoxelElements):
+        self._core = core
+
+    def __repr__(self) -> str:
+        figures = self._figures
+        return f"<trabecula.VoxelElements of {figures.elements} hexahedra, {figures.nodes} nodes>"
+
+    @cached_property
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes (n, 3), mm, x fastest."""
+        return self._core.nodes
+
+    @cached_property
+    def elements(self) -> NDArray[np.uint32]:
+        """Nodes of each hexahedron (m, 8), in the order of VTK, Abaqus and Gmsh: round the lower face, then the upper one."""
+        return self._core.elements
+
+    @cached_property
+    def fraction(self) -> NDArray[np.float64]:
+        """The share of each hexahedron that is solid."""
+        return self._core.fraction
+
+    @cached_property
+    def sets(self) -> Mapping[str, VolumeSet]:
+        """The named sets that are not empty: X0 X1 Y0 Y1 Z0 Z1, the faces on the sides of the grid; SURFACE, the rest of the
+        boundary; and those of the design. Faces (n, 2) are a hexahedron and the number, from 0, of S1 to S6 of Abaqus.
+        """
+        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return {"fraction": self.fraction}
+
+    @cached_property
+    def _figures(self) -> VoxelElementsReport:
+        return self._core.report()
+
+    def report(self) -> VoxelElementsReport:
+        """The figures: numbers of elements and nodes, solid volume, what was left out, sets."""
+        return copy.deepcopy(self._figures)
+
+    @property
+    def volume(self) -> float:
+        """Solid volume, mm³: of each hexahedron its solid share."""
+        return self._figures.volume
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Writes .inp (Abaqus, CalculiX: C3D8), .msh or .msh2 (Gmsh 2.2), .vtu (VTK) or .xdmf, with fractions and sets.
+
+        In .inp elements are in sets by their solid fraction, in twentieths. With ``hold`` and ``load``, as of
+        ``VolumeMesh.write``, it runs as it is: Young's modulus in each set is ``E`` (MPa) times its mean fraction. ``fields``
+        are those of ``VolumeMesh.write``.
+        """
+        self._write(path, extension(path, VOXEL_ELEMENT_WRITES), (E, nu), (hold, load), fields)
+
+
+def _resultant(name: str, value: Sequence[float]) -> list[float]:
+    """A force as three finite numbers, not all 0."""
+    found = [number(name, v) for v in value]
+    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
+        raise ValueError(f"{name} is {tuple(found)}; it must be three finite numbers, not all 0 (N)")
+    return found
 
 
 def warn_flaws(made: VolumeMesh, one: bool) -> None:

@@ -5,6 +5,13 @@ use rayon::prelude::*;
 use crate::math::{Mat3, Vec3, determinant, sub};
 use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
 
+mod hex_mesh;
+mod poly_faces;
+mod surface_load;
+
+pub use hex_mesh::{HEX_FACES, HexMesh};
+pub use poly_faces::{Patch, PolyFaces};
+
 /// A mesh for finite elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FeMesh {

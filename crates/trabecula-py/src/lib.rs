@@ -21,6 +21,7 @@ mod run;
 mod solid;
 mod tets;
 mod volume;
+mod voxel_elements;
 mod voxels;
 
 /// Rotations and translations.
@@ -70,6 +71,8 @@ mod _core {
     #[pymodule_export]
     use crate::volume::VolumeMesh;
     #[pymodule_export]
+    use crate::voxel_elements::VoxelElements;
+    #[pymodule_export]
     use crate::voxels::Voxels;
 
     #[pymodule_init]
@@ -114,6 +117,12 @@ mod _core {
     #[pyfunction]
     fn volume_formats() -> Vec<(&'static str, &'static str)> {
         crate::volume::formats()
+    }
+
+    /// The formats of voxels as finite elements: suffix, what it is.
+    #[pyfunction]
+    fn voxel_element_formats() -> Vec<(&'static str, &'static str)> {
+        crate::voxel_elements::formats()
     }
 
     /// The JSON Schema of a design, as JSON text.

@@ -4,7 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::fe_mesh::{FeMesh, MIDDLES};
-use geometry::formats::{FE_FORMATS, FeText};
+use geometry::formats::{FE_FORMATS, FeField, FeText, POLY_FILES};
 use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -20,7 +20,17 @@ use crate::run::run;
 use crate::solid::Solid;
 
 /// Nodes, tetrahedra, and faces (tetrahedron, corner opposite to it) of a set.
-type Members<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
+pub(crate) type Members<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
+
+/// Nodes, and the forces at them.
+pub(crate) type Forces<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
+
+/// A field of a file: its name, numbers for each node or element, whether it is at nodes, the numbers.
+pub(crate) type Field = (String, usize, bool, Vec<f64>);
+
+pub(crate) fn field((name, components, at_nodes, values): Field) -> FeField {
+    FeField { name, components, at_nodes, values }
+}
 
 /// A volume mesh.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -127,17 +137,49 @@ impl VolumeMesh {
         Ok(Mesh::new(SurfaceMesh { mesh, cut }, String::new()))
     }
 
-    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio for formats with a material.
-    #[pyo3(signature = (file, elastic=[1.0, 0.3]))]
-    fn write(&self, py: Python<'_>, file: (PathBuf, String, String), elastic: [f64; 2]) -> PyResult<()> {
+    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
+    fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
+        let Some(set) = self.mesh().set(name) else { return Ok(None) };
+        let (nodes, forces): (Vec<u32>, Vec<[f64; 3]>) = self.mesh().nodal_forces(set, force).into_iter().unzip();
+        let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
+        Ok(Some((nodes.into_pyarray(py), forces)))
+    }
+
+    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio for formats with a material; sets that
+    /// are held, sets with the resultants (N) of their loads, and fields.
+    #[allow(clippy::too_many_arguments)] // The pieces of a file.
+    fn write(
+        &self,
+        py: Python<'_>,
+        file: (PathBuf, String, String),
+        elastic: [f64; 2],
+        held: Vec<String>,
+        loads: Vec<(String, [f64; 3])>,
+        fields: Vec<Field>,
+    ) -> PyResult<()> {
+        let fields = fields.into_iter().map(field).collect();
         let (path, suffix, title) = file;
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
         let done = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
-            (format.write)(self.mesh(), &FeText { title, elastic }, &mut out)?;
+            (format.write)(self.mesh(), &FeText { title, elastic, held, loads, fields }, &mut out)?;
             out.flush()
+        })?;
+        Ok(done?)
+    }
+
+    /// Writes the files of OpenFOAM's polyMesh into a folder; gives the names of its patches and their numbers of faces.
+    fn write_poly(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(String, usize)>> {
+        let done = run(py, None, None, |_| {
+            let faces = self.mesh().poly_faces();
+            for (name, write) in POLY_FILES {
+                let mut out = BufWriter::with_capacity(1 << 20, file::anew(&folder.join(name))?);
+                write(self.mesh(), &faces, &mut out)?;
+                out.flush()?;
+            }
+            Ok::<_, std::io::Error>(faces.patches.into_iter().map(|p| (p.name, p.count)).collect())
         })?;
         Ok(done?)
     }

@@ -23,6 +23,7 @@ mod design_schema;
 mod finish_tiling;
 mod joins;
 mod sample;
+mod sets_kind;
 mod study_kind;
 mod surface_net;
 #[cfg(test)]
@@ -53,6 +54,7 @@ use crate::truss::Beams;
 use crate::volume_mesh;
 use beams::{StepSummary, write_step};
 use geometry::fault::Fault;
+use geometry::fe_mesh::HexMesh;
 use geometry::progress::{Progress, Stopped};
 use geometry::repair::Repaired;
 
@@ -65,6 +67,7 @@ pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
+pub use sets_kind::*;
 pub use study_kind::*;
 
 /// A lattice part, as data.
@@ -94,6 +97,9 @@ pub struct Design {
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[kind(default)]
     pub keep: Keeps,
+    /// Regions whose surface is a set of volume meshes, to hold or to load, under names of your own.
+    #[kind(default, hints("sets", "nset", "group"))]
+    pub set: SetSpecs,
     /// What varies where many designs are made of this one; of no effect on this one.
     #[kind(hints("study", "parameters", "vary"))]
     pub sweep: Option<SweepKind>,
@@ -152,6 +158,8 @@ pub struct Built {
     pub solid: Solid,
     /// Names of what is solid whatever the lattice says: `SKIN`, `KEEP_` and the name of a keep zone, `NET`.
     pub bodies: Vec<String>,
+    /// The regions whose surface is a set of volume meshes, by name.
+    pub sets: Vec<(String, Region)>,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
     /// The lattices over tetrahedral meshes, by name.
@@ -383,7 +391,17 @@ impl Built {
         options: &volume_mesh::Options,
         progress: &dyn Progress,
     ) -> Result<volume_mesh::Made, Stopped> {
-        volume_mesh::volume_mesh(&self.solid, &self.bodies, options, progress)
+        let named = volume_mesh::Named { bodies: &self.bodies, sets: &self.sets };
+        volume_mesh::volume_mesh(&self.solid, &named, options, progress)
+    }
+
+    /// Its voxels as finite elements: edge of a voxel (mm), and the least solid fraction of one; with sets of the grid's sides and of the
+    /// design.
+    ///
+    /// # Errors
+    /// As `voxel_fractions::voxel_elements`.
+    pub fn voxel_elements(&self, size: (f64, f64), progress: &dyn Progress) -> Result<HexMesh, Stopped> {
+        crate::voxel_fractions::voxel_elements(&self.solid, &self.sets, size, progress)
     }
 
     /// The periodic cell of which the design's lattice or beams are made. The region, skin and kept zones are no part of it.

@@ -15,6 +15,7 @@ use geometry::tetmesh::{FACES, TetMesh};
 use geometry::union_find::unite;
 use rayon::prelude::*;
 
+use crate::region::Region;
 use crate::solid::Solid;
 
 mod body_centred;
@@ -35,6 +36,7 @@ use body_centred::Cubes;
 use chord_balance::{distances, interfaces};
 use domains::Domains;
 pub use domains::Of;
+pub use named_sets::is_own_name;
 use node_surfaces::{HELD, MOST, SurfaceSet, members, only};
 use partition::{Partition, Tet};
 use shaping::{GONE, Shaping};
@@ -75,16 +77,21 @@ pub struct Made {
 /// The surfaces of the region's bounding planes: lower and upper, for each axis.
 type Planes = [[Option<usize>; 2]; 3];
 
-/// The volume mesh of a solid; `bodies` are the names of what is solid whatever the lattice says. The same for any number of threads.
+/// What has names in a solid.
+#[derive(Clone, Copy)]
+pub struct Named<'a> {
+    /// Names of what is solid whatever the lattice says, in the order of the solid.
+    pub bodies: &'a [String],
+    /// Regions whose surface is a set, by name.
+    pub sets: &'a [(String, Region)],
+}
+
+/// The volume mesh of a solid with sets by what is named. The same for any number of threads.
 ///
 /// # Errors
-/// An edge too fine; a side of what is no sheet; periodic where the solid is not; nothing to mesh; an interruption.
-pub fn volume_mesh(
-    solid: &Solid,
-    bodies: &[String],
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<Made, Stopped> {
+/// An edge too fine; a side of what is no sheet; periodic where the solid is not; nothing to mesh; an empty set of the solid's surface;
+/// an interruption.
+pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
     let domains = Domains::new(solid, options.of).map_err(Stopped::Refused)?;
     if domains.surfaces.len() > MOST {
         let count = domains.surfaces.len();
@@ -141,7 +148,7 @@ pub fn volume_mesh(
     if options.order == 1 {
         shaping.balance();
     }
-    let mut made = assembled(shaping, &domains, &planes, bodies, options);
+    let mut made = assembled(shaping, &domains, &planes, named, options).map_err(Stopped::Refused)?;
     (made.dropped, made.step) = (dropped, cubes.step());
     Ok(made)
 }
@@ -245,7 +252,13 @@ fn pinched(faces: &[([u32; 3], u32, bool)]) -> bool {
 }
 
 /// The improved mesh with sets, pairs and, of order 2, nodes on edges.
-fn assembled(shaping: Shaping, domains: &Domains, planes: &Planes, bodies: &[String], options: &Options) -> Made {
+fn assembled(
+    shaping: Shaping,
+    domains: &Domains,
+    planes: &Planes,
+    named: &Named,
+    options: &Options,
+) -> Result<Made, Fault> {
     let Shaping { surfaces, mut nodes, mut on, next, tets, domain, .. } = shaping;
     let mut order: Vec<u32> = (0..tets.len() as u32).filter(|t| tets[*t as usize] != GONE).collect();
     order.sort_by_key(|t| domain[*t as usize]);
@@ -284,10 +297,15 @@ fn assembled(shaping: Shaping, domains: &Domains, planes: &Planes, bodies: &[Str
     };
     let names = domains.names.iter().map(|n| n.to_string()).collect();
     let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, sets: Vec::new(), pairs, period };
-    named_sets::add_sets(&mut mesh, domains, &faces, planes, bodies);
+    named_sets::add_sets(&mut mesh, domains, &faces, planes, named.bodies);
+    let empty = named_sets::add_regions(&mut mesh, &faces, named.sets);
+    // A region of the solid's surface may hold none of a fluid's.
+    if let (Some(fault), Of::Solid | Of::All) = (empty, options.of) {
+        return Err(fault);
+    }
     let deviation = deviation(&mesh, &faces, domains);
     let pieces = components(&mesh.tets, mesh.nodes.len());
-    Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] }
+    Ok(Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] })
 }
 
 /// Removes nodes that no tetrahedron has; gives the cycles of images among the others.

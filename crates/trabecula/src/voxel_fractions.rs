@@ -6,6 +6,7 @@
 //! of edge h is O(h²) of its volume, O(h⁵) mm³; planes are exact. Where surfaces meet, voxels are divided, and the smallest
 //! ones cut by all planes.
 
+mod finite_elements;
 mod plane_cut;
 mod simplex_volume;
 
@@ -16,6 +17,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use crate::csg_tree::{CsgSolid, CsgTree, Sign};
 use crate::implicit::Surface;
+pub use finite_elements::voxel_elements;
 use plane_cut::{Plane, below, patch};
 use simplex_volume::volume;
 

@@ -5,11 +5,19 @@ use std::io::{self, Write};
 use rayon::prelude::*;
 
 use crate::fe_mesh::FeMesh;
+use crate::math::Vec3;
 
 mod abaqus;
+mod gmsh22;
 mod gmsh41;
+mod medit;
 mod nastran;
+mod openfoam;
+mod voxel_elements;
 mod vtk_cells;
+
+pub use openfoam::{POLY_FILES, PolyFile};
+pub use voxel_elements::{HEX_FORMATS, HexFormat};
 
 /// What is written besides the mesh.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +26,25 @@ pub struct FeText {
     pub title: String,
     /// Young's modulus (MPa) and Poisson's ratio of the first domain's material.
     pub elastic: [f64; 2],
+    /// Names of sets whose nodes are held in all directions.
+    pub held: Vec<String>,
+    /// Names of sets and the resultant (N) of a uniform traction on their faces.
+    pub loads: Vec<(String, Vec3)>,
+    /// Further numbers of nodes and elements, in formats that have them.
+    pub fields: Vec<FeField>,
+}
+
+/// Numbers at nodes or in elements.
+#[derive(Clone, Debug, Default)]
+pub struct FeField {
+    /// Its name.
+    pub name: String,
+    /// Numbers for each node or element.
+    pub components: usize,
+    /// Whether it is at nodes.
+    pub at_nodes: bool,
+    /// The numbers, those of a node or element together.
+    pub values: Vec<f64>,
 }
 
 /// A format of finite element meshes.
@@ -31,11 +58,13 @@ pub struct FeFormat {
 }
 
 /// The formats of finite element meshes.
-pub const FE_FORMATS: [FeFormat; 4] = [
+pub const FE_FORMATS: [FeFormat; 6] = [
     FeFormat { suffix: "inp", title: "Abaqus, CalculiX", write: abaqus::write },
     FeFormat { suffix: "msh", title: "Gmsh 4.1", write: gmsh41::write },
+    FeFormat { suffix: "msh2", title: "Gmsh 2.2", write: gmsh22::write },
     FeFormat { suffix: "vtu", title: "VTK, ParaView", write: vtk_cells::write },
     FeFormat { suffix: "bdf", title: "Nastran", write: nastran::write },
+    FeFormat { suffix: "mesh", title: "Medit, Mmg, FreeFem", write: medit::write },
 ];
 
 /// Items formatted by one thread at a time, and by all before they are written.
@@ -111,7 +140,12 @@ mod tests {
     fn every_format_is_written_with_sets_and_domains() {
         for format in FE_FORMATS {
             let mut bytes = Vec::new();
-            (format.write)(&two(), &FeText { title: "two".into(), elastic: [1.0, 0.3] }, &mut bytes).unwrap();
+            (format.write)(
+                &two(),
+                &FeText { title: "two".into(), elastic: [1.0, 0.3], ..FeText::default() },
+                &mut bytes,
+            )
+            .unwrap();
             let text = String::from_utf8_lossy(&bytes);
             for word in ["X0", "WALL", "LOWER"] {
                 assert!(text.contains(word), "{}: {word}", format.suffix);

@@ -69,6 +69,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let region = domain.as_ref().map_or(region, |d| d.region.clone());
     let points = sampled(&region, &mut notes.warnings)?;
     let (filled, skin) = build_skin::filled(d, &region, &points, loader, &mut notes)?;
+    let sets = super::sets_kind::sets(d, &region, loader, &mut notes)?;
     let Notes { mut warnings, repairs } = notes;
     let at = |path: String| Environment { path, region: &region, points: &points, filled: &filled, loader };
 
@@ -108,7 +109,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).collect();
     let solid = filled.into_iter().chain(nets).fold(solid, Solid::with);
     let figures = OnceLock::new();
-    Ok(Built { solid, bodies, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures })
+    Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures })
 }
 
 /// Refuses a region that is empty, unbounded or too far away.

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::volume_mesh::Made;
+use geometry::fe_mesh::{FeSet, HexMesh};
 
 /// The figures of a volume mesh.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -56,10 +57,49 @@ pub struct DomainReport {
 pub struct SetReport {
     /// Number of nodes.
     pub nodes: usize,
-    /// Number of tetrahedra.
+    /// Number of elements.
     pub elements: usize,
     /// Number of faces.
     pub faces: usize,
+}
+
+/// The figures of voxels as finite elements.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct VoxelElementsReport {
+    /// Number of hexahedra.
+    pub elements: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Edges of a hexahedron along x, y, z, mm.
+    pub step: [f64; 3],
+    /// Solid volume, mm³: of each hexahedron its solid share.
+    pub volume: f64,
+    /// Smallest solid fraction of a hexahedron.
+    pub least: f64,
+    /// Solid volume left out, mm³: voxels of a smaller fraction, and pieces other than the largest.
+    pub dropped: f64,
+    /// The named sets.
+    pub sets: BTreeMap<String, SetReport>,
+}
+
+impl From<&HexMesh> for VoxelElementsReport {
+    fn from(mesh: &HexMesh) -> VoxelElementsReport {
+        VoxelElementsReport {
+            elements: mesh.hexes.len(),
+            nodes: mesh.nodes.len(),
+            step: mesh.step,
+            volume: mesh.volume(),
+            least: mesh.fraction.iter().fold(1.0, |m, f| f64::min(m, *f)),
+            dropped: mesh.dropped,
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
+}
+
+impl From<&FeSet> for SetReport {
+    fn from(set: &FeSet) -> SetReport {
+        SetReport { nodes: set.nodes.len(), elements: set.elements.len(), faces: set.faces.len() }
+    }
 }
 
 impl From<&Made> for VolumeReport {
@@ -78,10 +118,7 @@ impl From<&Made> for VolumeReport {
             let report = DomainReport { elements: of.len(), volume: of.iter().map(|t| volume(*t)).sum(), inside };
             (name.clone(), report)
         });
-        let sets = mesh.sets.iter().map(|s| {
-            let report = SetReport { nodes: s.nodes.len(), elements: s.elements.len(), faces: s.faces.len() };
-            (s.name.clone(), report)
-        });
+        let sets = mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s)));
         VolumeReport {
             elements: mesh.tets.len(),
             nodes: mesh.nodes.len(),

@@ -4,8 +4,10 @@ use super::cyclic_nodes::PLANES;
 use super::domains::Domains;
 use super::node_surfaces::{HELD, SurfaceSet, only};
 use crate::field::Field;
+use crate::region::Region;
+use geometry::fault::Fault;
 use geometry::fe_mesh::{FeMesh, FeSet};
-use geometry::math::{Vec3, add, scale};
+use geometry::math::{Aabb, Vec3, add, norm, scale};
 use rayon::prelude::*;
 
 /// Adds the sets that are not empty. `faces` are those on surfaces: tetrahedron and corner, their surfaces, whether only one tetrahedron
@@ -42,7 +44,10 @@ pub(super) fn add_sets(
     push(mesh, "LATTICE".into(), own);
     let middle = |t: &[u32; 4]| scale(t.iter().fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize])), 0.25);
     let middles: Vec<Vec3> = mesh.tets.par_iter().map(middle).collect();
+    let mut first = domains.region;
     for (body, name) in domains.filled.iter().zip(bodies) {
+        let own = below(first + body.surfaces.len()) & !below(first);
+        first += body.surfaces.len();
         let mut values = vec![0.0; middles.len()];
         values.par_chunks_mut(1024).zip(middles.par_chunks(1024)).for_each(|(v, p)| body.values(p, v));
         let within = |t: u32| values[t as usize] < 0.0 && mesh.domain[t as usize] == 0;
@@ -54,8 +59,60 @@ pub(super) fn add_sets(
                 mesh.tets[*t as usize].into_iter().chain(middles.into_iter().flatten())
             }));
             mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: of });
+        } else {
+            // Of a fluid the body is a wall.
+            let wall = faces.iter().filter(|(_, set, _)| set & region == 0 && set & own != 0).map(|f| f.0).collect();
+            push(mesh, name.clone(), wall);
         }
     }
+}
+
+/// Adds the faces within each region, by its name: those whose corners' mean is inside it or within a millionth of the mesh's size, so that
+/// a region may end where a flat face is. Gives what to say of the first one that is empty.
+pub(super) fn add_regions(
+    mesh: &mut FeMesh,
+    faces: &[((u32, u8), SurfaceSet, bool)],
+    sets: &[(String, Region)],
+) -> Option<Fault> {
+    let mean = |f: (u32, u8)| {
+        let [a, b, c] = mesh.face(f).map(|n| mesh.nodes[n as usize]);
+        scale(add(add(a, b), c), 1.0 / 3.0)
+    };
+    let points: Vec<Vec3> = faces.iter().map(|f| mean(f.0)).collect();
+    let bounds = mesh.nodes.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+    let near = 1e-6 * norm(bounds.size());
+    let mut empty = None;
+    for (name, region) in sets {
+        let mut depth = vec![0.0; points.len()];
+        depth.par_chunks_mut(1024).zip(points.par_chunks(1024)).for_each(|(d, p)| region.values(p, d));
+        let of: Vec<(u32, u8)> = faces.iter().zip(&depth).filter(|(_, d)| **d <= near).map(|(f, _)| f.0).collect();
+        if of.is_empty() && empty.is_none() {
+            let nearest = depth.iter().fold(f64::INFINITY, |m, d| m.min(*d));
+            let message = format!(
+                "the set is empty: no face of the mesh lies within its region, the nearest is {nearest:.3} mm away; \
+                 enlarge the region or move it"
+            );
+            empty = Some(Fault::new(format!("set.{name}"), message));
+        }
+        push(mesh, name.clone(), of);
+    }
+    empty
+}
+
+/// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
+pub fn is_own_name(name: &str) -> bool {
+    const OWN: [&str; 15] = [
+        "CUT", "LATTICE", "SKIN", "NET", "SOLID", "PORE", "WALL", "LOWER", "UPPER", "NALL", "REF", "REFX", "REFY",
+        "REFZ", "SURFACE",
+    ];
+    let name = name.to_ascii_uppercase();
+    let plane = |n: &str| PLANES.iter().flatten().any(|p| *p == n);
+    let of_domain = || name.rsplit_once('_').is_some_and(|(d, p)| OWN.contains(&d) && plane(p));
+    OWN.contains(&name.as_str())
+        || name.starts_with("KEEP_")
+        || name.starts_with("FRACTION_")
+        || plane(&name)
+        || of_domain()
 }
 
 /// Adds a set of faces with their nodes and tetrahedra, unless it is empty.

@@ -1,14 +1,15 @@
 //! Input files of Abaqus and CalculiX.
 //!
 //! Source: CalculiX CrunchiX User's Manual 2.20, sections *NODE, *ELEMENT, *NSET, *SURFACE, *EQUATION. At most sixteen numbers stand on a
-//! line of a set. A periodic cell is ready to run: its faces are tied by equations to three reference nodes, whose displacements
-//! are the columns of the mean strain times the periods, and six steps apply one strain each.
+//! line of a set. A mesh with loads has a step and is ready to run. So is a periodic cell: its faces are tied by equations to three
+//! reference nodes, whose displacements are the columns of the mean strain times the periods, and six steps apply one strain each.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::{FeText, lines, push, rows};
-use crate::fe_mesh::{FeMesh, MIDDLES};
+use crate::fe_mesh::{FeMesh, FeSet, MIDDLES};
+use crate::math::{Vec3, add};
 
 /// The number of a face by the corner opposite to it.
 const FACE: [u8; 4] = [3, 4, 2, 1];
@@ -18,15 +19,7 @@ const STRAINS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]
 const STRAIN: f64 = 1e-3;
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "*HEADING\n{}\n** mm, N, MPa\n*NODE, NSET=NALL", text.title)?;
-    lines(out, mesh.nodes.len(), |i, text| {
-        push(text, i + 1);
-        for x in mesh.nodes[i] {
-            // Writing to a string cannot fail.
-            let _ = write!(text, ", {x:?}");
-        }
-        text.push('\n');
-    })?;
+    nodes(&text.title, &mesh.nodes, out)?;
     let kind = if mesh.middles.is_empty() { "C3D4" } else { "C3D10" };
     for (d, name) in mesh.domains.iter().enumerate() {
         let of: Vec<usize> = (0..mesh.tets.len()).filter(|i| mesh.domain[*i] as usize == d).collect();
@@ -43,7 +36,30 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
             text.push('\n');
         })?;
     }
-    for set in &mesh.sets {
+    sets(&mesh.sets, &FACE, out)?;
+    match (mesh.pairs.is_empty(), text.held.is_empty() && text.loads.is_empty()) {
+        (false, _) => periodic(mesh, text, out),
+        (true, false) => loaded(mesh, text, out),
+        (true, true) => Ok(()),
+    }
+}
+
+/// The heading and the nodes.
+pub(super) fn nodes(title: &str, nodes: &[Vec3], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "*HEADING\n{title}\n** mm, N, MPa\n*NODE, NSET=NALL")?;
+    lines(out, nodes.len(), |i, text| {
+        push(text, i + 1);
+        for x in nodes[i] {
+            text.push_str(", ");
+            decimal(text, x);
+        }
+        text.push('\n');
+    })
+}
+
+/// Sets of nodes, elements and faces; `numbers` are the solver's of an element's faces.
+pub(super) fn sets(sets: &[FeSet], numbers: &[u8], out: &mut dyn Write) -> io::Result<()> {
+    for set in sets {
         writeln!(out, "*NSET, NSET={}", set.name)?;
         rows(out, &set.nodes, 16, ", ")?;
         writeln!(out, "*ELSET, ELSET={}", set.name)?;
@@ -54,12 +70,75 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
                 let (t, k) = set.faces[i];
                 push(text, t as usize + 1);
                 text.push_str(", S");
-                push(text, FACE[k as usize] as usize);
+                push(text, numbers[k as usize] as usize);
                 text.push('\n');
             })?;
         }
     }
-    if mesh.pairs.is_empty() { Ok(()) } else { periodic(mesh, text, out) }
+    Ok(())
+}
+
+/// Appends a number in at most twenty characters: CalculiX leaves out what is beyond, an exponent too.
+fn decimal(text: &mut String, x: f64) {
+    let start = text.len();
+    // Writing to a string cannot fail.
+    let _ = write!(text, "{x:?}");
+    for digits in (1..=16).rev() {
+        if text.len() - start <= 20 {
+            return;
+        }
+        text.truncate(start);
+        let _ = write!(text, "{x:.digits$e}");
+    }
+}
+
+/// The material of all domains.
+fn material(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    let [e, nu] = text.elastic;
+    writeln!(out, "*MATERIAL, NAME=SOLID\n*ELASTIC\n{e:?}, {nu:?}")?;
+    mesh.domains.iter().try_for_each(|name| writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL=SOLID"))
+}
+
+/// Material and a step.
+fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    material(mesh, text, out)?;
+    let names: Vec<&str> = mesh.domains.iter().map(String::as_str).collect();
+    let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
+    step(text, &names, &forces, out)
+}
+
+/// The forces at nodes of a load on a set.
+pub(super) type Forces<'a> = dyn Fn(&str, Vec3) -> Option<Vec<(u32, Vec3)>> + 'a;
+
+/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the `domains`.
+pub(super) fn step(text: &FeText, domains: &[&str], of: &Forces, out: &mut dyn Write) -> io::Result<()> {
+    text.held.iter().try_for_each(|name| writeln!(out, "*BOUNDARY\n{name}, 1, 3"))?;
+    writeln!(out, "*STEP\n*STATIC")?;
+    // A node of several sets has one line for each direction: what a second one means differs between programs.
+    let mut forces = std::collections::BTreeMap::<u32, Vec3>::new();
+    for (name, force) in &text.loads {
+        let [x, y, z] = force;
+        writeln!(out, "** on {name}: {x:?}, {y:?}, {z:?} N in all, a uniform traction")?;
+        for (node, force) in of(name, *force).into_iter().flatten() {
+            let sum = forces.entry(node).or_insert([0.0; 3]);
+            *sum = add(*sum, force);
+        }
+    }
+    let forces: Vec<(u32, Vec3)> = forces.into_iter().collect();
+    writeln!(out, "*CLOAD")?;
+    lines(out, forces.len(), |i, text| {
+        let (node, force) = forces[i];
+        for (k, f) in force.iter().enumerate().filter(|(_, f)| **f != 0.0) {
+            let _ = write!(text, "{}, {}, ", node + 1, k + 1);
+            decimal(text, *f);
+            text.push('\n');
+        }
+    })?;
+    writeln!(out, "*NODE FILE\nU\n*EL FILE\nS")?;
+    text.held.iter().try_for_each(|name| writeln!(out, "*NODE PRINT, NSET={name}, TOTALS=ONLY\nRF"))?;
+    // The internal energy is half the work of the loads.
+    domains.iter().try_for_each(|name| writeln!(out, "*EL PRINT, ELSET={name}, TOTALS=ONLY\nEVOL, ELSE"))?;
+    writeln!(out, "*END STEP")
 }
 
 /// Equations, material and six steps of a periodic cell.
@@ -97,11 +176,7 @@ fn periodic(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()>
             text.push('\n');
         }
     })?;
-    let [e, nu] = text.elastic;
-    writeln!(out, "*MATERIAL, NAME=SOLID\n*ELASTIC\n{e:?}, {nu:?}")?;
-    for name in &mesh.domains {
-        writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL=SOLID")?;
-    }
+    material(mesh, text, out)?;
     let dependent: std::collections::HashSet<u32> = mesh.pairs.iter().map(|p| p.node).collect();
     let held = mesh.tets.iter().flatten().copied().filter(|n| !dependent.contains(n)).min().unwrap_or(0);
     writeln!(out, "*BOUNDARY\n{}, 1, 3", held + 1)?;
@@ -125,4 +200,22 @@ fn periodic(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()>
         writeln!(out, "*END STEP")?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimal;
+
+    #[test]
+    fn numbers_keep_their_value_in_twenty_characters() {
+        for x in
+            [0.0, 4.0, -1.0 / 3.0, 1.701414312254252e-17, -1.2345678901234567e-105, 45.367132785054515, -1e300 / 3.0]
+        {
+            let mut text = String::new();
+            decimal(&mut text, x);
+            let back: f64 = text.parse().unwrap_or(f64::NAN);
+            // Eleven digits after the first remain with a sign and an exponent of three digits.
+            assert!(text.len() <= 20 && (back - x).abs() <= 1e-11 * x.abs(), "{x:?}: {text}");
+        }
+    }
 }

@@ -13,7 +13,7 @@ use crate::math::Aabb;
 use crate::tetmesh::EDGES;
 
 /// The order of the edges' nodes, by indices of `EDGES`: the last two are swapped.
-const MIDDLES: [usize; 6] = [0, 3, 1, 2, 5, 4];
+pub(super) const MIDDLES: [usize; 6] = [0, 3, 1, 2, 5, 4];
 
 pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Result<()> {
     debug_assert_eq!(EDGES[5], [2, 3]);

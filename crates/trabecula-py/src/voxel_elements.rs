@@ -1,0 +1,119 @@
+//! Voxels as finite elements: arrays, sets, figures, files.
+
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use geometry::fe_mesh::HexMesh;
+use geometry::formats::{FeText, HEX_FORMATS};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use trabecula::report::VoxelElementsReport;
+
+use crate::error;
+use crate::file;
+use crate::report::report;
+use crate::run::run;
+use crate::solid::Solid;
+use crate::volume::{Field, Forces, Members, field};
+
+/// Voxels as finite elements.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct VoxelElements {
+    mesh: HexMesh,
+}
+
+#[pymethods]
+impl VoxelElements {
+    /// Of a solid: edge of a voxel (mm), and the least solid fraction of one.
+    #[staticmethod]
+    #[pyo3(signature = (solid, step, least, threads=None, progress=None))]
+    fn make(
+        py: Python<'_>,
+        solid: &Solid,
+        step: f64,
+        least: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<VoxelElements> {
+        let mesh = run(py, threads, progress, |p| solid.built().voxel_elements((step, least), p))?;
+        Ok(VoxelElements { mesh: mesh.map_err(error::stopped)? })
+    }
+
+    /// Nodes (n, 3), mm.
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let n = self.mesh.nodes.len();
+        self.mesh.nodes.clone().into_flattened().into_pyarray(py).reshape([n, 3])
+    }
+
+    /// Nodes of each hexahedron (m, 8), in the order of VTK.
+    #[getter]
+    fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let m = self.mesh.hexes.len();
+        self.mesh.hexes.clone().into_flattened().into_pyarray(py).reshape([m, 8])
+    }
+
+    /// The share of each hexahedron that is solid.
+    #[getter]
+    fn fraction<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.mesh.fraction.clone().into_pyarray(py)
+    }
+
+    /// The names of the sets.
+    #[getter]
+    fn sets(&self) -> Vec<String> {
+        self.mesh.sets.iter().map(|s| s.name.clone()).collect()
+    }
+
+    /// Nodes, hexahedra, and faces (hexahedron, number from 0 of S1 to S6 of Abaqus) of a set; None without it.
+    fn set<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Members<'py>>> {
+        let Some(set) = self.mesh.set(name) else { return Ok(None) };
+        let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
+        let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
+        Ok(Some((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces)))
+    }
+
+    /// The figures, as `reports.VoxelElementsReport`.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        report(py, "VoxelElementsReport", &VoxelElementsReport::from(&self.mesh))
+    }
+
+    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
+    fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
+        let Some(set) = self.mesh.set(name) else { return Ok(None) };
+        let (nodes, forces): (Vec<u32>, Vec<[f64; 3]>) = self.mesh.nodal_forces(set, force).into_iter().unzip();
+        let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
+        Ok(Some((nodes.into_pyarray(py), forces)))
+    }
+
+    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio of the solid; sets that are held, and sets
+    /// with the resultants (N) of their loads.
+    #[allow(clippy::too_many_arguments)] // The pieces of a file.
+    fn write(
+        &self,
+        py: Python<'_>,
+        file: (PathBuf, String, String),
+        elastic: [f64; 2],
+        held: Vec<String>,
+        loads: Vec<(String, [f64; 3])>,
+        fields: Vec<Field>,
+    ) -> PyResult<()> {
+        let fields = fields.into_iter().map(field).collect();
+        let (path, suffix, title) = file;
+        let Some((.., write)) = HEX_FORMATS.iter().find(|f| f.0 == suffix) else {
+            return Err(PyValueError::new_err(format!("no format of voxels is named {suffix}")));
+        };
+        let done = run(py, None, None, |_| {
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
+            write(&self.mesh, &FeText { title, elastic, held, loads, fields }, &mut out)?;
+            out.flush()
+        })?;
+        Ok(done?)
+    }
+}
+
+/// The formats of voxels as finite elements: suffix, what it is.
+pub fn formats() -> Vec<(&'static str, &'static str)> {
+    HEX_FORMATS.iter().map(|f| (f.0, f.1)).collect()
+}
