@@ -93,8 +93,8 @@ def surface(mesh, values):
     """The boundary and the values at its vertices, which are the corners of faces in the order of nodes."""
     boundary = mesh.boundary()
     sides = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    faces = np.concatenate([mesh.sets[name].faces for name in ("CUT", "LATTICE")])
-    corners = np.unique(mesh.elements[faces[:, 0][:, None], sides[faces[:, 1]]])
+    faces, counts = np.unique(np.sort(mesh.elements[:, sides].reshape(-1, 3), axis=1), axis=0, return_counts=True)
+    corners = np.unique(faces[counts == 1])
     assert (boundary.vertices == mesh.nodes[corners]).all()
     return boundary, values[corners]
 

@@ -86,7 +86,7 @@ fn boundary(mesh: &FeMesh, of: &PolyFaces, out: &mut dyn Write) -> io::Result<()
     for patch in &of.patches {
         let kind = match (&patch.cyclic, patch.name.as_str()) {
             (Some(_), _) => "cyclic",
-            (None, "LATTICE" | "CUT" | "SKIN") => "wall",
+            (None, "LATTICE" | "CUT" | "SKIN" | "REST") => "wall",
             _ => "patch",
         };
         writeln!(out, "    {}\n    {{\n        type            {kind};", patch.name)?;
