@@ -1179,7 +1179,7 @@ class VolumeReport(Report):
     domains: dict[str, DomainReport]
     """The domains by name."""
     dropped: float
-    """Volume left out, mm³: small loose components, and tetrahedra where the boundary would touch itself."""
+    """Volume left out, mm³: small loose components, flat tetrahedra, and those where the boundary would touch itself."""
     edge: list[float]
     """Edges of the background's cubes along x, y, z, mm: the longest edges of most tetrahedra."""
     elements: int
