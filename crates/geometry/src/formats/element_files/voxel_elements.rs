@@ -127,8 +127,9 @@ mod tests {
 
     #[test]
     fn every_format_has_elements_sets_and_fractions() {
-        let bounds = Aabb { min: [0.0; 3], max: [3.0, 1.0, 1.0] };
-        let mesh = HexMesh::of(&bounds, [3, 1, 1], &[1.0, 0.5, 0.51], 0.1);
+        // Three round an empty one, whose faces are the surface within the grid.
+        let bounds = Aabb { min: [0.0; 3], max: [2.0, 2.0, 1.0] };
+        let mesh = HexMesh::of(&bounds, [2, 2, 1], &[1.0, 0.5, 0.51, 0.0], 0.1);
         let loads = vec![("X1".to_string(), [1.0, 0.0, 0.0])];
         let text =
             FeText { title: "three".into(), elastic: [10.0, 0.3], held: vec!["X0".into()], loads, ..FeText::default() };
