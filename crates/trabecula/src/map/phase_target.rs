@@ -11,7 +11,7 @@ use super::surface_frames::Surface;
 use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Mat3, Vec3, norm, scale};
+use geometry::math::{Aabb, Mat3, Vec3, exp, norm, scale};
 use geometry::progress::checkpoint;
 
 /// Weights fall off outside the region by e² for each of this many steps.
@@ -61,7 +61,7 @@ impl Laid {
 
     /// The root of the weight of a node; it falls off by e outside the region over some steps of the grid.
     fn nearness(&self, steps: f64, node: usize) -> f64 {
-        (-self.depth[node].max(0.0) / (steps * self.longest())).exp()
+        exp(-self.depth[node].max(0.0) / (steps * self.longest()))
     }
 
     /// The longest step of the grid, mm.

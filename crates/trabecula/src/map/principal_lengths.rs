@@ -11,7 +11,7 @@ use super::frame::DOUBT;
 use super::phase_grid::Grid;
 use super::principal::Principal;
 use super::smooth_frames::{Smoothing, trusted};
-use geometry::math::{Mat3, Vec3, transpose};
+use geometry::math::{Mat3, Vec3, exp, transpose};
 
 /// The lengths along the axes of the frames at nodes, of those along the principal directions of a stress in descending order of its
 /// values (tension positive); smoothed as the frames are.
@@ -34,7 +34,7 @@ pub(super) fn along_axes(
         let [xx, yy, zz, yz, xz, xy, sure] = *t;
         transpose(frame).map(|[x, y, z]| {
             let quadratic = xx * x * x + yy * y * y + zz * z * z + 2.0 * (yz * y * z + xz * x * z + xy * x * y);
-            (quadratic / sure).exp()
+            exp(quadratic / sure)
         })
     };
     tensors.par_iter().zip(frames).map(along).collect()
