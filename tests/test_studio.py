@@ -243,6 +243,17 @@ level.fraction = { formula = "0.25 + 0.1*sin(x)*exp(-y/9) + 0.02*abs(z)^1.3" }
 [skin]
 thickness = 0.5
 """,
+    "radial basis functions": """schema = 1
+region.box.size = [10, 8, 6]
+[lattice.a]
+cell = "gyroid"
+part = "sheet"
+map.affine = { wavelength = 4 }
+[lattice.a.level.fraction.rbf]
+points = [[-5, -4, -3], [-4, 3, 2], [0, 0, 0], [1, -3, 2], [3, 3, -2], [5, -4, 3]]
+values = [0.2, 0.5, 0.3, 0.45, 0.25, 0.4]
+delta = 7
+""",
     "beams": """schema = 1
 region.box.size = [8, 8, 8]
 [beams.a]

@@ -320,6 +320,7 @@ impl Varying for Rbf {}
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use geometry::math::add;
 
     fn ring(n: usize) -> Vec<Vec3> {
         let turn = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
