@@ -73,7 +73,7 @@ def test_boundaries_of_coarse_meshes_are_manifold(cell, part, fraction, radius, 
 
 
 def test_flat_tetrahedra_at_sharp_edges_are_shelled_off():
-    """Where lattice and ball meet at a sharp angle there were angles of 4.7 and 173 degrees; some ten tetrahedra are left out."""
+    """Where lattice and ball meet at a sharp angle there were angles of 4.7 and 173 degrees; a few tetrahedra are left out."""
     made = coarse("frd", "upper", 0.425050775134174, 3.953704026284279).volume_mesh(per_cell=10)
     figures = made.report()
     assert figures.min_angle > 14 and figures.max_angle < 160 and made.boundary().defects == []
