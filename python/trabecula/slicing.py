@@ -12,10 +12,10 @@ from .solid import Solid
 from .terminal import Progress, figure, put_json, say
 from .texts import counted
 
-__all__ = ["sliced"]
+__all__ = ["slice"]
 
 
-def sliced(args) -> None:
+def slice(args) -> None:
     """``trabecula slice``: layers, or one section."""
     import numpy  # noqa: F401  wanted by drawings; see `terminal` for why no import waits until then
 

@@ -1,0 +1,160 @@
+"""``trabecula measure``, and the transitions of blends."""
+
+from __future__ import annotations
+
+import os
+
+from .errors import Refused
+from .files import check_place
+from .formats import STDIN, VOLUME_READS, is_design, kind_of
+from .inputs import build, keep_inputs, meshed, same_file, surface
+from .solid import Solid
+from .terminal import Progress, figure, put_json, settle, warn, warned
+from .texts import table, voids
+
+__all__ = ["draw", "measure", "transitions"]
+
+
+def measure(args) -> None:
+    """``trabecula measure``."""
+    check_measure(args)
+    if kind_of(args.file) in VOLUME_READS:
+        return measure_tets(args)
+    solid = build(args.file) if is_design(args.file) else None
+    if args.dangling and solid is None:
+        raise Refused("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
+    if solid is None and args.transitions is not None:
+        raise Refused("--transitions is for designs with a blend; this is a mesh")
+    found = () if solid is None else transitions(solid, args.transitions, args.file)
+    held, figures = None, None
+    if solid is None or args.region or args.thickness or closely(solid, args):
+        held = surface(args) if solid is None else meshed(solid, args)
+        if args.region:
+            held = held.within(args.region)
+        figures = held.measure().to_dict()
+        figures |= {"self_intersections": held.self_intersections, "quality": held.quality, "defects": held.defects}
+    else:
+        with Progress("measuring", args.progress) as progress:
+            made, quality = solid._measured(args.edge, args.per_cell, args.threads, progress)
+        figures = made.to_dict() | {"self_intersections": 0, "quality": quality, "defects": []}
+        # What the method excludes is not looked for.
+        figures["by_construction"] = ["self_intersections", "defects"]
+    warn_measured("the design" if args.file == STDIN else args.file, figures)
+    if solid is not None:
+        off = None if held is None else held.chord_error
+        edge = solid.spacing(args.edge, args.per_cell)
+        figures |= (
+            {"edge": edge, "volume_error": solid.volume_error(edge)} if off is None else {"edge": None, "chord_error": off}
+        )
+    if args.dangling:
+        with Progress("looking for fragments", args.progress) as progress:
+            figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
+    settle()
+    draw(found, args.transitions)
+    if args.thickness:
+        with Progress("fitting balls", args.progress) as progress:
+            balls = held.thickness(args.step, args.threads, progress)
+        figures |= balls.measure()
+        if args.histogram is not None:
+            balls.render(args.histogram)
+    if found:
+        figures["transitions"] = list(found)
+    if args.json:
+        return put_json(figures | {"warnings": warned()})
+    bare = solid is None and not args.region
+    inverted = figures["closed"] and figures["volume"] < 0
+    shown = figures | ({"closed": "yes, but inside out"} if inverted else {})
+    print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
+    for transition in found:
+        print(transition)
+
+
+def measure_tets(args) -> None:
+    """``trabecula measure`` of a file of tetrahedra: volume, dihedral angles, sets of elements."""
+    import numpy as np
+
+    from .tets import TetMesh
+
+    if args.region or args.thickness or args.dangling or args.transitions or args.edge or args.per_cell:
+        raise Refused(f"{args.file} holds tetrahedra: of the options --json alone applies")
+    made = TetMesh.read(args.file, split=True)
+    quality = made.report().quality
+    zones = np.asarray(made.zones)
+    sets = {name: {"elements": int(np.isin(zones, numbers).sum())} for name, numbers in made.zone_names.items()}
+    figures = {
+        "elements": quality.tets,
+        "nodes": quality.nodes,
+        "volume": quality.volume,
+        "min_angle": quality.dihedral.min,
+        "max_angle": quality.dihedral.max,
+        "pieces": quality.pieces,
+        "bounds": quality.bounds,
+        "sets": sets,
+    }
+    settle()
+    if args.json:
+        return put_json(figures | {"warnings": warned()})
+    print(f"{quality.tets} tetrahedra, {quality.nodes} nodes, volume {figure(quality.volume)} mm³")
+    print(f"dihedral angles {quality.dihedral.min:.2f} to {quality.dihedral.max:.2f} degrees, pieces {quality.pieces}")
+    for name, of in sets.items():
+        print(f"set {name}: {of['elements']} elements")
+
+
+def check_measure(args) -> None:
+    """Refuses options of ``measure`` that do not go together, before any work is done."""
+    if not args.thickness and (args.step is not None or args.histogram is not None):
+        raise Refused("--step and --histogram belong to --thickness; add it")
+    if args.region is not None and not os.path.exists(args.region):
+        raise Refused(f"{args.region} does not exist")
+    if args.histogram is not None:
+        check_place(args.histogram)
+        if any(same_file(name, args.histogram) for name in filter(None, (args.file, args.region))):
+            raise Refused(f"{args.histogram} is read by this command; name another picture")
+
+
+def closely(solid: Solid, args) -> bool:
+    """Whether a design is beams alone that are meshed without a grid."""
+    return solid._chord_of(None, args.edge, args.per_cell, "drop-small") is not None
+
+
+def warn_measured(name: str, figures: dict) -> None:
+    """Warns of figures that may mislead, and of closed voids."""
+    if (figures["solid_fraction"] or 0) > 1.01:
+        warn(f"{name} holds more than the region does; they may not be in the same place or unit")
+    if not figures["closed"]:
+        flaws = [d for d in figures["defects"] if d.split(" ", 1)[1].startswith("edge")]
+        why = ", ".join(flaws) or "triangles with a corner twice"
+        return warn(f"{name} is not closed ({why}), so its volume and what follows from it mean little")
+    if figures["volume"] < 0:
+        warn(
+            f"{name} is closed but inside out (its triangles run clockwise seen from outside), so its volume "
+            "is negative and its solids count as cavities"
+        )
+    if figures["self_intersections"]:
+        warn(
+            f"the surface of {name} crosses itself, so volume in several of its bodies is counted "
+            "several times; taken as a region (region.mesh) they are united"
+        )
+    if figures["volume"] >= 0 and figures["voids"]:
+        warn(voids(figures["voids"]))
+
+
+def transitions(solid: Solid, picture: str | None, design: str | None = None, tell: bool = True):
+    """The transitions of a blend, if one is asked for with a picture that can be written."""
+    found = solid.transitions()
+    for warning in found.warnings:
+        warn(warning["message"], warning["path"], tell)
+    settle()
+    if picture is not None:
+        if not found:
+            raise Refused("--transitions is for designs with a blend; this one has none")
+        check_place(picture)
+        if design is not None:
+            keep_inputs(design, picture)
+    return found
+
+
+def draw(found, picture: str | None) -> None:
+    """Draws the transitions to ``picture`` if one is asked for."""
+    if picture is not None:
+        found.render(picture)

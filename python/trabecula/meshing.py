@@ -1,0 +1,249 @@
+"""``trabecula mesh`` and ``trabecula simplify``: surfaces, and files that need none."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+
+from .errors import Refused
+from .files import check_place
+from .formats import MESH_WRITES, STEP_WRITES, kind_of
+from .inputs import build, closes, keep_inputs, resolution, same_file
+from .mesh import Mesh
+from .parts import part_files, write_parts
+from .solid import Solid
+from .terminal import Progress, figure, put_json, say, settle, warn, warned
+from .texts import counted, voids
+
+__all__ = ["mesh", "simplify"]
+
+
+def mesh(args) -> None:
+    """``trabecula mesh``."""
+    if args.beams:
+        return mesh_beams(args)
+    if args.implicit:
+        return mesh_implicit(args)
+    if args.no_mesh:
+        raise Refused("--no-mesh belongs to --beams; add it")
+    if kind_of(args.output) in STEP_WRITES:
+        return mesh_step(args)
+    if kind_of(args.output) not in MESH_WRITES:
+        raise Refused(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
+    if args.parts:
+        return mesh_parts(args)
+    check_place(args.output)
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    if not (args.smooth or args.open or args.tolerance is not None or args.triangles is not None):
+        args.chord = solid._chord_of(args.chord, args.edge, args.per_cell, args.islands)
+    with Progress("meshing", args.progress) as progress:
+        made = meshed_file(solid, args, progress)
+    edge = solid.spacing(args.edge, args.per_cell)
+    made["solid_fraction"] = made["volume"] / solid.region_volume(edge)
+    made["edge"] = None if args.chord is not None else edge
+    made["bytes"] = os.path.getsize(args.output)
+    made["seconds"] = round(time.perf_counter() - start, 3)
+    others = made["islands"]
+    if others and others["dropped"]:
+        pieces = counted(others["dropped"], "small piece" if args.islands == "drop-small" else "piece")
+        say(f"{pieces} dropped: {others['dropped_volume']:.3g} mm³ in all")
+    if others and others["filled"]:
+        filled = counted(others["filled"], "closed void")
+        say(f"{filled} smaller than a grid cell filled: {others['filled_volume']:.3g} mm³ in all")
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
+    say(
+        f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
+        f"{made['seconds']:.2f} s"
+    )
+
+
+def mesh_step(args) -> None:
+    """``trabecula mesh -o OUT.step``."""
+    names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "tolerance", "triangles")
+    why = "a STEP file: it has the exact surface, and no triangles"
+    refuse_others(args, names, ("drop-small", "keep"), why)
+
+    def words(made: dict) -> str:
+        return (
+            f"{made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, "
+            f"{counted(made['solids'], 'solid')}; exact"
+        )
+
+    without_mesh(args, lambda solid: solid.save_step(args.output).to_dict(), words)
+
+
+def mesh_beams(args) -> None:
+    """``trabecula mesh --beams``."""
+    kind = kind_of(args.output)
+    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles"]
+    names += [] if kind == "3mf" else ["chord", "no_mesh"]
+    refuse_others(args, names, ("drop-small",), f"--beams and a .{kind}: it has beams, not their surface")
+
+    def words(made: dict) -> str:
+        within = "" if made["error"] is None else f"; radii within {made['error']:.2g} mm"
+        balls = f", {counted(made['balls'], 'ball')}" if made["balls"] else ""
+        return f"{counted(made['beams'], 'beam')}{balls}, {counted(made['nodes'], 'node')}{within}, {made['bytes']} bytes"
+
+    def save(solid: Solid) -> dict:
+        return solid.save_beams(args.output, args.chord, not args.no_mesh, args.threads).to_dict()
+
+    without_mesh(args, save, words)
+
+
+def mesh_implicit(args) -> None:
+    """``trabecula mesh --implicit``."""
+    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord")
+    refuse_others(args, names, ("drop-small",), "--implicit: the file has a function, and no triangles")
+
+    def words(made: dict) -> str:
+        return f"a function of {counted(made['nodes'], 'node')}, {made['bytes']} bytes"
+
+    without_mesh(args, lambda solid: solid.save_implicit(args.output), words)
+
+
+def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) -> None:
+    """Refuses options that do not go with a file without triangles; ``islands`` are what --islands may be."""
+    given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
+    given += [] if args.islands in islands else [f"--islands {args.islands}"]
+    if given:
+        raise Refused(f"{given[0]} does not go with {why}; leave it out")
+
+
+def without_mesh(args, save: Callable[[Solid], dict], words: Callable[[dict], str]) -> None:
+    """Saves a solid to a file that has no triangles; ``words`` puts its figures into words."""
+    check_place(args.output)
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    settle()
+    made = save(solid)
+    made |= {"bytes": os.path.getsize(args.output), "seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    say(f"{args.output}: {words(made)}, {made['seconds']:.2f} s")
+
+
+def mesh_parts(args) -> None:
+    """``trabecula mesh --parts``."""
+    others = {
+        "--open": args.open,
+        "--smooth": args.smooth,
+        "--chord": args.chord,
+        "--tolerance": args.tolerance,
+        "--triangles": args.triangles,
+    }
+    if alone := [name for name, value in others.items() if value]:
+        raise Refused(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
+    if args.islands == "drop":
+        raise Refused("--islands drop does not go with --parts: a dropped piece would leave a gap between them; leave it out")
+    files = part_files(args.output, args.parts)
+    start = time.perf_counter()
+    for name in files.values():
+        check_place(name)
+    solid = build(args.design)
+    for name in files.values():
+        keep_inputs(args.design, name)
+    islands = "error" if args.islands == "error" else "keep"
+    with Progress("meshing", args.progress) as progress:
+        parts = solid.parts(args.edge, args.per_cell, args.parts, args.threads, progress, islands)
+    settle()
+    write_parts(args.output, parts)
+    edge = solid.spacing(args.edge, args.per_cell)
+    made = {"parts": {}, "edge": edge, "region_volume": solid.region_volume(edge)}
+    for name, mesh in parts.items():
+        share = {"solid_fraction": mesh.volume / made["region_volume"], "file": files[name]}
+        made["parts"][name] = mesh.summary().to_dict() | share
+    made["seconds"] = round(time.perf_counter() - start, 3)
+    if args.json:
+        return put_json(made | {"warnings": warned()})
+    for name, it in made["parts"].items():
+        say(
+            f"{name}: {it['triangles']} triangles, volume {figure(it['volume'])} mm³, {it['solid_fraction']:.4f} of the "
+            f"region, area {figure(it['area'])} mm², {counted(it['pieces'])}; {it['file']}"
+        )
+    say(f"edge {edge:g} mm, {made['seconds']:.2f} s")
+
+
+def meshed_file(solid: Solid, args, progress: Progress) -> dict:
+    """Meshes a solid into a file, streamed where it can be; gives the figures."""
+    lighter = args.tolerance is not None or args.triangles is not None
+    options = {**resolution(args), "threads": args.threads, "progress": progress, "islands": args.islands}
+    options |= {"smooth": True} if args.smooth else {}
+    asked = {} if args.chord is None else {"chord": args.chord}
+    is_open = args.open or solid.open_ends
+    whole = lighter or args.smooth or is_open
+    if not whole and (kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))):
+        given = {"edge": None, "per_cell": None, "chord": None} | options
+
+        def accept(found) -> None:
+            if found.cavities:
+                warn(
+                    f"{counted(found.cavities, 'closed void')}, from which powder or resin cannot drain; "
+                    f"`trabecula measure {args.output}` tells where"
+                )
+            settle()
+
+        return solid._save(args.output, **given, accept=accept).to_dict() | asked
+    if not lighter and not asked:
+        solid.check_room(args.output, **resolution(args))
+    surface = solid.mesh(**options)
+    progress.clear()
+    error = {"chord_error": surface.chord_error} if asked else {}
+    if it := surface.smoothing:
+        say(
+            f"smoothed: the smallest angle of 19 in 20 triangles is {it.smallest_angle_p05:.3g}° or more, before "
+            f"{it.smallest_angle_p05_before:.3g}°; of all {it.smallest_angle:.2g}°, before {it.smallest_angle_before:.2g}°"
+        )
+    surface = simplified(surface, args) if lighter else surface
+    made = surface.summary().to_dict() | asked | error
+    if not asked:
+        made["voids"] = [v.to_dict() for v in surface.voids]
+        if surface.simplification:
+            made["simplification"] = surface.simplification.to_dict()
+        if surface.smoothing:
+            made["smoothing"] = surface.smoothing.to_dict()
+        if surface.voids:
+            warn(voids(surface.voids))
+    settle()
+    if is_open:
+        surface = surface.uncapped()
+        made |= {"triangles": surface.counts[1], "open": True}
+        say("open at the region's boundary: volume and fraction are the closed part's")
+    surface.write(args.output)
+    return made
+
+
+def simplify(args) -> None:
+    """``trabecula simplify``."""
+    check_place(args.output)
+    start = time.perf_counter()
+    if same_file(args.file, args.output):
+        raise Refused(f"{args.output} is what is simplified; name another output")
+    made = simplified(Mesh.read(args.file), args)
+    made.write(args.output)
+    if args.json:
+        put_json(made.simplification.to_dict() | {"seconds": round(time.perf_counter() - start, 3)})
+
+
+def simplified(mesh: Mesh, args) -> Mesh:
+    """The lighter mesh, and a message on what was done."""
+    with Progress("simplifying", args.progress) as progress:
+        made = mesh.simplified(args.tolerance, args.triangles, progress)
+    it = made.simplification
+    if args.triangles and it.triangles_before <= args.triangles:
+        say(f"{it.triangles} triangles are no more than {args.triangles} already: left as they are")
+        return made
+    if args.triangles and not args.tolerance and it.triangles > args.triangles:
+        warn(f"{it.triangles} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
+    change = 100 * (it.volume / it.volume_before - 1)
+    say(
+        f"simplified from {it.triangles_before} to {it.triangles} triangles, nowhere farther than "
+        f"{it.deviation:.2g} mm from the first; volume {change:+.2g} %"
+    )
+    return made
