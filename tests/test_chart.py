@@ -4,7 +4,7 @@ import math
 from xml.etree import ElementTree
 
 import pytest
-from trabecula.chart import Chart, _ticks, svg
+from trabecula.chart import Chart, svg, ticks
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -55,6 +55,8 @@ def test_odd_figures_are_drawn(share):
 
 
 def test_ticks_are_round():
-    assert _ticks(1.3, 8) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4]
-    assert _ticks(0.3, 3) == [0.0, 0.1, 0.2, 0.3]
-    assert _ticks(47, 4) == [0.0, 20.0, 40.0, 60.0]
+    assert ticks(0, 1.3, 8) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4]
+    assert ticks(0, 0.3, 3) == [0.0, 0.1, 0.2, 0.3]
+    assert ticks(0, 47, 4) == [0.0, 20.0, 40.0, 60.0]
+    assert ticks(-0.25, 0.31, 6) == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4]
+    assert ticks(3, 3)[0] < 3 < ticks(3, 3)[-1]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
-__all__ = ["Chart", "label", "svg"]
+__all__ = ["Chart", "label", "svg", "ticks"]
 
 WIDTH, HEIGHT = 720, 380
 #: Room to the left, right and below the axes, and above them for the titles and for each mark.
@@ -50,7 +50,7 @@ def _drawn(chart: Chart) -> Iterator[str]:
     top = ABOVE + LINE * len(marks)
     width, base = WIDTH - LEFT - RIGHT, HEIGHT - BELOW
     end = max(chart.edges) or 1.0
-    rises = _ticks(100 * max(filter(math.isfinite, [*chart.share, *chart.asked])) or 1.0, 4)
+    rises = ticks(0, 100 * max(filter(math.isfinite, [*chart.share, *chart.asked])) or 1.0, 4)
 
     def x(v: float) -> float:
         return LEFT + width * min(max(v / end, 0), 1)
@@ -71,7 +71,7 @@ def _drawn(chart: Chart) -> Iterator[str]:
         if math.isfinite(share):
             yield f'<path d="M{x(low):.2f} {y(100 * share):.2f}H{x(high):.2f}" stroke="{MARK}" stroke-width="3"/>'
     yield f'<path d="M{LEFT} {base}h{width}" stroke="{INK}"/>'
-    for v in (v for v in _ticks(end, 8) if v <= end * (1 + 1e-9)):
+    for v in (v for v in ticks(0, end, 8) if v <= end * (1 + 1e-9)):
         yield f'<path d="M{x(v):.2f} {base}v6" stroke="{INK}"/>'
         yield label(x(v), base + 21, f"{v:g}", 'text-anchor="middle"')
     yield label(LEFT + width / 2, base + 44, chart.across, 'text-anchor="middle"')
@@ -93,9 +93,14 @@ def label(x: float, y: float, words: str, style: str = "") -> str:
     return f'<text x="{x:.2f}" y="{y:.2f}"{" " * bool(style)}{style}>{escape(words)}</text>'
 
 
-def _ticks(end: float, about: int) -> list[float]:
-    """Multiples of 1, 2 or 5 times a power of ten from 0 to ``end`` or just above it, in at most ``about`` steps."""
-    least = end / about
+def ticks(low: float, high: float, about: int = 6) -> list[float]:
+    """Marks of an axis that holds both numbers: multiples of 1, 2 or 5 times a power of ten, in at most ``about`` steps or two
+    more. Equal numbers are held apart.
+    """
+    if low == high:
+        low, high = low - (abs(low) or 1) / 2, high + (abs(high) or 1) / 2
+    least = (high - low) / about
     unit = 10.0 ** math.floor(math.log10(least))
     step = next(k * unit for k in (1, 2, 5, 10) if k * unit >= least * (1 - 1e-9))
-    return [float(f"{i * step:.12g}") for i in range(math.ceil(end / step * (1 - 1e-9)) + 1)]
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [float(f"{i * step:.12g}") for i in range(first, last + 1)]

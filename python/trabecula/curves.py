@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from .chart import FAINT, FONT, INK, label
+from .chart import FAINT, FONT, INK, label, ticks
 
 __all__ = ["Curve", "Panel", "law_plots", "panels"]
 
@@ -67,9 +67,9 @@ def _drawn(panel: Panel) -> Iterator[str]:
     if not pairs:
         yield label(LEFT, 60, "no numbers")
         return
-    across = _even(min(x for x, _ in pairs), max(x for x, _ in pairs))
+    across = ticks(min(x for x, _ in pairs), max(x for x, _ in pairs))
     low, high = min(y for _, y in pairs), max(y for _, y in pairs)
-    up = _decades(low, high) if panel.log else _even(min(low, 0.0), high)
+    up = _decades(low, high) if panel.log else ticks(min(low, 0.0), high)
     scale = math.log10 if panel.log else float
     right, base = WIDTH - RIGHT, HEIGHT - BELOW
 
@@ -100,17 +100,6 @@ def _drawn(panel: Panel) -> Iterator[str]:
         row = ABOVE + 10 + 16 * i
         yield f'<path d="M{right + 10} {row - 4}h16" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash or "none"}"/>'
         yield label(right + 30, row, curve.name, 'font-size="11"')
-
-
-def _even(low: float, high: float) -> list[float]:
-    """Marks in equal steps of 1, 2 or 5 times a power of ten around the values."""
-    if low == high:
-        low, high = low - 0.5, high + 0.5
-    least = (high - low) / 6
-    unit = 10.0 ** math.floor(math.log10(least))
-    step = next(k * unit for k in (1, 2, 5, 10) if k * unit >= least * (1 - 1e-9))
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [float(f"{i * step:.12g}") for i in range(first, last + 1)]
 
 
 def _decades(low: float, high: float) -> list[float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from .chart import BELOW, FAINT, FONT, INK, LEFT, MARK, label
+from .chart import BELOW, FAINT, FONT, INK, LEFT, MARK, label, ticks
 
 __all__ = ["front_of", "scatter"]
 
@@ -31,7 +31,7 @@ def scatter(
     rows = [row for row in zip(*(columns[name] for name in wanted), strict=True) if all(map(_is_number, row))]
     if not rows:
         raise ValueError(f"no design has numbers in all of {', '.join(wanted)}")
-    across, up = _axis([row[0] for row in rows]), _axis([row[1] for row in rows])
+    across, up = (ticks(min(row[k] for row in rows), max(row[k] for row in rows)) for k in (0, 1))
     drawn = list(_drawn(rows, wanted, across, up, front))
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" {FONT}>'
     return "\n".join([head, f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>', *drawn, "</svg>\n"])
@@ -52,18 +52,6 @@ def front_of(points: Sequence[tuple[float, float]], better: tuple[str, str]) -> 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _axis(values: Sequence[float]) -> list[float]:
-    """Marks of an axis that holds the values, in equal steps of 1, 2 or 5 times a power of ten."""
-    low, high = min(values), max(values)
-    if low == high:
-        low, high = low - (abs(low) or 1) / 2, high + (abs(high) or 1) / 2
-    least = (high - low) / 6
-    unit = 10.0 ** math.floor(math.log10(least))
-    step = next(k * unit for k in (1, 2, 5, 10) if k * unit >= least * (1 - 1e-9))
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [float(f"{i * step:.12g}") for i in range(first, last + 1)]
 
 
 def _drawn(rows: list, names: list[str], across: list[float], up: list[float], front: tuple[str, str] | None) -> Iterator[str]:
