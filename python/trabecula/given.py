@@ -30,6 +30,7 @@ __all__ = [
     "plain",
     "positive",
     "settings",
+    "thread_count",
     "three",
     "whole",
 ]
@@ -157,3 +158,8 @@ def control(points: Points) -> dict:
 def numbered(given: Mapping[int, Any] | None) -> dict | None:
     """A table whose keys are whole numbers."""
     return None if given is None else {str(number): value for number, value in given.items()}
+
+
+def thread_count(threads: int | None) -> int | None:
+    """A number of threads, 1 to 4096, or None for as many as there are processors. ValueError for others."""
+    return None if threads is None else whole("threads", threads, 1, 4096)

@@ -14,15 +14,16 @@ from .beam_files import save_beams
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES
-from .given import number, positive, whole
+from .given import number, positive, thread_count
 from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
 from .layers import Layers
-from .machine import file_size, fits, rounded_down, rounded_up
+from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
 from .seen import Seen
+from .simulated import Simulated
 from .thickness import Thickness
 from .transition import Transitions
 from .voxels import Voxels
@@ -37,19 +38,15 @@ if TYPE_CHECKING:
     from .islands import Islands
     from .reports import (
         BeamsFileReport,
-        ConductivityReport,
         DanglingReport,
         DesignReport,
         EstimateReport,
         MeshReport,
-        PermeabilityReport,
         QualityReport,
         RepairReport,
         StepReport,
-        StiffnessReport,
         SurfaceReport,
     )
-    from .volumes import VolumeMesh, VoxelElements
 
     Progress = Callable[[int, int], Any]
 
@@ -61,17 +58,11 @@ MOST_STEPS, MOST_CELLS = 4e6, 2e12
 TRIANGLE = 2 * (12 + 12)
 #: Bytes for each triangle of the temporary files of vertices and triangles.
 SPOOLED = 24
-#: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
-STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
-#: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
-PERMEABILITY_BYTES = 1300
-#: Short edges of a volume mesh's tetrahedra as a fraction of the long ones.
-SHORT_EDGE = math.sqrt(0.75)
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
 
-class Solid(Seen):
+class Solid(Seen, Simulated):
     """A region and the lattice in it. Made by ``Design.build``.
 
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
@@ -166,7 +157,7 @@ class Solid(Seen):
         if neck is None and own is None:
             raise ValueError("the lattice's narrowest neck is not known: give neck, mm")
         narrowest = own if neck is None else positive("neck", neck)
-        return self._core.dangling(narrowest, _threads(threads), progress)
+        return self._core.dangling(narrowest, thread_count(threads), progress)
 
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
         """Values at points (n, 3) in mm: negative in the solid, positive outside, continuous; not a distance."""
@@ -337,7 +328,7 @@ class Solid(Seen):
             need, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
             # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
             fits(2 * TRIANGLE * need, f"{need:.3g} triangles", edge=chord, power=1, word="chord")
-            core, error = self._core.mesh_beams(chord, _threads(threads), progress)
+            core, error = self._core.mesh_beams(chord, thread_count(threads), progress)
             return Mesh(core, self._core.region, chord_error=error)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
@@ -346,7 +337,7 @@ class Solid(Seen):
         fits(memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
-        core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
+        core, others, words = self._core.mesh(spacing, thread_count(threads), progress, islands)
         self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
         warn_islands(others, words)
         if not smooth:
@@ -384,7 +375,7 @@ class Solid(Seen):
         spacing = self.spacing(edge, per_cell)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
-        made, quality, islands = self._core.measure(spacing, self.region_volume(spacing), _threads(threads), progress)
+        made, quality, islands = self._core.measure(spacing, self.region_volume(spacing), thread_count(threads), progress)
         self._warn_coarse(made.volume + left_out(islands), spacing, pieces=islands.found + 1)
         return made, quality
 
@@ -428,7 +419,7 @@ class Solid(Seen):
         fits(most, f"{need['triangles']:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
-        made = self._core.parts(chosen, spacing, _threads(threads), progress, islands == "error")
+        made = self._core.parts(chosen, spacing, thread_count(threads), progress, islands == "error")
         parts = {}
         for name, (core, others, words) in zip(chosen, made, strict=True):
             if name == "wall":
@@ -451,9 +442,9 @@ class Solid(Seen):
         fits(2 * TRIANGLE * held, f"{held:.3g} triangles of hubs that differ", edge=chord, power=1, word="chord")
         fits(file_size("stl", need), f"{need:.3g} triangles", path, chord, 1, "chord")
         if special(os.fsdecode(path)):
-            return self._core.stream_beams(path, chord, _threads(threads))
+            return self._core.stream_beams(path, chord, thread_count(threads))
         with whole_file(path) as temporary:
-            return self._core.stream_beams(temporary, chord, _threads(threads))
+            return self._core.stream_beams(temporary, chord, thread_count(threads))
 
     def check_room(self, path: str | os.PathLike[str], edge: float | None = None, per_cell: float | None = None) -> None:
         """Raises ValueError if the disk has no room for the mesh file ``path`` at this spacing and the temporary files that
@@ -529,7 +520,7 @@ class Solid(Seen):
         radii), .inp (Abaqus B31) and .bdf (Nastran CBAR, numbers of sixteen characters), these two with a circular section for
         each radius.
         """
-        return save_beams(self, path, None if chord is None else positive("chord", chord), mesh, _threads(threads))
+        return save_beams(self, path, None if chord is None else positive("chord", chord), mesh, thread_count(threads))
 
     def save_implicit(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Writes the part as a function of position to a .3mf with the volumetric and implicit extensions (0.8.0, a draft):
@@ -578,7 +569,7 @@ class Solid(Seen):
         self.check_room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
-            summary, words = self._core.stream((temporary, kind, TITLE), spacing, _threads(threads), progress, islands)
+            summary, words = self._core.stream((temporary, kind, TITLE), spacing, thread_count(threads), progress, islands)
             self._warn_coarse(summary.volume + left_out(summary.islands), spacing, pieces=summary.islands.found + 1)
             warn_islands(summary.islands, words)
             accept(summary)
@@ -597,7 +588,7 @@ class Solid(Seen):
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
         fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
-        made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
+        made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
 
@@ -635,104 +626,7 @@ class Solid(Seen):
             cusp = [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
         elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
-        return Layers(self, _core.Layers.of(self._core, thick, within, spacing, begin, end, cusp), _threads(threads))
-
-    def volume_mesh(
-        self,
-        edge: float | None = None,
-        per_cell: float | None = None,
-        wall: float | None = None,
-        order: int = 1,
-        of: str = "solid",
-        periodic: bool = False,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> VolumeMesh:
-        """Tetrahedra that conform to all surfaces, edges and corners of the solid, for finite elements.
-
-        One size: ``edge`` (mm), the longest edge of most tetrahedra; ``per_cell``, edges along the smallest wavelength;
-        ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the
-        wavelength.
-
-        ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Nodes of linear
-        ones are shifted off curved surfaces by about half the distance of a chord, so that the volume is kept.
-
-        ``of``: ``"solid"``; ``"pore"``, the rest of the region; ``"lower"`` or ``"upper"``, the space on one side of a sheet;
-        ``"all"``, the wall and both spaces of a sheet, else solid and pore, with common nodes.
-
-        ``periodic`` is for a box with whole cells: nodes and faces on opposite sides match in all bits.
-
-        Small loose components and places where the boundary touches itself are left out, ``report().dropped`` is their volume.
-        The same for any number of ``threads``. Raises ValueError for an edge greater than the thinnest wall, a mesh beyond the
-        memory there is, a side of what is no sheet, ``periodic`` where the solid is not.
-        """
-        from .volumes import OF, TET_BYTES, VolumeMesh, warn_flaws
-
-        if of not in OF:
-            raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
-        if order not in (1, 2):
-            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
-        size = self._volume_edge(edge, per_cell, wall)
-        share, region = self._core.expected()
-        part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
-        count = 12 * max(part, 0.02) * region / size**3
-        if count > 3e8:
-            raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
-        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
-        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, _threads(threads), progress)
-        made = VolumeMesh(core, self._core.design)
-        warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
-        return made
-
-    def voxel_elements(
-        self,
-        step: float,
-        least: float = 0.01,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> VoxelElements:
-        """Voxels as finite elements: hexahedra over the region's bounds with edges of about ``step`` (mm), stretched so that a
-        whole number fits, each with its exact solid fraction.
-
-        Those of which a share of at least ``least`` is solid are elements if they belong to the largest piece by common
-        faces. A set of the design has the faces whose centres are at most half a voxel outside its region. Raises ValueError
-        for a step beyond the memory there is, and where no voxel has that share.
-        """
-        from .volumes import VOXEL_BYTES, VoxelElements
-
-        size, share = positive("step", step), number("least", least)
-        if not 0 < share <= 1:
-            raise ValueError(f"least is {share:g}; it must be greater than 0 and at most 1")
-        low, high = self.bounds
-        count = math.prod(math.ceil((b - a) / size) for a, b in zip(low, high, strict=True))
-        fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
-        return VoxelElements(_core.VoxelElements.make(self._core, size, share, _threads(threads), progress))
-
-    def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
-        """The edge (mm) of a request for a volume mesh."""
-        if sum(v is not None for v in (edge, per_cell, wall)) > 1:
-            raise ValueError("give one of edge, per_cell and wall")
-        walls = dict(self._thinnest)
-        if self.skin is not None:
-            walls["skin"] = self.skin
-        where, thin = min(walls.items(), key=lambda item: item[1], default=("", math.inf))
-        if wall is not None:
-            if not walls:
-                raise ValueError("wall: the thinnest wall of this design is not known; give edge, mm")
-            size = thin / positive("wall", wall)
-        elif edge is None and per_cell is None:
-            size = min(thin / 2, self.wavelength / 16)
-        else:
-            size = positive("edge", edge) if edge is not None else self.wavelength / positive("per_cell", per_cell)
-        # Four of a tetrahedron's six edges are shorter than the longest, by half the root of three.
-        if SHORT_EDGE * size > thin:
-            raise ValueError(
-                f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at "
-                f"{where}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
-            )
-        if size > self.wavelength / 4:
-            raise ValueError(f"an edge of {size:.4g} mm is more than a quarter of the wavelength, {self.wavelength:g} mm")
-        return size
+        return Layers(self, _core.Layers.of(self._core, thick, within, spacing, begin, end, cusp), thread_count(threads))
 
     def thickness(
         self,
@@ -749,78 +643,6 @@ class Solid(Seen):
         wanted = None if step is None else positive("step", step)
         return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
 
-    @cached_property
-    def _cell(self) -> _core.Cell:
-        """The periodic cell of its lattice or beams. A DesignError where there is none."""
-        return _core.Cell.of(self._core, self._folder or os.getcwd())
-
-    def stiffness(
-        self,
-        n: int = 64,
-        E: float = 1.0,
-        nu: float = 0.3,
-        C: ArrayLike | None = None,
-        voxels: bool = False,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> StiffnessReport:
-        """The effective stiffness of the periodic cell, of a solid of Young's modulus ``E`` and Poisson's ratio ``nu``, or of a
-        stiffness ``C`` (6, 6): stress = C strain in Voigt's order 11 22 33 23 13 12 with engineering shears, world axes, in
-        the unit of E; with Young's and shear moduli, anisotropy, bounds, and how sure it is.
-
-        The cell is that of one lattice under an affine map at one level, or of beams by a unit cell; the region plays no
-        part. Trilinear finite elements on ``n`` voxels along its edge, weighted by the exact solid fraction of each
-        (``voxels``: solid or not by their centres), on n/2 and n/4 too, and the limit of the three.
-
-        Raises DesignError for a design without such a cell, ValueError for a cell that falls apart, for ``n`` below 8 or beyond
-        the memory there is, and for a solid that is none.
-        """
-        import numpy as np
-
-        given = None if C is None else np.asarray(C, dtype=float)
-        if given is not None and given.shape != (6, 6):
-            raise ValueError(f"expected C of shape (6, 6), found {given.shape}")
-        grid = _voxels(n, STIFFNESS_BYTES), voxels
-        solid = number("E", E), number("nu", nu)
-        return self._cell.stiffness(grid, solid, None if given is None else given.tolist(), (_threads(threads), progress))
-
-    def conductivity(
-        self,
-        n: int = 64,
-        pore: float = 0.0,
-        voxels: bool = False,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> ConductivityReport:
-        """The effective conductivity of the periodic cell, (3, 3) relative to the solid's, where the ``pore`` conducts this
-        many times as well as the solid; for heat, electricity and diffusion alike. Else as ``stiffness``.
-        """
-        grid = _voxels(n, CONDUCTIVITY_BYTES), voxels
-        return self._cell.conductivity(grid, number("pore", pore), (_threads(threads), progress))
-
-    def permeability(
-        self,
-        n: int = 64,
-        side: Literal["lower", "upper"] | None = None,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> PermeabilityReport:
-        """The permeability of the pore of the periodic cell to creeping flow, (3, 3) in mm²: mean flux over the whole cell = -k
-        grad p / viscosity; with hydraulic diameter, tortuosity, Kozeny's constant, and how sure it is. Both sides of a sheet
-        together, or that of one ``side``.
-
-        Stokes's flow between the exact walls, by a lattice Boltzmann scheme of two relaxation times with interpolated
-        bounce-back on ``n`` nodes along the cell's edge, on n/2 and n/4 too, and the limit of the three. Directions in which
-        the pore does not go through have zeros, and a warning.
-
-        Raises DesignError for a design without such a cell, ValueError for the side of what is no sheet, for ``n`` below 8 or
-        beyond the memory there is.
-        """
-        if side not in (None, "lower", "upper"):
-            raise ValueError(f'side is {side!r}; expected "lower", "upper" or None for both')
-        n = _voxels(n, PERMEABILITY_BYTES)
-        return self._cell.permeability(n, None if side is None else side == "upper", (_threads(threads), progress))
-
     def _picture(self) -> Mesh:
         low, high = self.bounds
         return self.mesh(edge=max(self.wavelength / 20, max(b - a for a, b in zip(low, high, strict=True)) / 160))
@@ -828,17 +650,6 @@ class Solid(Seen):
 
 def _a(word: str) -> str:
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
-
-
-def _voxels(n: int, each: float) -> int:
-    """A number of voxels along an edge that fits the memory, at ``each`` bytes a voxel."""
-    n = whole("n", n, 8, 4096)
-    fits(each * n**3, f"{n} x {n} x {n} voxels")
-    return n
-
-
-def _threads(threads: int | None) -> int | None:
-    return None if threads is None else whole("threads", threads, 1, 4096)
 
 
 def _rebuilt(design: str, folder: str) -> Solid:

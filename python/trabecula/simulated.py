@@ -1,0 +1,216 @@
+"""What solvers take of a solid, finite elements of it, and what the periodic cell of a lattice does."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from functools import cached_property
+
+from . import _core
+from .given import number, positive, thread_count, whole
+from .machine import fits, rounded_down
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, VolumeMesh, VoxelElements, warn_flaws
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Any, Literal
+
+    from numpy.typing import ArrayLike
+
+    from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
+
+    Progress = Callable[[int, int], Any]
+
+__all__ = ["Simulated"]
+
+#: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
+STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
+#: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
+PERMEABILITY_BYTES = 1300
+#: Short edges of a volume mesh's tetrahedra as a fraction of the long ones.
+SHORT_EDGE = math.sqrt(0.75)
+
+
+class Simulated:
+    """Solids that are meshed for solvers, or whose cell is solved for."""
+
+    _core: _core.Solid
+    _folder: str
+    skin: float | None
+    wavelength: float
+    bounds: list[list[float]]
+    _thinnest: dict[str, float]
+
+    def volume_mesh(
+        self,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        wall: float | None = None,
+        order: int = 1,
+        of: str = "solid",
+        periodic: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> VolumeMesh:
+        """Tetrahedra that conform to all surfaces, edges and corners of the solid, for finite elements.
+
+        One size: ``edge`` (mm), the longest edge of most tetrahedra; ``per_cell``, edges along the smallest wavelength;
+        ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the
+        wavelength.
+
+        ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Nodes of linear
+        ones are shifted off curved surfaces by about half the distance of a chord, so that the volume is kept.
+
+        ``of``: ``"solid"``; ``"pore"``, the rest of the region; ``"lower"`` or ``"upper"``, the space on one side of a sheet;
+        ``"all"``, the wall and both spaces of a sheet, else solid and pore, with common nodes.
+
+        ``periodic`` is for a box with whole cells: nodes and faces on opposite sides match in all bits.
+
+        Small loose components, flat tetrahedra at the boundary, and places where it touches itself are left out,
+        ``report().dropped`` is their volume. Warns of several components, of boundary triangles that cross, and of dihedral
+        angles below 12 or above 160 degrees. The same for any number of ``threads``. Raises ValueError for an edge greater than
+        the thinnest wall, a mesh beyond the memory there is, a side of what is no sheet, ``periodic`` where the solid is not.
+        """
+        if of not in OF:
+            raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
+        if order not in (1, 2):
+            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        size = self._volume_edge(edge, per_cell, wall)
+        share, region = self._core.expected()
+        part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
+        count = 12 * max(part, 0.02) * region / size**3
+        if count > 3e8:
+            raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
+        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
+        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, thread_count(threads), progress)
+        made = VolumeMesh(core, self._core.design)
+        warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
+        return made
+
+    def voxel_elements(
+        self,
+        step: float,
+        least: float = 0.01,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> VoxelElements:
+        """Voxels as finite elements: hexahedra over the region's bounds with edges of about ``step`` (mm), stretched so that a
+        whole number fits, each with its exact solid fraction.
+
+        Those of which a share of at least ``least`` is solid are elements if they belong to the largest piece by common
+        faces. A set of the design has the faces whose centres are at most half a voxel outside its region. Raises ValueError
+        for a step beyond the memory there is, and where no voxel has that share.
+        """
+        size, share = positive("step", step), number("least", least)
+        if not 0 < share <= 1:
+            raise ValueError(f"least is {share:g}; it must be greater than 0 and at most 1")
+        low, high = self.bounds
+        count = math.prod(math.ceil((b - a) / size) for a, b in zip(low, high, strict=True))
+        fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
+        return VoxelElements(_core.VoxelElements.make(self._core, size, share, thread_count(threads), progress))
+
+    def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
+        """The edge (mm) of a request for a volume mesh."""
+        if sum(v is not None for v in (edge, per_cell, wall)) > 1:
+            raise ValueError("give one of edge, per_cell and wall")
+        walls = dict(self._thinnest)
+        if self.skin is not None:
+            walls["skin"] = self.skin
+        where, thin = min(walls.items(), key=lambda item: item[1], default=("", math.inf))
+        if wall is not None:
+            if not walls:
+                raise ValueError("wall: the thinnest wall of this design is not known; give edge, mm")
+            size = thin / positive("wall", wall)
+        elif edge is None and per_cell is None:
+            size = min(thin / 2, self.wavelength / 16)
+        else:
+            size = positive("edge", edge) if edge is not None else self.wavelength / positive("per_cell", per_cell)
+        # Four of a tetrahedron's six edges are shorter than the longest, by half the root of three.
+        if SHORT_EDGE * size > thin:
+            raise ValueError(
+                f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at "
+                f"{where}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
+            )
+        if size > self.wavelength / 4:
+            raise ValueError(f"an edge of {size:.4g} mm is more than a quarter of the wavelength, {self.wavelength:g} mm")
+        return size
+
+    @cached_property
+    def _cell(self) -> _core.Cell:
+        """The periodic cell of its lattice or beams. A DesignError where there is none."""
+        return _core.Cell.of(self._core, self._folder or os.getcwd())
+
+    def stiffness(
+        self,
+        n: int = 64,
+        E: float = 1.0,
+        nu: float = 0.3,
+        C: ArrayLike | None = None,
+        voxels: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> StiffnessReport:
+        """The effective stiffness of the periodic cell, of a solid of Young's modulus ``E`` and Poisson's ratio ``nu``, or of a
+        stiffness ``C`` (6, 6): stress = C strain in Voigt's order 11 22 33 23 13 12 with engineering shears, world axes, in
+        the unit of E; with Young's and shear moduli, anisotropy, bounds, and how sure it is.
+
+        The cell is that of one lattice under an affine map at one level, or of beams by a unit cell; the region plays no
+        part. Trilinear finite elements on ``n`` voxels along its edge, weighted by the exact solid fraction of each
+        (``voxels``: solid or not by their centres), on n/2 and n/4 too, and the limit of the three.
+
+        Raises DesignError for a design without such a cell, ValueError for a cell that falls apart, for ``n`` below 8 or beyond
+        the memory there is, and for a solid that is none.
+        """
+        import numpy as np
+
+        given = None if C is None else np.asarray(C, dtype=float)
+        if given is not None and given.shape != (6, 6):
+            raise ValueError(f"expected C of shape (6, 6), found {given.shape}")
+        grid = _voxels(n, STIFFNESS_BYTES), voxels
+        solid = number("E", E), number("nu", nu)
+        return self._cell.stiffness(grid, solid, None if given is None else given.tolist(), (thread_count(threads), progress))
+
+    def conductivity(
+        self,
+        n: int = 64,
+        pore: float = 0.0,
+        voxels: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> ConductivityReport:
+        """The effective conductivity of the periodic cell, (3, 3) relative to the solid's, where the ``pore`` conducts this
+        many times as well as the solid; for heat, electricity and diffusion alike. Else as ``stiffness``.
+        """
+        grid = _voxels(n, CONDUCTIVITY_BYTES), voxels
+        return self._cell.conductivity(grid, number("pore", pore), (thread_count(threads), progress))
+
+    def permeability(
+        self,
+        n: int = 64,
+        side: Literal["lower", "upper"] | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> PermeabilityReport:
+        """The permeability of the pore of the periodic cell to creeping flow, (3, 3) in mm²: mean flux over the whole cell = -k
+        grad p / viscosity; with hydraulic diameter, tortuosity, Kozeny's constant, and how sure it is. Both sides of a sheet
+        together, or that of one ``side``.
+
+        Stokes's flow between the exact walls, by a lattice Boltzmann scheme of two relaxation times with interpolated
+        bounce-back on ``n`` nodes along the cell's edge, on n/2 and n/4 too, and the limit of the three. Directions in which
+        the pore does not go through have zeros, and a warning.
+
+        Raises DesignError for a design without such a cell, ValueError for the side of what is no sheet, for ``n`` below 8 or
+        beyond the memory there is.
+        """
+        if side not in (None, "lower", "upper"):
+            raise ValueError(f'side is {side!r}; expected "lower", "upper" or None for both')
+        n = _voxels(n, PERMEABILITY_BYTES)
+        return self._cell.permeability(n, None if side is None else side == "upper", (thread_count(threads), progress))
+
+
+def _voxels(n: int, each: float) -> int:
+    """A number of voxels along an edge that fits the memory, at ``each`` bytes a voxel."""
+    n = whole("n", n, 8, 4096)
+    fits(each * n**3, f"{n} x {n} x {n} voxels")
+    return n
