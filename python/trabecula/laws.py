@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from . import _core
 from .design import Design, Lattice
 from .errors import DesignWarning
 from .files import extension, whole_file
@@ -249,19 +250,9 @@ def _power(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
 
 
 def monotone(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The piecewise cubic through points of ascending x that has no extremum between them (Fritsch and Carlson 1980).
-
-    ``at`` holds positions within them.
+    """Values at positions (n,) or () of the piecewise cubic through points (x, y) of ascending x that has no extremum between
+    them (Fritsch and Carlson 1980); beyond the ends the value there.
     """
-    h, secant = np.diff(x), np.diff(y) / np.diff(x)
-    slope = np.empty(len(x))
-    slope[0], slope[-1] = secant[0], secant[-1]
-    a, b = secant[:-1], secant[1:]
-    same = a * b > 0
-    weights = h[:-1] + 2 * h[1:], 2 * h[:-1] + h[1:]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inner = 3 * (h[:-1] + h[1:]) / (weights[0] / a + weights[1] / b)
-    slope[1:-1] = np.where(same, inner, 0.0)
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-    t = (at - x[i]) / h[i]
-    return y[i] + (y[i + 1] - y[i]) * t * t * (3 - 2 * t) + h[i] * t * (1 - t) * ((1 - t) * slope[i] - t * slope[i + 1])
+    positions = np.asarray(at, dtype=float)
+    found = _core.monotone(np.column_stack([x, y]).tolist(), positions.ravel().tolist())
+    return np.array(found).reshape(positions.shape)

@@ -60,6 +60,7 @@ pub mod layer;
 pub mod math;
 pub mod measure;
 pub mod mesh;
+pub mod monotone_cubic;
 pub mod progress;
 pub mod random;
 mod remesh;

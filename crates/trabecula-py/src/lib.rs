@@ -7,6 +7,7 @@ mod beam_files;
 mod design;
 mod effective;
 mod error;
+mod fe_arrays;
 mod file;
 mod folder;
 mod lattice_terms;
@@ -123,6 +124,15 @@ mod _core {
     #[pyfunction]
     fn voxel_element_formats() -> Vec<(&'static str, &'static str)> {
         crate::voxel_elements::formats()
+    }
+
+    /// Values at positions of the monotone cubic through points of ascending x.
+    #[pyfunction]
+    fn monotone(points: Vec<[f64; 2]>, at: Vec<f64>) -> PyResult<Vec<f64>> {
+        if points.is_empty() {
+            return Err(pyo3::exceptions::PyValueError::new_err("a curve needs one point at least"));
+        }
+        Ok(at.into_iter().map(|x| geometry::monotone_cubic::monotone(&points, x)).collect())
     }
 
     /// The JSON Schema of a design, as JSON text.

@@ -4,7 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::fe_mesh::{FeMesh, MIDDLES};
-use geometry::formats::{FE_FORMATS, FeField, FeText, POLY_FILES};
+use geometry::formats::{FE_FORMATS, FeText, POLY_FILES};
 use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -13,24 +13,12 @@ use trabecula::report::VolumeReport;
 use trabecula::volume_mesh::{Made, Of, Options};
 
 use crate::error;
+use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
 use crate::file;
 use crate::mesh::Mesh;
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
-
-/// Nodes, tetrahedra, and faces (tetrahedron, corner opposite to it) of a set.
-pub(crate) type Members<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
-
-/// Nodes, and the forces at them.
-pub(crate) type Forces<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
-
-/// A field of a file: its name, numbers for each node or element, whether it is at nodes, the numbers.
-pub(crate) type Field = (String, usize, bool, Vec<f64>);
-
-pub(crate) fn field((name, components, at_nodes, values): Field) -> FeField {
-    FeField { name, components, at_nodes, values }
-}
 
 /// A volume mesh.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -109,10 +97,7 @@ impl VolumeMesh {
 
     /// Nodes, tetrahedra and faces of a set; None without it.
     fn set<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Members<'py>>> {
-        let Some(set) = self.mesh().set(name) else { return Ok(None) };
-        let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
-        let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
-        Ok(Some((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces)))
+        self.mesh().set(name).map(|set| members(py, set)).transpose()
     }
 
     /// Periodic pairs (n, 5): node, its image, and by which periods they differ (0 or 1 along x, y, z).
@@ -139,10 +124,7 @@ impl VolumeMesh {
 
     /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
     fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
-        let Some(set) = self.mesh().set(name) else { return Ok(None) };
-        let (nodes, forces): (Vec<u32>, Vec<[f64; 3]>) = self.mesh().nodal_forces(set, force).into_iter().unzip();
-        let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
-        Ok(Some((nodes.into_pyarray(py), forces)))
+        self.mesh().set(name).map(|set| forces(py, self.mesh().nodal_forces(set, force))).transpose()
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio for formats with a material; sets that
@@ -157,17 +139,12 @@ impl VolumeMesh {
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let fields = fields.into_iter().map(field).collect();
         let (path, suffix, title) = file;
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
-        let done = run(py, None, None, |_| {
-            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
-            (format.write)(self.mesh(), &FeText { title, elastic, held, loads, fields }, &mut out)?;
-            out.flush()
-        })?;
-        Ok(done?)
+        let text = FeText { title, elastic, held, loads, fields: fields.into_iter().map(field).collect() };
+        to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 
     /// Writes the files of OpenFOAM's polyMesh into a folder; gives the names of its patches and their numbers of faces.

@@ -1,6 +1,5 @@
 //! Voxels as finite elements: arrays, sets, figures, files.
 
-use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::fe_mesh::HexMesh;
@@ -11,11 +10,10 @@ use pyo3::prelude::*;
 use trabecula::report::VoxelElementsReport;
 
 use crate::error;
-use crate::file;
+use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
-use crate::volume::{Field, Forces, Members, field};
 
 /// Voxels as finite elements.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -68,10 +66,7 @@ impl VoxelElements {
 
     /// Nodes, hexahedra, and faces (hexahedron, number from 0 of S1 to S6 of Abaqus) of a set; None without it.
     fn set<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Members<'py>>> {
-        let Some(set) = self.mesh.set(name) else { return Ok(None) };
-        let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
-        let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
-        Ok(Some((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces)))
+        self.mesh.set(name).map(|set| members(py, set)).transpose()
     }
 
     /// The figures, as `reports.VoxelElementsReport`.
@@ -81,10 +76,7 @@ impl VoxelElements {
 
     /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
     fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
-        let Some(set) = self.mesh.set(name) else { return Ok(None) };
-        let (nodes, forces): (Vec<u32>, Vec<[f64; 3]>) = self.mesh.nodal_forces(set, force).into_iter().unzip();
-        let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
-        Ok(Some((nodes.into_pyarray(py), forces)))
+        self.mesh.set(name).map(|set| forces(py, self.mesh.nodal_forces(set, force))).transpose()
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio of the solid; sets that are held, and sets
@@ -99,17 +91,12 @@ impl VoxelElements {
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let fields = fields.into_iter().map(field).collect();
         let (path, suffix, title) = file;
         let Some((.., write)) = HEX_FORMATS.iter().find(|f| f.0 == suffix) else {
             return Err(PyValueError::new_err(format!("no format of voxels is named {suffix}")));
         };
-        let done = run(py, None, None, |_| {
-            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
-            write(&self.mesh, &FeText { title, elastic, held, loads, fields }, &mut out)?;
-            out.flush()
-        })?;
-        Ok(done?)
+        let text = FeText { title, elastic, held, loads, fields: fields.into_iter().map(field).collect() };
+        to_file(py, &path, |out| write(&self.mesh, &text, out))
     }
 }
 

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::vtk_cells::{Array, Cells};
 use super::{FeText, abaqus, lines, push};
 use crate::fe_mesh::HexMesh;
+use crate::formats::vtu::{Array, Cells};
 
 /// A format of voxels: suffix, what it is, and what writes a mesh.
 pub type HexFormat = (&'static str, &'static str, fn(&HexMesh, &FeText, &mut dyn Write) -> io::Result<()>);

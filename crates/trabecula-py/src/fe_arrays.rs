@@ -1,0 +1,55 @@
+//! What meshes for finite elements give and take: sets, forces and fields as arrays, files.
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use geometry::fe_mesh::FeSet;
+use geometry::formats::FeField;
+use geometry::math::Vec3;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+
+use crate::file;
+use crate::run::run;
+
+/// Nodes, elements, and faces (element, number of the face in it) of a set.
+pub type Members<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
+
+/// Nodes, and the forces at them.
+pub type Forces<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
+
+/// A field of a file: its name, numbers for each node or element, whether it is at nodes, the numbers.
+pub type Field = (String, usize, bool, Vec<f64>);
+
+/// A set as arrays.
+pub fn members<'py>(py: Python<'py>, set: &FeSet) -> PyResult<Members<'py>> {
+    let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
+    let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
+    Ok((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces))
+}
+
+/// Forces at nodes as arrays.
+pub fn forces(py: Python<'_>, of: Vec<(u32, Vec3)>) -> PyResult<Forces<'_>> {
+    let (nodes, forces): (Vec<u32>, Vec<Vec3>) = of.into_iter().unzip();
+    let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
+    Ok((nodes.into_pyarray(py), forces))
+}
+
+/// A field as the core takes it.
+pub fn field((name, components, at_nodes, values): Field) -> FeField {
+    FeField { name, components, at_nodes, values }
+}
+
+/// Writes a file that is made anew.
+pub fn to_file(
+    py: Python<'_>,
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()> + Send,
+) -> PyResult<()> {
+    let done = run(py, None, None, |_| {
+        let mut out = BufWriter::with_capacity(1 << 20, file::anew(path)?);
+        write(&mut out)?;
+        out.flush()
+    })?;
+    Ok(done?)
+}
