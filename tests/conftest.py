@@ -9,6 +9,7 @@ import warnings
 
 import pytest
 import trabecula as lt
+from finite_elements import solid
 from trabecula import cli
 
 CUBE = """schema = 1
@@ -38,6 +39,12 @@ def block():
     """A cube of 10 mm with eight cells of a gyroid sheet."""
     core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
     return lt.Design(region=lt.region.box(size=[10, 10, 10]), lattice={"core": core}).build()
+
+
+@pytest.fixture(scope="session")
+def sheet():
+    """A periodic volume mesh of one cell of a gyroid sheet, 16 edges along it."""
+    return solid().volume_mesh(per_cell=16, periodic=True)
 
 
 def command(*words):
