@@ -155,7 +155,7 @@ def page(lines):
 
 Written by `scripts/bracket_ccx.py`, which needs CalculiX: [stress_bracket](../../examples/stress_bracket.toml) as
 tetrahedra of Ti-6Al-4V (E = {E:.0f} MPa, ν = {NU}), the nodes of the set `X0` held, {FORCE:.0f} N down on the faces of `X1`,
-beside lattices of the same cells and mass. The sag is the work of the load over the force; "times as stiff" is the uniform
+next to lattices of the same cells and mass. The sag is the work of the load over the force; "times as stiff" is the uniform
 lattice's sag over this one's.
 
 ![Stress](../images/bracket_ccx.png)

@@ -63,7 +63,7 @@ class LayerRow(NamedTuple):
 LAYERS = {suffix: LayerRow(*row) for suffix, *row in _core.layer_formats()}
 LAYER_WRITES = tuple(LAYERS)
 #: The formats of volume meshes: suffix, what it is.
-VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, beside the folder constant/polyMesh"}
+VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, next to the folder constant/polyMesh"}
 VOLUME_WRITES = tuple(VOLUMES)
 #: The formats of voxels as finite elements.
 VOXEL_ELEMENT_WRITES = (*dict(_core.voxel_element_formats()), "xdmf")

@@ -46,7 +46,7 @@ FUNCTIONS = {
 }
 
 
-class Refused(ValueError):
+class Unsupported(ValueError):
     """What the extension cannot say."""
 
     def __init__(self, what: str) -> None:
@@ -140,7 +140,7 @@ def save_implicit(solid: Solid, path: str | os.PathLike[str]) -> dict[str, Any]:
     for key, what in [("blend", "a blend"), ("skin", "a skin"), ("keep", "keep zones"), ("beams", "beams")]:
         if design.get(key):
             more = "" if key != "beams" else ": save_beams writes them as such"
-            raise Refused(what + more)
+            raise Unsupported(what + more)
     write = Expressions()
     (name, lattice), *_ = design["lattice"].items()
     inside = lattice_value(write, solid, name, lattice)
@@ -164,9 +164,9 @@ def lattice_value(write: Expressions, solid: Solid, name: str, lattice: dict) ->
     terms = _core.lattice_terms(solid._core, name)
     if terms.affine is None:
         (kind,) = lattice["map"]
-        raise Refused(f"lattice.{name}: map.{kind}, which is not affine")
+        raise Unsupported(f"lattice.{name}: map.{kind}, which is not affine")
     if terms.distance:
-        raise Refused(f"lattice.{name}: a thickness, for which the field is a tabulated distance; give its iso or fraction")
+        raise Unsupported(f"lattice.{name}: a thickness, for which the field is a tabulated distance; give its iso or fraction")
     matrix, shift = terms.affine
     waves = []
     for hkl, amplitude, phase in terms.waves:
@@ -187,13 +187,13 @@ def graded_level(write: Expressions, name: str, level: dict) -> str:
     """A level that varies: an iso that is linear or a formula."""
     (kind,) = level
     if kind != "iso":
-        raise Refused(f"lattice.{name}: a {kind} that varies, whose level is tabulated; give its iso as a grade")
+        raise Unsupported(f"lattice.{name}: a {kind} that varies, whose level is tabulated; give its iso as a grade")
     (grade,) = level["iso"]
     of = level["iso"][grade]
     if grade == "formula":
         return formula(write, of)
     if grade != "linear":
-        raise Refused(f"lattice.{name}: the grade {grade}; linear and formula can be written")
+        raise Unsupported(f"lattice.{name}: the grade {grade}; linear and formula can be written")
     s = write.dot(of["along"])
     stops = of["stops"]
     parts = [write.constant(stops[0][1])]
@@ -243,8 +243,8 @@ def formula(write: Expressions, text: str) -> str:
                 squares = [write.two("multiplication", v, v) for v in (a, b)]
                 return write.one("sqrt", write.sum(squares))
             case ast.Call(func=ast.Name(id=name)):
-                raise Refused(f"the function {name} of a formula")
-        raise Refused(f"the formula {text}")
+                raise Unsupported(f"the function {name} of a formula")
+        raise Unsupported(f"the formula {text}")
 
     return value(ast.parse(text.replace("^", "**"), mode="eval").body)
 
@@ -260,7 +260,7 @@ def region_value(write: Expressions, region: dict) -> tuple[str, bool]:
             other = write.negative(value) if kind == "difference" else value
             total = write.two("min" if kind == "union" else "max", total, other)
         if any(whole for _, whole in parts):
-            raise Refused(f"a {kind} of meshes; combine them to one mesh first")
+            raise Unsupported(f"a {kind} of meshes; combine them to one mesh first")
         return total, False
     if kind == "offset":
         value, whole = region_value(write, of["of"])
@@ -275,7 +275,7 @@ def region_value(write: Expressions, region: dict) -> tuple[str, bool]:
         return "distance.distance", True
     shapes = {"box": box, "sphere": sphere, "halfspace": halfspace, "cylinder": cylinder}
     if kind not in shapes:
-        raise Refused(f"region.{kind}; {', '.join(shapes)}, mesh and their combinations can be written")
+        raise Unsupported(f"region.{kind}; {', '.join(shapes)}, mesh and their combinations can be written")
     return shapes[kind](write, of), False
 
 

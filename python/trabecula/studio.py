@@ -30,7 +30,7 @@ def page() -> bytes:
 
 
 def given(design: str) -> tuple[dict, list[str]]:
-    """What the page is told of a design, and the paths of the files that it names, in order. A design with an error is
+    """What the page has of a design, and the paths of the files that it names, in order. A design with an error is
     shown with it; then its files are not known. Raises OSError for a file that cannot be read.
     """
     text = read_text(design)
@@ -76,9 +76,9 @@ class Studio(ThreadingHTTPServer):
             return self.page, "text/html; charset=utf-8"
         if self.design is None:
             return None
-        told, named = given(self.design)
+        described, named = given(self.design)
         if path == "/design.json":
-            return json.dumps(told).encode(), "application/json"
+            return json.dumps(described).encode(), "application/json"
         number = path.removeprefix("/files/")
         if number != path and number.isdecimal() and int(number) < len(named):
             with open(named[int(number)], "rb") as file:
