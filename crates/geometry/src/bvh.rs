@@ -96,6 +96,11 @@ impl Bvh {
 
     /// Calls `visit` with the items of every leaf whose box touches `b`.
     pub fn overlapping(&self, b: &Aabb, mut visit: impl FnMut(&[u32])) {
+        self.overlapping_leaves(b, |leaf| visit(&self.order[leaf]));
+    }
+
+    /// Calls `visit` with the place in the order of every leaf whose box touches `b`.
+    pub fn overlapping_leaves(&self, b: &Aabb, mut visit: impl FnMut(Range<usize>)) {
         let mut stack = [0usize; STACK];
         let mut top = usize::from(!self.nodes.is_empty());
         while top > 0 {
@@ -104,7 +109,7 @@ impl Bvh {
             while self.nodes[i].bounds.touches(b) {
                 let node = &self.nodes[i];
                 if let Some(items) = node.items() {
-                    visit(&self.order[items]);
+                    visit(items);
                     break;
                 }
                 let [first, second] = node.children(i);

@@ -70,6 +70,7 @@ pub mod simplify;
 pub mod smooth;
 pub mod spatial_order;
 pub mod surface_mesh;
+pub mod surface_patches;
 pub mod symmetry;
 pub mod tetmesh;
 pub mod transform;

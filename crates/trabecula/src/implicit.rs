@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::field::{Block, Field};
 use geometry::feature_edges::Creases;
 use geometry::math::{Aabb, Interval, Vec3};
+use geometry::mesh::Mesh;
 
 /// A field that states what meshing it by its zero set requires.
 pub trait Implicit: Field {
@@ -60,6 +61,8 @@ pub struct Surface {
     pub has_creases: bool,
     /// Its creases, where they are known.
     pub creases: Arc<Creases>,
+    /// The mesh, if it is one.
+    pub mesh: Option<Arc<dyn AsRef<Mesh> + Send + Sync>>,
     /// Whether it was offset because it coincided with another surface of the solid (`coincident.rs`).
     pub perturbed: bool,
 }
@@ -86,6 +89,7 @@ impl Surface {
             plane: None,
             cut: false,
             creases: Arc::default(),
+            mesh: None,
             perturbed: false,
         }
     }
@@ -100,6 +104,7 @@ impl Surface {
             cut: true,
             has_creases: true,
             creases: Arc::default(),
+            mesh: None,
             perturbed: false,
         }
     }
@@ -113,7 +118,7 @@ impl Surface {
     /// The surface where the function is `by`: the solid grows by that distance (mm) if the function is a distance.
     pub fn offset(self, by: f64) -> Surface {
         let plane = self.plane.map(|p| Plane { at: p.at + if p.below { by } else { -by }, ..p });
-        Surface { field: Arc::new(Shifted(self.field, by)), pair: None, plane, ..self }
+        Surface { field: Arc::new(Shifted(self.field, by)), pair: None, plane, mesh: None, ..self }
     }
 }
 

@@ -39,6 +39,7 @@ pub mod beam_surface;
 pub mod blend;
 pub mod cell;
 mod coincident;
+mod conforming_tets;
 pub mod csg_tree;
 pub mod design;
 pub mod effective;

@@ -11,35 +11,25 @@ use geometry::fault::{Fault, number};
 use geometry::fe_mesh::FeMesh;
 use geometry::math::{Aabb, Vec3};
 use geometry::progress::{Progress, Stopped};
-use geometry::tetmesh::{FACES, TetMesh};
-use geometry::union_find::unite;
+use geometry::tetmesh::FACES;
 use rayon::prelude::*;
 
+use crate::conforming_tets::{
+    GONE, MOST, Partition, Shaping, SurfaceSet, Tet, components, distances, images, interfaces, members, only, prepared,
+};
 use crate::region::Region;
 use crate::solid::Solid;
 
 mod body_centred;
-mod chord_balance;
-mod crease_nodes;
 mod cyclic_nodes;
 mod domains;
-mod flips;
 mod mid_nodes;
 mod named_sets;
-mod node_surfaces;
-mod partition;
-mod shaping;
-mod slivers;
-mod surface_cuts;
 
 use body_centred::Cubes;
-use chord_balance::{distances, interfaces};
 use domains::Domains;
 pub use domains::Of;
 pub use named_sets::is_own_name;
-use node_surfaces::{HELD, MOST, SurfaceSet, members, only};
-use partition::{Partition, Tet};
-use shaping::{GONE, Shaping};
 
 /// Most cubes of the background.
 const CUBES: f64 = 4e9;
@@ -127,7 +117,9 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
         }
         partition.cut(s, step);
     }
-    let (mut shaping, mut dropped) = prepared(partition, options);
+    // Of a periodic cell components hold together by images.
+    let one = options.of != Of::All && !options.periodic;
+    let (mut shaping, mut dropped) = prepared(partition, one);
     if shaping.tets.is_empty() {
         let m = format!(
             "nothing to mesh: no tetrahedron of edge {} mm lies in it; use a smaller edge",
@@ -185,70 +177,7 @@ fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Parti
     }
     let next = (0..nodes.len() as u32).collect();
     let tets = tets.into_iter().map(|nodes| Tet { nodes, negative, positive: 0 }).collect();
-    Partition { surfaces: &domains.surfaces, trees: &domains.trees, nodes, on, next, tets }
-}
-
-/// The cut mesh, ready to be improved: manifold, without fragments, nodes held by the surfaces of their boundary faces alone; and
-/// the volume that was left out.
-fn prepared<'a>(partition: Partition<'a>, options: &Options) -> (Shaping<'a>, f64) {
-    let mut domain = partition.domains();
-    let mut tets: Vec<[u32; 4]> = partition.tets.iter().map(|t| t.nodes).collect();
-    let mut dropped = 0.0;
-    let mut faces = interfaces(&tets, &domain, &|n| partition.on[n as usize] != 0);
-    // Of a periodic cell components hold together by images.
-    let one = options.of != Of::All && !options.periodic;
-    if one && (components(&tets, partition.nodes.len()) > 1 || pinched(&faces)) {
-        let mut mesh = TetMesh { nodes: partition.nodes.clone(), tets, zones: Vec::new() };
-        dropped = crate::mesher::repair(&mut mesh);
-        tets = mesh.tets;
-        domain = vec![0; tets.len()];
-        faces = interfaces(&tets, &domain, &|_| true);
-    }
-    let mut on = vec![0; partition.on.len()];
-    for (f, ..) in faces {
-        let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & partition.on[*n as usize]);
-        f.iter().for_each(|n| on[*n as usize] |= if set == 0 { HELD } else { set });
-    }
-    let nodes = (partition.nodes, on, partition.next);
-    (Shaping::new(partition.surfaces, nodes, (tets, domain)), dropped)
-}
-
-/// The number of components that are connected by nodes.
-fn components(tets: &[[u32; 4]], nodes: usize) -> usize {
-    let mut root: Vec<u32> = (0..nodes as u32).collect();
-    let mut used = vec![false; nodes];
-    for t in tets {
-        t.iter().for_each(|n| used[*n as usize] = true);
-        for n in &t[1..] {
-            unite(&mut root, t[0], *n);
-        }
-    }
-    (0..nodes as u32).filter(|n| used[*n as usize] && root[*n as usize] == *n).count()
-}
-
-/// Whether the boundary touches itself: by Euler's formula for the faces around each node, which are one fan unless a node has more
-/// edges than faces, or an edge more than two faces.
-fn pinched(faces: &[([u32; 3], u32, bool)]) -> bool {
-    // (node, opposite edge) of each face.
-    let mut links: Vec<(u32, [u32; 2])> =
-        faces.par_iter().flat_map_iter(|([a, b, c], ..)| [(*a, [*b, *c]), (*b, [*a, *c]), (*c, [*a, *b])]).collect();
-    links.par_sort_unstable();
-    let by_node: Vec<&[(u32, [u32; 2])]> = links.chunk_by(|a, b| a.0 == b.0).collect();
-    by_node.par_iter().any(|link| {
-        // One closed cycle through the neighbours?
-        let mut at = link[0].1[1];
-        let mut before = 0;
-        for count in 1..=link.len() {
-            let next = (0..link.len()).find(|i| *i != before && link[*i].1.contains(&at));
-            if at == link[0].1[0] {
-                return count != link.len();
-            }
-            let Some(i) = next else { return true };
-            let [p, q] = link[i].1;
-            (at, before) = (if p == at { q } else { p }, i);
-        }
-        true
-    })
+    Partition { surfaces: &domains.surfaces, patched: &[], trees: &domains.trees, nodes, on, next, tets }
 }
 
 /// The improved mesh with sets, pairs and, of order 2, nodes on edges.
@@ -319,7 +248,7 @@ fn compacted(nodes: &mut Vec<Vec3>, on: &mut Vec<SurfaceSet>, next: Vec<u32>, te
     }
     let mut cycles = vec![0; count as usize];
     for n in (0..to.len()).filter(|n| to[*n] != u32::MAX) {
-        let after = partition::images(&next, n as u32).skip(1).find(|m| to[*m as usize] != u32::MAX);
+        let after = images(&next, n as u32).skip(1).find(|m| to[*m as usize] != u32::MAX);
         cycles[to[n] as usize] = to[after.unwrap_or(n as u32) as usize];
         (nodes[to[n] as usize], on[to[n] as usize]) = (nodes[n], on[n]);
     }

@@ -19,6 +19,7 @@ const LAYERS: &[&[&str]] = &[
     &["environment"],
     &["grade"],
     &["cell", "map"],
+    &["conforming_tets"],
     &["mesher", "lattice", "tiling", "truss", "skin", "beam_surface"],
     &["blend"],
     &["solid"],

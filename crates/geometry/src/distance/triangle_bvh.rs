@@ -70,6 +70,13 @@ impl TriangleBvh {
         self.bvh.order()
     }
 
+    /// Whether `test` holds for one of the triangles in leaves whose boxes touch `b`.
+    pub fn any_touching(&self, b: &Aabb, test: impl Fn(&Triangle) -> bool) -> bool {
+        let mut found = false;
+        self.bvh.overlapping_leaves(b, |leaf| found = found || self.triangles[leaf].iter().any(&test));
+        found
+    }
+
     /// The nearest triangle; of several at the same computed distance the first. `seed` is a triangle that may be
     /// near: it makes the search shorter and never changes the answer.
     pub fn nearest(&self, p: Vec3, seed: u32) -> Nearest {

@@ -169,7 +169,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
             let below = |key: &str| format!("{}.{key}", environment.path);
             let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsKind>("size")))?;
             if made.mesher == MesherKind::Background {
-                let (mesh, mended) = background(&**environment.region, &bounds, &size, &inside).map_err(wrong)?;
+                let (mesh, mended) = background(environment.region, &bounds, &size, &inside).map_err(wrong)?;
                 (mesh, mended, Checked::default(), "background".to_string())
             } else {
                 let Some(size) = size.constant() else {

@@ -7,7 +7,7 @@ use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::map::Tets;
 use crate::map::curved_tets::boundary_edges;
-use crate::map::surface_feet::{edge_feet, feet, sharp_feet};
+use crate::map::surface_feet::{EdgeFaces, edge_feet, feet, sharp_feet};
 use crate::region::Region;
 use crate::tiling::Ports;
 use ::beams::graph::{Beam, Graph, Hub, Profile};
@@ -27,7 +27,7 @@ pub(super) struct Net {
 }
 
 /// The middles of the two faces of each edge of the boundary, by its nodes.
-type Edges = HashMap<[u32; 2], [Vec3; 2]>;
+type Edges = HashMap<[u32; 2], EdgeFaces>;
 
 impl Net {
     /// The net on the faces of a mesh's boundary that have their middles in `on`, and along the sharp edges of the region there; `None` if
@@ -36,7 +36,7 @@ impl Net {
         let at = |n: u32| map.nodes()[n as usize];
         let third = |f: &[u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, at(*n))), 1.0 / 3.0);
         let all = map.boundary_nodes();
-        let edges: Edges = boundary_edges(map).into_iter().map(|e| (e.nodes, e.sides)).collect();
+        let edges: Edges = boundary_edges(map).into_iter().map(|e| (e.nodes, e.faces)).collect();
         let faces: Vec<[u32; 3]> = all.into_iter().filter(|f| on.is_none_or(|on| on.value(third(f)) < 0.0)).collect();
         if faces.is_empty() {
             return None;
@@ -134,9 +134,9 @@ fn sharp(map: &Tets, region: &Region, edges: &Edges, of: Vec<[u32; 2]>) -> Vec<[
 }
 
 /// Points of an edge of the boundary, on the region's surface or, where it has two faces, its sharp edge.
-fn on_edge(region: &Region, points: &[Vec3], sides: Option<&[Vec3; 2]>) -> Vec<Vec3> {
-    match sides {
-        Some(sides) => edge_feet(&**region, points, &vec![*sides; points.len()]),
+fn on_edge(region: &Region, points: &[Vec3], faces: Option<&EdgeFaces>) -> Vec<Vec3> {
+    match faces {
+        Some(faces) => edge_feet(&**region, points, &vec![*faces; points.len()]),
         None => feet(&**region, points),
     }
 }

@@ -12,11 +12,11 @@
 
 use std::collections::HashMap;
 
-use super::surface_feet::{edge_feet, feet};
+use super::surface_feet::{EdgeFaces, edge_feet, feet};
 use super::tet_map::{NONE, Tets};
 use crate::field::Field;
 use crate::region::Region;
-use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, scale, spectral_norm, sub, transpose};
+use geometry::math::{Mat3, Vec3, add, apply, cross, dot, inverse, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// The greatest norm κ of the derivative of A.
 const MOST: f64 = 0.85;
@@ -37,8 +37,8 @@ pub(crate) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3
 pub(crate) struct BoundaryEdge {
     /// Its nodes, ascending.
     pub nodes: [u32; 2],
-    /// The middles of its two faces (mm).
-    pub sides: [Vec3; 2],
+    /// Its two faces.
+    pub faces: EdgeFaces,
 }
 
 /// How the tetrahedra at the boundary are bent.
@@ -157,8 +157,8 @@ impl Curves {
         let edges = boundary_edges(map);
         let ends = |e: &BoundaryEdge| e.nodes.map(|n| map.nodes()[n as usize]);
         let middles: Vec<Vec3> = edges.iter().map(|e| middle(ends(e), 0.5)).collect();
-        let sides: Vec<[Vec3; 2]> = edges.iter().map(|e| e.sides).collect();
-        let targets = edge_feet(&**region, &middles, &sides);
+        let faces: Vec<EdgeFaces> = edges.iter().map(|e| e.faces).collect();
+        let targets = edge_feet(&**region, &middles, &faces);
         let mut moved: HashMap<[u32; 2], Vec3> = HashMap::with_capacity(edges.len());
         for ((e, p), q) in edges.iter().zip(&middles).zip(&targets) {
             let [a, b] = ends(e);
@@ -333,8 +333,15 @@ pub(crate) fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
     }
     halves.sort_unstable();
     let third = |f: [u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, map.nodes()[*n as usize])), 1.0 / 3.0);
+    let normal = |f: [u32; 3]| {
+        let [a, b, c] = f.map(|n| map.nodes()[n as usize]);
+        unit(cross(sub(b, a), sub(c, a)))
+    };
     let edge = |pair: &[([u32; 2], [u32; 3])]| match pair {
-        [(nodes, f), (_, g)] => Some(BoundaryEdge { nodes: *nodes, sides: [third(*f), third(*g)] }),
+        [(nodes, f), (_, g)] => {
+            let outward = unit(add(normal(*f), normal(*g)));
+            Some(BoundaryEdge { nodes: *nodes, faces: EdgeFaces { middles: [third(*f), third(*g)], outward } })
+        }
         _ => None,
     };
     halves.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect()

@@ -37,22 +37,58 @@ pub(crate) fn feet(region: &dyn Field, points: &[Vec3]) -> Vec<Vec3> {
     feet
 }
 
-/// As `feet`, of points on edges of a boundary mesh whose faces have their middles at `sides`: on the region's sharp edge, if it
-/// has one there.
-pub(crate) fn edge_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]) -> Vec<Vec3> {
-    let mut out = feet(region, points);
-    for (i, p) in sharp_feet(region, points, sides) {
+/// As `feet`, of points on or near faces of a boundary mesh with these outward directions.
+///
+/// On a long chord near an edge of the region its nearest surface may be the other face of that edge: points whose nearest surface
+/// faces elsewhere are moved first, against the sign of their distance, until the one that faces as they should is nearest.
+pub(crate) fn feet_facing(region: &dyn Field, points: &[Vec3], outward: &[Vec3]) -> Vec<Vec3> {
+    /// The least cosine between the direction and the surface's normal.
+    const ALIKE: f64 = 0.5;
+    /// Steps, as multiples of the distance: beyond the surface.
+    const STEP: f64 = 1.2;
+    const ROUNDS: usize = 6;
+    let mut out = points.to_vec();
+    let mut left: Vec<usize> = (0..points.len()).collect();
+    for _ in 0..ROUNDS {
+        let at: Vec<Vec3> = left.iter().map(|i| out[*i]).collect();
+        let (v, g) = gradients(region, &at);
+        let elsewhere = |(k, i): (usize, &usize)| (dot(g[k], outward[*i]) < ALIKE).then_some((*i, v[k]));
+        let moved: Vec<(usize, f64)> = left.iter().enumerate().filter_map(elsewhere).collect();
+        for (i, v) in &moved {
+            out[*i] = sub(out[*i], scale(outward[*i], STEP * v));
+        }
+        left = moved.into_iter().map(|m| m.0).collect();
+    }
+    // Of those that found none the plain feet.
+    left.iter().for_each(|i| out[*i] = points[*i]);
+    feet(region, &out)
+}
+
+/// The faces on both sides of an edge of a boundary mesh.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EdgeFaces {
+    /// Their middles (mm).
+    pub middles: [Vec3; 2],
+    /// The mean of their outward normals.
+    pub outward: Vec3,
+}
+
+/// As `feet`, of points on edges of a boundary mesh: on the region's sharp edge, if it has one there.
+pub(crate) fn edge_feet(region: &dyn Field, points: &[Vec3], faces: &[EdgeFaces]) -> Vec<Vec3> {
+    let outward: Vec<Vec3> = faces.iter().map(|f| f.outward).collect();
+    let mut out = feet_facing(region, points, &outward);
+    for (i, p) in sharp_feet(region, points, faces) {
         out[i] = p;
     }
     out
 }
 
 /// The points of these that belong on a sharp edge of the region, by index, and where.
-pub(crate) fn sharp_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]]) -> Vec<(usize, Vec3)> {
+pub(crate) fn sharp_feet(region: &dyn Field, points: &[Vec3], faces: &[EdgeFaces]) -> Vec<(usize, Vec3)> {
     let mut sharp: Vec<usize> = (0..points.len()).collect();
     let mut at = points.to_vec();
     for toward in TOWARD {
-        let seen = |i: &usize| sides[*i].map(|s| add(at[*i], scale(sub(s, points[*i]), toward)));
+        let seen = |i: &usize| faces[*i].middles.map(|s| add(at[*i], scale(sub(s, points[*i]), toward)));
         let near: Vec<Vec3> = sharp.iter().flat_map(seen).collect();
         let (v, g) = gradients(region, &near);
         let plane = |k: usize| (sub(near[k], scale(g[k], v[k])), g[k]);
@@ -68,7 +104,8 @@ pub(crate) fn sharp_feet(region: &dyn Field, points: &[Vec3], sides: &[[Vec3; 2]
     let mut off = vec![0.0; found.len()];
     region.values(&found, &mut off);
     let close = |(i, off): &(usize, f64)| {
-        let near = norm(sub(sides[*i][0], sides[*i][1]));
+        let [a, b] = faces[*i].middles;
+        let near = norm(sub(a, b));
         off.abs() < 1e-3 * near && norm(sub(at[*i], points[*i])) < near
     };
     sharp.into_iter().zip(off).filter(close).map(|(i, _)| (i, at[i])).collect()

@@ -10,11 +10,9 @@
 use std::collections::HashMap;
 
 use crate::field::Field;
-use crate::grade::Grade;
-use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Vec3, norm, sub};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Vec3};
 use geometry::progress::checkpoint;
-use geometry::tetmesh::tet_quality::size_of;
 
 /// Integer coordinate units per cube edge; the number of possible bisections is its logarithm.
 const UNIT: i32 = 1 << 12;
@@ -28,39 +26,26 @@ pub(super) struct Grid {
     /// Tetrahedra, positively oriented; in those that are not bisected nodes 0, 1 belong to one lattice and 2, 3 to the
     /// other.
     pub tets: Vec<[u32; 4]>,
-    /// Whether any tetrahedron was bisected.
-    pub bisected: bool,
     origin: Vec3,
-    unit: f64,
-}
-
-/// The direction of an edge, by the number of coordinates that differ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Along {
-    /// Along an axis.
-    Axis,
-    /// Along a face diagonal.
-    Face,
-    /// Along a body diagonal.
-    Body,
+    unit: Vec3,
 }
 
 impl Grid {
-    /// The tetrahedra of the lattice with cubes of edge `cube` (mm) that may intersect the region.
+    /// The tetrahedra of the lattice with cubes of edges `cube` (mm) that may intersect the region.
     ///
     /// **Errors**: more than `most` tetrahedra.
-    pub fn new(region: &dyn Field, bounds: &Aabb, cube: f64, most: usize) -> Result<Grid, Fault> {
+    pub fn new(region: &dyn Field, bounds: &Aabb, cube: Vec3, most: usize) -> Result<Grid, Fault> {
         let size = bounds.size();
         // The lattice is centred on the region, with planes on both sides of its bounds where they fit.
-        let steps = size.map(|l| (2.0 * l / cube).round());
-        let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
-        let mut grid =
-            Grid { keys: Vec::new(), tets: Vec::new(), bisected: false, origin, unit: cube / f64::from(UNIT) };
+        let steps: Vec3 = core::array::from_fn(|a| (2.0 * size[a] / cube[a]).round());
+        let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube[a] / 2.0) / 2.0);
+        let mut grid = Grid { keys: Vec::new(), tets: Vec::new(), origin, unit: cube.map(|c| c / f64::from(UNIT)) };
         let many = || too_many(most);
-        if size.iter().any(|l| l / cube > 1e5) {
+        if (0..3).any(|a| size[a] / cube[a] > 1e5) {
             return Err(many());
         }
-        let end = size.map(|l| (l / cube).ceil() as i32 + 1);
+        let end: [i32; 3] = core::array::from_fn(|a| (size[a] / cube[a]).ceil() as i32 + 1);
+        let margin = 0.5 * cube.into_iter().fold(0.0, f64::max);
         if grid.surely_more(region, end, most) {
             return Err(many());
         }
@@ -69,7 +54,7 @@ impl Grid {
         while let Some((low, high)) = todo.pop() {
             checkpoint();
             let block = grid.block(low, high);
-            if region.bound(&block.grown(0.5 * cube)).lo > 0.0 {
+            if region.bound(&block.grown(margin)).lo > 0.0 {
                 continue;
             }
             if (0..3).any(|a| high[a] - low[a] > BLOCK) {
@@ -145,7 +130,7 @@ impl Grid {
 
     /// The position of a node (mm).
     pub fn position(&self, key: [i32; 3]) -> Vec3 {
-        core::array::from_fn(|a| self.origin[a] + self.unit * f64::from(key[a]))
+        core::array::from_fn(|a| self.origin[a] + self.unit[a] * f64::from(key[a]))
     }
 
     /// The positions of all nodes (mm).
@@ -159,21 +144,14 @@ impl Grid {
         (0..3).map(|k| i64::from(a[k] - b[k]).pow(2)).sum()
     }
 
-    /// The direction of an edge.
-    pub fn along(&self, a: u32, b: u32) -> Along {
-        let (a, b) = (self.keys[a as usize], self.keys[b as usize]);
-        match (0..3).filter(|k| a[*k] != b[*k]).count() {
-            1 => Along::Axis,
-            2 => Along::Face,
-            _ => Along::Body,
-        }
-    }
-
-    /// Bisects tetrahedra that may intersect the region until each has the requested size at its centroid, within a
-    /// factor of the sixth root of two, and the mesh is conforming.
+    /// Bisects tetrahedra until none is `coarse`, and the mesh is conforming.
     ///
-    /// **Errors**: a size that is not positive; more than `most` tetrahedra.
-    pub fn refine(&mut self, region: &dyn Field, size: &Grade, most: usize) -> Result<(), Fault> {
+    /// **Errors**: those of `coarse`; more than `most` tetrahedra.
+    pub fn refine(
+        &mut self,
+        most: usize,
+        mut coarse: impl FnMut([Vec3; 4]) -> Result<bool, Fault>,
+    ) -> Result<(), Fault> {
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
         let mut fine = vec![false; self.tets.len()];
         loop {
@@ -182,7 +160,7 @@ impl Grid {
             while i < self.tets.len() {
                 let t = self.tets[i];
                 let torn = geometry::tetmesh::EDGES.iter().any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
-                if !torn && (fine[i] || !self.coarse(t, region, size)?) {
+                if !torn && (fine[i] || !coarse(t.map(|n| self.position(self.keys[n as usize])))?) {
                     fine[i] = true;
                     i += 1;
                     continue;
@@ -213,7 +191,6 @@ impl Grid {
                 fine[i] = false;
                 fine.push(false);
                 changed = true;
-                self.bisected = true;
                 if self.tets.len() > most {
                     return Err(too_many(most));
                 }
@@ -231,32 +208,6 @@ impl Grid {
             (self.length2(t[a], t[b]), first)
         };
         geometry::tetmesh::EDGES.into_iter().fold([0, 1], |m, e| if rank(e) > rank(m) { e } else { m })
-    }
-
-    /// Whether a tetrahedron that may intersect the region is larger than requested.
-    fn coarse(&self, t: [u32; 4], region: &dyn Field, size: &Grade) -> Result<bool, Fault> {
-        let p = t.map(|n| self.position(self.keys[n as usize]));
-        let middle: Vec3 = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
-        let reach = p.iter().map(|p| norm(sub(*p, middle))).fold(0.0, f64::max);
-        let mine = size_of(geometry::tetmesh::volume(p));
-        let mut wanted = [0.0; 5];
-        size.values(&[middle, p[0], p[1], p[2], p[3]], &mut wanted);
-        let least = wanted.into_iter().fold(f64::INFINITY, f64::min);
-        if mine <= wanted[0] * 2f64.powf(1.0 / 6.0) && mine <= 2.0 * least {
-            return Ok(false);
-        }
-        if region.value(middle) > reach {
-            return Ok(false);
-        }
-        if !(wanted[0] > 0.0 && least > 0.0) {
-            let message = format!(
-                "size is {} mm at {}; it must be greater than 0 in the region and near it",
-                number(wanted[0].min(least)),
-                geometry::tetmesh::conformity::place(middle)
-            );
-            return Err(Fault::new("size", message));
-        }
-        Ok(true)
     }
 }
 

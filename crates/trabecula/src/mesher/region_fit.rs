@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::isosurface_stuffing::values;
+use crate::conforming_tets::evaluated as values;
 use crate::field::Field;
 use crate::map::surface_feet::feet;
 use geometry::math::{Vec3, norm, sub};

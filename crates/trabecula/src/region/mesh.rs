@@ -84,6 +84,12 @@ fn planes(faces: &[Triangle], bounds: &Aabb, axis: usize) -> Vec<f64> {
     together.filter(|g| g.iter().map(|f| f.1).sum::<f64>() >= least).map(|g| g[0].0).collect()
 }
 
+impl AsRef<Mesh> for MeshRegion {
+    fn as_ref(&self) -> &Mesh {
+        self.mesh()
+    }
+}
+
 impl Field for MeshRegion {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         self.distance.values(points, out);
@@ -136,7 +142,11 @@ impl Shape for MeshRegion {
             Ok(moved) if by != 0.0 => one_surface(Arc::new(moved), out),
             _ => {
                 let creases = self.creases.get_or_init(|| Arc::new(creases(self.distance.mesh())));
-                out.push(Surface { creases: creases.clone(), ..Surface::distance(self.clone()) });
+                out.push(Surface {
+                    creases: creases.clone(),
+                    mesh: Some(self.clone()),
+                    ..Surface::distance(self.clone())
+                });
                 CsgTree::Leaf(out.len() - 1)
             }
         }

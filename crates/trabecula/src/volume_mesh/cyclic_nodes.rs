@@ -3,8 +3,8 @@
 use rustc_hash::FxHashMap;
 
 use super::body_centred::Cubes;
-use super::node_surfaces::SurfaceSet;
-use super::partition::images;
+use crate::conforming_tets::SurfaceSet;
+use crate::conforming_tets::images;
 use crate::implicit::Surface;
 use geometry::fault::{Fault, number};
 use geometry::fe_mesh::Pair;
@@ -50,7 +50,7 @@ pub(super) fn cycles(
         let step = cubes.step()[axis];
         for surface in &surfaces[lattice..] {
             let at = |k: usize| -> Vec<Vec3> { pairs.iter().map(|p| nodes[p[k] as usize]).collect() };
-            let [v, w] = [at(0), at(1)].map(|p| super::surface_cuts::evaluated(&*surface.field, &p));
+            let [v, w] = [at(0), at(1)].map(|p| crate::conforming_tets::evaluated(&*surface.field, &p));
             let off = v.iter().zip(&w).map(|(v, w)| (v - w).abs()).fold(0.0, f64::max) / surface.lipschitz;
             if off > OFF * step {
                 let [a, b] = PLANES[axis];

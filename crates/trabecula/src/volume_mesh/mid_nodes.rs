@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
-use super::node_surfaces::{SurfaceSet, members, onto};
-use super::partition::edge_images;
+use crate::conforming_tets::edge_images;
+use crate::conforming_tets::{SurfaceSet, members, onto};
 use crate::implicit::Surface;
 use geometry::fe_mesh::{Pair, jacobian};
 use geometry::math::{Vec3, add, norm, scale, sub};

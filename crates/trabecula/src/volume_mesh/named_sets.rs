@@ -2,7 +2,7 @@
 
 use super::cyclic_nodes::PLANES;
 use super::domains::Domains;
-use super::node_surfaces::{HELD, SurfaceSet, only};
+use crate::conforming_tets::{HELD, SurfaceSet, only};
 use crate::field::Field;
 use crate::region::Region;
 use geometry::fault::Fault;

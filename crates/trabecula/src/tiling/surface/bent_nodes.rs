@@ -15,9 +15,9 @@ use super::small_simplices::{PAIRS, Small, Template};
 use crate::cell::tet::{Nodes, Subdivision};
 use crate::map::Tets;
 use crate::map::curved_tets::{BoundaryEdge, Curves};
-use crate::map::surface_feet::{edge_feet, feet};
+use crate::map::surface_feet::{edge_feet, feet_facing};
 use crate::map::tet_map::NONE;
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 
 /// Moves below this share of an edge are rounding, and the most that are made.
@@ -147,9 +147,15 @@ impl BentNodes {
         let points: Vec<Vec3> = on.iter().map(|i| at[*i]).collect();
         let region = &*map.curves()?.region;
         let corner = |i: usize| at[nodes.whole.iter().position(|k| usize::from(k[i]) == self.n).unwrap_or(0)];
-        let [a, b] = [corner((face + 1) % 4), corner((face + 2) % 4)];
+        let [a, b, c] = [1, 2, 3].map(|i| corner((face + i) % 4));
         let length = norm(sub(a, b));
-        let by: Vec<Vec3> = feet(region, &points).iter().zip(&points).map(|(q, p)| sub(*q, *p)).collect();
+        let normal = unit(cross(sub(b, a), sub(c, a)));
+        let outward = if dot(normal, sub(corner(face), a)) > 0.0 { scale(normal, -1.0) } else { normal };
+        let by: Vec<Vec3> = feet_facing(region, &points, &vec![outward; points.len()])
+            .iter()
+            .zip(&points)
+            .map(|(q, p)| sub(*q, *p))
+            .collect();
         if by.iter().all(|d| norm(*d) < FLAT * length) {
             return None;
         }
@@ -199,15 +205,15 @@ fn keys(map: &Tets, t: usize) -> [[u32; 2]; 6] {
 
 /// The moves of the nodes of some edges, of those that are moved.
 fn edge_moves(map: &Tets, curves: &Curves, some: &[BoundaryEdge], n: usize) -> Vec<([u32; 2], Vec<Vec3>)> {
-    let (mut points, mut sides) = (Vec::new(), Vec::new());
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
     for e in some {
         let [a, b] = e.nodes.map(|v| map.nodes()[v as usize]);
         for k in 1..n {
             points.push(add(a, scale(sub(b, a), k as f64 / n as f64)));
-            sides.push(e.sides);
+            faces.push(e.faces);
         }
     }
-    let feet = edge_feet(&*curves.region, &points, &sides);
+    let feet = edge_feet(&*curves.region, &points, &faces);
     let by: Vec<Vec3> = feet.iter().zip(&points).map(|(q, p)| sub(*q, *p)).collect();
     let each = some.iter().zip(by.chunks(n - 1)).filter_map(|(e, by)| {
         let [a, b] = e.nodes.map(|v| map.nodes()[v as usize]);

@@ -1,6 +1,7 @@
 //! A background of tetrahedra that is cut along the surfaces of a solid, one after another.
 
 use super::node_surfaces::{SurfaceSet, members};
+use super::patch_cuts::Patched;
 use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, sub};
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 
 /// A tetrahedron, positively oriented, and the surfaces of which it is known on which side it lies.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tet {
+pub(crate) struct Tet {
     pub nodes: [u32; 4],
     /// Surfaces whose function is negative in it.
     pub negative: SurfaceSet,
@@ -17,8 +18,10 @@ pub(super) struct Tet {
 }
 
 /// Tetrahedra that are cut along surfaces until each lies in one domain or in none.
-pub(super) struct Partition<'a> {
+pub(crate) struct Partition<'a> {
     pub surfaces: &'a [Surface],
+    /// Those of them that are meshes with feature edges, and are cut patch by patch.
+    pub patched: &'a [Patched],
     /// The domains; no two overlap.
     pub trees: &'a [CsgTree],
     pub nodes: Vec<Vec3>,
@@ -42,7 +45,7 @@ impl Tet {
     }
 
     /// Whether the side of a surface that is not known yet can decide whether it lies in a domain.
-    fn depends_on(&self, surface: usize, trees: &[CsgTree]) -> bool {
+    pub fn depends_on(&self, surface: usize, trees: &[CsgTree]) -> bool {
         if (self.negative | self.positive) >> surface & 1 == 1 {
             return false;
         }
@@ -110,7 +113,7 @@ impl Partition<'_> {
 }
 
 /// A node and its periodic images, along their cycle.
-pub(super) fn images(next: &[u32], n: u32) -> impl Iterator<Item = u32> {
+pub(crate) fn images(next: &[u32], n: u32) -> impl Iterator<Item = u32> {
     let mut at = Some(n);
     core::iter::from_fn(move || {
         let here = at?;
@@ -121,7 +124,7 @@ pub(super) fn images(next: &[u32], n: u32) -> impl Iterator<Item = u32> {
 }
 
 /// The periodic images of an edge other than itself.
-pub(super) fn edge_images(nodes: &[Vec3], next: &[u32], [a, b]: [u32; 2]) -> Vec<[u32; 2]> {
+pub(crate) fn edge_images(nodes: &[Vec3], next: &[u32], [a, b]: [u32; 2]) -> Vec<[u32; 2]> {
     let mut out = Vec::new();
     if next[a as usize] == a || next[b as usize] == b {
         return out;

@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use super::work::Around;
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{FACES, TetMesh, volume};
 
@@ -126,4 +125,24 @@ fn groups(mesh: &TetMesh, n: u32, tets: &[u32]) -> Vec<Vec<u32>> {
         groups.push(group.into_iter().map(|i| tets[i]).collect());
     }
     groups
+}
+
+/// The tetrahedra at each node.
+struct Around(Vec<Vec<u32>>);
+
+impl Around {
+    fn new(mesh: &TetMesh) -> Around {
+        let mut count = vec![0; mesh.nodes.len()];
+        mesh.tets.iter().flatten().for_each(|n| count[*n as usize] += 1);
+        let mut at: Vec<Vec<u32>> = count.into_iter().map(Vec::with_capacity).collect();
+        for (i, t) in (0..).zip(&mesh.tets) {
+            t.iter().for_each(|n| at[*n as usize].push(i));
+        }
+        Around(at)
+    }
+
+    /// The tetrahedra at node `n`.
+    fn of(&self, n: usize) -> &[u32] {
+        &self.0[n]
+    }
 }

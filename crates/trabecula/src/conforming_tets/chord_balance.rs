@@ -10,14 +10,14 @@ use rustc_hash::FxHashMap;
 use super::node_surfaces::{SurfaceSet, balanced, members};
 use super::partition::images;
 use super::shaping::{GONE, GOOD, Shaping};
+use super::tet_shape::shape;
 use crate::implicit::Surface;
-use crate::mesher::shape;
 use geometry::math::{Vec3, add, cross, norm, scale, sub};
 use geometry::tetmesh::FACES;
 
 /// Faces of the boundary and between domains, each once: its nodes, four times its tetrahedron (of the first domain) and the opposite
 /// corner, and whether no other tetrahedron has it. Only faces whose nodes all `may` be on one are searched.
-pub(super) fn interfaces(
+pub(crate) fn interfaces(
     tets: &[[u32; 4]],
     domain: &[u8],
     may: &(impl Fn(u32) -> bool + Sync),
@@ -46,7 +46,7 @@ pub(super) fn interfaces(
 }
 
 /// Signed distances of points from a surface, to first order.
-pub(super) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Item = f64> + use<> {
+pub(crate) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Item = f64> + use<> {
     let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
     surface.field.gradients(points, &mut v, &mut g);
     v.into_iter().zip(g).map(|(v, g)| v / norm(g).max(f64::MIN_POSITIVE))

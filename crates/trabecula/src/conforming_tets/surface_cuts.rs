@@ -6,8 +6,8 @@
 
 use super::node_surfaces::{SurfaceSet, only, onto};
 use super::partition::{Partition, Tet, images};
+use super::tet_shape::shape;
 use crate::field::Field;
-use crate::mesher::shape;
 use geometry::math::{Vec3, add, norm, sub};
 use geometry::tetmesh::{EDGES, volume};
 use rayon::prelude::*;
@@ -19,8 +19,10 @@ const BATCH: usize = 256;
 const LONG: f64 = 0.24999;
 const SHORT: f64 = 0.41189;
 const OTHER: f64 = 0.33;
-/// The least shape (`mesher::shape`) that moving a node may leave.
+/// The least shape (`tet_shape::shape`) that moving a node may leave.
 const LEAST: f64 = 0.4;
+/// Nodes closer to a patch than this fraction of the background's edges are on it.
+const ROUNDING: f64 = 1e-7;
 /// Greatest distance of a projected position from its crossing, as a fraction of the edge.
 const REACH: f64 = 0.5;
 
@@ -45,22 +47,29 @@ struct Mark {
 impl Partition<'_> {
     /// Cuts the tetrahedra that depend on a surface along it. `step` are the edges of the background's cubes (mm).
     pub fn cut(&mut self, surface: usize, step: f64) {
-        let dependent = self.dependent(surface);
-        let mut values = self.values(surface, &dependent);
-        let crossings = self.crossings(surface, &dependent, &values);
+        match self.patched.iter().find(|p| p.mesh == surface) {
+            Some(patched) => self.cut_by_patches(patched, step),
+            None => self.cut_where(surface, &self.dependent(surface), step),
+        }
+        self.drop_outside();
+    }
+
+    /// Cuts some tetrahedra along a surface.
+    pub fn cut_where(&mut self, surface: usize, dependent: &[bool], step: f64) {
+        let mut values = self.values(surface, dependent, step);
+        let crossings = self.crossings(surface, dependent, &values);
         if !crossings.is_empty() {
             self.snap(surface, &crossings, &mut values, step);
         }
         let marks = self.mark(surface, &crossings, &mut values);
         let straight = self.project(surface, &marks);
-        self.bisect(surface, &dependent, &marks, &values);
+        self.bisect(surface, dependent, &marks, &values);
         self.straighten(&straight);
-        self.drop_outside();
     }
 
     /// Values of the surface's function at the nodes of some tetrahedra, zero at nodes on it, NaN elsewhere; the same at periodic
     /// images.
-    fn values(&mut self, surface: usize, of: &[bool]) -> Vec<f64> {
+    pub fn values(&mut self, surface: usize, of: &[bool], step: f64) -> Vec<f64> {
         let bit = only(surface);
         let mut values = vec![f64::NAN; self.nodes.len()];
         let mut needed = vec![false; self.nodes.len()];
@@ -80,11 +89,13 @@ impl Partition<'_> {
         for (n, v) in ask.iter().zip(found) {
             values[*n] = v;
         }
+        // Corners of a mesh in which more than three patches meet.
+        let rounding = if self.patched.iter().any(|p| p.groups().contains(&surface)) { ROUNDING * step } else { 0.0 };
         for n in 0..needed.len() {
             if needed[n] && next[n] as usize != n {
                 values[n] = values[first(n)];
             }
-            if needed[n] && (values[n] == 0.0 || self.on[n] & bit != 0) {
+            if needed[n] && (values[n].abs() <= rounding || self.on[n] & bit != 0) {
                 values[n] = 0.0;
                 self.on[n] |= bit;
             }
@@ -365,7 +376,7 @@ fn divided(t: Tet, marks: &[&Mark], out: &mut Vec<Tet>) {
 }
 
 /// Values of a field at points, on all threads.
-pub(super) fn evaluated(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
+pub(crate) fn evaluated(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
     let mut out = vec![0.0; points.len()];
     out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
     out

@@ -8,8 +8,8 @@ use rustc_hash::FxHashMap;
 use super::chord_balance::{distances, interfaces};
 use super::node_surfaces::{HELD, SurfaceSet, members, only};
 use super::shaping::Shaping;
+use super::tet_shape::shape;
 use crate::implicit::Surface;
-use crate::mesher::shape;
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 

@@ -4,24 +4,24 @@ use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, dot, inverse, norm, scale, sub};
 
 /// Most surfaces of a solid.
-pub(super) const MOST: usize = 127;
+pub(crate) const MOST: usize = 127;
 /// The set of nodes that stay where they are: where tetrahedra were removed, the boundary follows no surface.
-pub(super) const HELD: SurfaceSet = 1 << MOST;
+pub(crate) const HELD: SurfaceSet = 1 << MOST;
 /// Newton steps.
 const STEPS: usize = 12;
 /// Greatest distance from a surface left out for its dependent gradient, as a fraction of the reach.
 const OFF: f64 = 2e-3;
 
 /// A set of surfaces, one bit for each number.
-pub(super) type SurfaceSet = u128;
+pub(crate) type SurfaceSet = u128;
 
 /// The set of one surface.
-pub(super) fn only(surface: usize) -> SurfaceSet {
+pub(crate) fn only(surface: usize) -> SurfaceSet {
     1 << surface
 }
 
 /// The numbers of a set, ascending.
-pub(super) fn members(mut set: SurfaceSet) -> impl Iterator<Item = usize> {
+pub(crate) fn members(mut set: SurfaceSet) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let next = set.trailing_zeros() as usize;
         set &= set.wrapping_sub(1);
@@ -94,7 +94,7 @@ fn exact(surfaces: &[Surface], set: SurfaceSet, mut p: Vec3) -> Vec3 {
 
 /// The position on all surfaces of a set near `p`, by Newton's method with shortest steps; `None` if it is farther than
 /// `reach` (mm) from `p`, or there are more than three surfaces.
-pub(super) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -> Option<Vec3> {
+pub(crate) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -> Option<Vec3> {
     if set.count_ones() > 3 || set & HELD != 0 {
         return None;
     }
@@ -117,7 +117,7 @@ pub(super) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -
 }
 
 /// The part of a displacement that is tangent to all surfaces of a set at `p`.
-pub(super) fn tangent(surfaces: &[Surface], set: SurfaceSet, p: Vec3) -> Tangent {
+pub(crate) fn tangent(surfaces: &[Surface], set: SurfaceSet, p: Vec3) -> Tangent {
     if set & HELD != 0 {
         return Tangent::Fixed;
     }
@@ -136,7 +136,7 @@ pub(super) fn tangent(surfaces: &[Surface], set: SurfaceSet, p: Vec3) -> Tangent
 
 /// The directions in which a node may move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Tangent {
+pub(crate) enum Tangent {
     /// All.
     Free,
     /// Those normal to this.
@@ -160,7 +160,7 @@ impl Tangent {
 }
 
 /// The displacement of a node on a set of surfaces by given distances (mm) along their gradients; nothing along those without.
-pub(super) fn balanced(surfaces: &[Surface], set: SurfaceSet, p: Vec3, wanted: &[(usize, f64)]) -> Option<Vec3> {
+pub(crate) fn balanced(surfaces: &[Surface], set: SurfaceSet, p: Vec3, wanted: &[(usize, f64)]) -> Option<Vec3> {
     if set & HELD != 0 {
         return None;
     }

@@ -4,13 +4,13 @@ use rayon::prelude::*;
 
 use super::node_surfaces::{SurfaceSet, onto, tangent};
 use super::partition::images;
+use super::tet_shape::shape;
 use crate::implicit::Surface;
-use crate::mesher::shape;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::tetmesh::FACES;
 
 /// Shapes better than this are left as they are: dihedral angles of 22 to 149 degrees.
-pub(super) const GOOD: f64 = 4.2;
+pub(crate) const GOOD: f64 = 4.2;
 /// For shapes worse than this all directions are tried: dihedral angles of 15 to 159 degrees.
 const POOR: f64 = 1.9;
 /// Rounds of moves, collapses and flips.
@@ -22,10 +22,10 @@ const STEPS: [f64; 4] = [0.3, 0.15, 0.07, 0.03];
 /// The least relative gain.
 const GAIN: f64 = 1.001;
 /// A tetrahedron that was removed.
-pub(super) const GONE: [u32; 4] = [u32::MAX; 4];
+pub(crate) const GONE: [u32; 4] = [u32::MAX; 4];
 
 /// A mesh that is being improved.
-pub(super) struct Shaping<'a> {
+pub(crate) struct Shaping<'a> {
     pub surfaces: &'a [Surface],
     pub nodes: Vec<Vec3>,
     /// The surfaces on which each node stays.

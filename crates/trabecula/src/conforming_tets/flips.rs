@@ -5,7 +5,7 @@
 
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
-use crate::mesher::shape;
+use super::tet_shape::shape;
 use geometry::math::{norm, sub};
 use geometry::tetmesh::{EDGES, FACES};
 

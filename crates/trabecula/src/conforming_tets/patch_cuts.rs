@@ -1,0 +1,140 @@
+//! Cuts along the patches of a mesh, group by group, so that its feature edges and corners are edges and nodes of tetrahedra.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::node_surfaces::{MOST, members, only};
+use super::partition::{Partition, Tet};
+use super::surface_cuts::evaluated;
+use crate::field::Field;
+use crate::implicit::Surface;
+use geometry::math::{Aabb, Interval, Vec3};
+use geometry::surface_patches::{PatchGroup, patch_groups};
+use rayon::prelude::*;
+
+/// A surface that is a mesh with feature edges, and the groups of its patches, which are surfaces too.
+pub(crate) struct Patched {
+    /// The number of the mesh among the surfaces.
+    pub mesh: usize,
+    /// The number of the first group.
+    first: usize,
+    groups: Vec<Arc<PatchGroup>>,
+}
+
+impl Patched {
+    /// The numbers of the groups.
+    pub fn groups(&self) -> Range<usize> {
+        self.first..self.first + self.groups.len()
+    }
+
+    /// Whether a patch of the group with this number meets a tetrahedron.
+    pub fn meets(&self, group: usize, corners: &[Vec3; 4]) -> bool {
+        self.groups[group - self.first].meets(corners)
+    }
+
+    /// The meshes among surfaces, whose groups are added to these if there are not too many. `size` is that of tetrahedra (mm).
+    pub fn of(surfaces: &mut Vec<Surface>, size: f64) -> Vec<Patched> {
+        let mut found = Vec::new();
+        for mesh in 0..surfaces.len() {
+            let Some(of) = surfaces[mesh].mesh.clone() else { continue };
+            let groups: Vec<Arc<PatchGroup>> = patch_groups((*of).as_ref(), size).into_iter().map(Arc::new).collect();
+            if groups.is_empty() || surfaces.len() + groups.len() > MOST {
+                continue;
+            }
+            let first = surfaces.len();
+            surfaces.extend(groups.iter().map(|g| Surface::distance(Arc::new(GroupField(g.clone())))));
+            found.push(Patched { mesh, first, groups });
+        }
+        found
+    }
+}
+
+/// A group of patches as a field.
+struct GroupField(Arc<PatchGroup>);
+
+impl Field for GroupField {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+    }
+
+    fn bound(&self, _: &Aabb) -> Interval {
+        Interval::new(f64::NEG_INFINITY, f64::INFINITY)
+    }
+}
+
+impl Partition<'_> {
+    /// Cuts tetrahedra along the patches of a mesh that meet them, and notes on which side of it all lie.
+    pub fn cut_by_patches(&mut self, patched: &Patched, step: f64) {
+        for g in patched.groups() {
+            let dependent = self.met(patched, g);
+            self.cut_where(g, &dependent, step);
+        }
+        self.settle(patched, step);
+    }
+
+    /// Which tetrahedra depend on a mesh and meet a group of its patches.
+    fn met(&self, patched: &Patched, group: usize) -> Vec<bool> {
+        let of = |t: &Tet| t.depends_on(patched.mesh, self.trees) && patched.meets(group, &self.corners(t));
+        self.tets.par_iter().map(of).collect()
+    }
+
+    /// Holds nodes of the background on the planes, and on the patches of meshes, on which they lie already, so that cuts along other
+    /// surfaces do not move them away.
+    pub fn hold_nodes(&mut self, own: usize, step: f64) {
+        let all = vec![true; self.tets.len()];
+        for s in 0..own {
+            match self.patched.iter().find(|p| p.mesh == s) {
+                Some(patched) => patched.groups().for_each(|g| {
+                    let dependent = self.met(patched, g);
+                    self.values(g, &dependent, step);
+                }),
+                None if self.surfaces[s].plane.is_some() => drop(self.values(s, &all, step)),
+                None => {}
+            }
+        }
+    }
+
+    /// Notes on which side of a mesh tetrahedra lie that have been cut along it.
+    ///
+    /// The node farthest from the surface decides. Where all nodes are on it, the middle does; chords may have put that on the wrong
+    /// side of a curved patch, and so the side that the cut along the patch has found counts if it is the nearest one.
+    fn settle(&mut self, patched: &Patched, step: f64) {
+        /// Nodes are off the surface if they are farther away than this fraction of the background's edges.
+        const OFF: f64 = 1e-4;
+        /// Distances that differ by less than this fraction of those edges are those of one place.
+        const ROUNDING: f64 = 1e-9;
+        let field = &*self.surfaces[patched.mesh].field;
+        let mut used = vec![false; self.nodes.len()];
+        self.tets.iter().flat_map(|t| t.nodes).for_each(|n| used[n as usize] = true);
+        let asked: Vec<usize> = (0..used.len()).filter(|n| used[*n]).collect();
+        let points: Vec<Vec3> = asked.iter().map(|n| self.nodes[*n]).collect();
+        let mut values = vec![0.0; self.nodes.len()];
+        asked.iter().zip(evaluated(field, &points)).for_each(|(n, v)| values[*n] = v);
+        let groups = patched.groups().fold(0, |set, g| set | only(g));
+        let (nodes, surfaces) = (&self.nodes, self.surfaces);
+        self.tets.par_iter_mut().for_each(|t| {
+            let farthest = t
+                .nodes
+                .map(|n| values[n as usize])
+                .into_iter()
+                .fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+            let inside = if farthest.abs() > OFF * step {
+                farthest < 0.0
+            } else {
+                let p = t.nodes.map(|n| nodes[n as usize]);
+                let middle = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
+                let v = field.value(middle);
+                let nearest = |g: &usize| (surfaces[*g].field.value(middle).abs() - v.abs()).abs() <= ROUNDING * step;
+                match members((t.negative | t.positive) & groups).find(nearest) {
+                    Some(g) => t.negative & only(g) != 0,
+                    None => v < 0.0,
+                }
+            };
+            if inside { t.negative |= only(patched.mesh) } else { t.positive |= only(patched.mesh) }
+        });
+    }
+}
