@@ -420,7 +420,8 @@ class Mesh:
                 p = divided.Node(i).Transformed(moved)
                 self.points.append((p.X(), p.Y(), p.Z()))
             self.joined.extend(range(base, len(self.points)))
-            turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+            # A mirrored instance of a part is turned inside out.
+            turned = (face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED) != moved.IsNegative()
             for i in range(1, divided.NbTriangles() + 1):
                 a, b, c = (base - 1 + n for n in divided.Triangle(i).Get())
                 self.triangles.append((a, c, b) if turned else (a, b, c))
