@@ -762,8 +762,8 @@ class RegionReport(Report):
     """Lower and upper corner of its bounds, mm."""
     described_volume: float | None
     """Volume of the region as described, mm³, of a lattice over tetrahedra; else None."""
-    tessellated: list[TessellationReport]
-    """Files of CAD systems that the region is made of, as triangles."""
+    tessellated: list[TessellationReport] | None
+    """Files of CAD systems that the region is made of, as triangles; None if it is made of none."""
     volume: float
     """Volume of what the lattice fills, mm³: the region's, or of what it has in common with tetrahedra that are no mesh of
     it."""

@@ -127,8 +127,8 @@ pub(super) fn report(built: &Built) -> DesignReport {
     }
 }
 
-/// The files of CAD systems of a region.
-fn tessellated(region: &Region) -> Vec<TessellationReport> {
+/// The files of CAD systems of a region, if any.
+fn tessellated(region: &Region) -> Option<Vec<TessellationReport>> {
     let mut files = Vec::new();
     region.cad(&mut files);
     let told = |f: Arc<CadMesh>| TessellationReport {
@@ -140,7 +140,7 @@ fn tessellated(region: &Region) -> Vec<TessellationReport> {
         volume: f.volume,
         volume_error: f.volume.map(|exact| f.mesh.volume() / exact - 1.0),
     };
-    files.into_iter().map(told).collect()
+    (!files.is_empty()).then(|| files.into_iter().map(told).collect())
 }
 
 /// Share of a volume by which sums over tetrahedra and over triangles may differ.

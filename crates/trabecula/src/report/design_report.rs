@@ -89,9 +89,9 @@ pub struct RegionReport {
     /// Volume of the region as described, mm³, of a lattice over tetrahedra; else None.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub described_volume: Option<f64>,
-    /// Files of CAD systems that the region is made of, as triangles.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub tessellated: Vec<TessellationReport>,
+    /// Files of CAD systems that the region is made of, as triangles; None if it is made of none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tessellated: Option<Vec<TessellationReport>>,
 }
 
 /// A file of a CAD system as triangles.
