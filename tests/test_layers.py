@@ -282,9 +282,21 @@ def test_pictures_have_the_area_of_layers(part, tmp_path):
         assert large.shape == (180, 200) and (large[10:170, 20:180] == image).all()
 
 
+def test_a_tiff_by_another_reader(part, tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    layers = part.layers(0.8)
+    layers.save(tmp_path / "a.tif", pixel=0.1)
+    layers.save(tmp_path / "a.npy", pixel=0.1)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert (file.asarray() == np.load(tmp_path / "a.npy")[:, ::-1].T).all()
+        assert file.imagej_metadata["slices"] == len(layers) and file.imagej_metadata["spacing"] == pytest.approx(0.8)
+        dots, unit = file.pages[0].tags["XResolution"].value, file.pages[0].tags["ResolutionUnit"].value
+        assert dots[0] / dots[1] == pytest.approx(100) and unit == 3  # a centimetre
+
+
 def test_the_same_bytes_for_any_number_of_threads(part, tmp_path):
-    for suffix in ("cli", "svg", "3mf", "zip", "sl1", "npy"):
-        pictures = {"pixel": 0.2} if suffix in ("zip", "sl1", "npy") else {}
+    for suffix in ("cli", "svg", "3mf", "zip", "sl1", "tif", "npy"):
+        pictures = {"pixel": 0.2} if suffix in ("zip", "sl1", "tif", "npy") else {}
         files = []
         for threads in (1, 2):
             path = tmp_path / f"{threads}.{suffix}" if suffix != "sl1" else tmp_path / str(threads) / "a.sl1"
@@ -321,7 +333,7 @@ def test_bad_layers_are_refused(arguments, why):
 @pytest.mark.parametrize(
     ("name", "arguments", "why"),
     [
-        ("a.png", {}, "the name must end in .cli, .svg, .3mf, .sl1, .zip, .npy"),
+        ("a.png", {}, "the name must end in .cli, .svg, .3mf, .sl1, .zip, .tif, .npy"),
         ("a.zip", {}, "give pixel"),
         ("a.cli", {"pixel": 0.1}, "pixel and size are for pictures"),
         ("a.svg", {"binary": True}, "binary is for .cli"),

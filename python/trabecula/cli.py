@@ -12,13 +12,14 @@ from .camera import VIEWS
 from .completion import SHELLS, script
 from .formats import (
     BEAM_WRITES,
+    CAD_READS,
     CONDUCTIVITY_WRITES,
     DESIGNS,
     LAW_WRITES,
     LAYER_WRITES,
-    MESH_READS,
     MESH_WRITES,
     MESHES,
+    PART_READS,
     PERMEABILITY_WRITES,
     STDIN,
     STEP_WRITES,
@@ -207,10 +208,10 @@ PLAIN = option("--voxels", action="store_true", help="plain voxels: solid if the
 #: The mesh formats that are written, each with what is particular to it.
 WRITTEN = ", ".join(f".{suffix}" + (" (binary)" if row.binary else "") for suffix, row in MESHES.items() if row.writes)
 DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for standard input", "DESIGN", True)
-DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
+DESIGN_OR_MESH = file("file", (*DESIGNS, *PART_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
 MEASURED = file(
     "file",
-    (*DESIGNS, *MESH_READS, *VOLUME_READS),
+    (*DESIGNS, *PART_READS, *VOLUME_READS),
     "a design, a mesh or a file of tetrahedra; - is a design on standard input",
     stdin=True,
 )
@@ -243,7 +244,7 @@ COMMANDS = {
             option("--cell", default="gyroid", metavar="NAME", help="a named cell; see `trabecula cells`"),
             option("--beams", metavar="NAME", help="a unit cell of beams; see `trabecula cells --beams`"),
         ],
-        file("--part", MESH_READS, "the part to fill, a closed mesh; without it a box", "PART"),
+        file("--part", PART_READS, "the part to fill, a closed mesh or a STEP file; without it a box", "PART"),
         option("--skin", type=LENGTH, metavar="MM", help="a skin of this thickness, mm"),
         option("--schema", action="store_true", help="also write design-schema.json, by which editors complete and check keys"),
         option("--force", action="store_true", help="replace the file if it exists"),
@@ -327,7 +328,7 @@ COMMANDS = {
         "The mesh must be closed and free of self-intersection.\n\n"
         "examples:\n  trabecula simplify part.stl -o light.stl --tolerance 0.02\n"
         "  trabecula simplify part.3mf -o light.3mf --triangles 200000",
-        file("file", MESH_READS, "a mesh file, mm"),
+        file("file", PART_READS, "a mesh file, mm"),
         *(output(MESH_WRITES, "the mesh to write"), *LIGHTER, PROGRESS, JSON),
     ),
     "volume": (
@@ -442,8 +443,8 @@ COMMANDS = {
     "slice": (
         "Slice a design into layers for a machine, from its field and without a mesh; or at one height.",
         "The name of OUT decides the format: .cli (--binary or text), .svg, .3mf (slices), or pictures of a --pixel in .zip\n"
-        "(PNG), .sl1 (resin printers) or .npy. Contours are within the tolerance of the section in the middle of each layer\n"
-        "and have its area; grey is the exact area fraction of a pixel. Layers are written while they are made.\n"
+        "(PNG), .sl1 (resin printers), .tif or .npy. Contours are within the tolerance of the section in the middle of each\n"
+        "layer and have its area; grey is the exact area fraction of a pixel. Layers are written while they are made.\n"
         "With --z a design that is beams alone is cut in exact conic arcs (also with --beams, uncut by region and skin).\n\n"
         "examples:\n  trabecula slice part.toml -o part.cli --layer 0.05 --binary\n"
         "  trabecula slice part.toml -o part.3mf --layer 0.05 --tolerance 0.002\n"
@@ -483,7 +484,7 @@ COMMANDS = {
         MEASURED,
         file(
             "--region",
-            (*DESIGNS, *MESH_READS),
+            (*DESIGNS, *PART_READS),
             "region of the solid fraction: a design, a file with a [region] alone, or a closed mesh in mm",
             "R",
         ),
@@ -502,6 +503,15 @@ COMMANDS = {
             help="also weakly attached fragments of a design: necks under half the lattice's narrowest",
         ),
         *(TRANSITIONS, JSON, *NOTICES),
+    ),
+    "faces": (
+        "List the faces of a STEP or IGES file: by these names a design opens its skin, keeps places solid and holds sets.",
+        "A face goes by its name, its colour or its number; faces of one name go together.\n"
+        "Needs pip install 'trabecula[cad]'.\n\n"
+        "examples:\n  trabecula faces part.step\n  trabecula faces assembly.step --solid bracket --json",
+        file("file", CAD_READS, "a file from a CAD system (.step, .stp, .iges, .igs)"),
+        option("--solid", metavar="NAME", help="of this solid alone"),
+        JSON,
     ),
     "cells": (
         "List the named cells: formula, space group, range, fractions in one piece, source.",

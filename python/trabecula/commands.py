@@ -11,7 +11,7 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
+from .formats import DESIGNS, PART_READS, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .measuring import draw, measure, transitions
 from .mesh import region_of_file
@@ -23,7 +23,7 @@ from .texts import counted
 
 # fmt: off
 __all__ = [
-    "cells", "check", "conductivity", "doctor", "law", "measure", "mesh", "new", "permeability", "render", "report",
+    "cells", "check", "conductivity", "doctor", "faces", "law", "measure", "mesh", "new", "permeability", "render", "report",
     "schema", "simplify", "slice", "stiffness", "studio", "sweep", "tets", "volume", "voxels",
 ]
 # fmt: on
@@ -47,7 +47,7 @@ def new(args) -> None:
         low, high = region_of_file(args.part).bounds
         path = os.path.relpath(os.path.abspath(args.part), os.path.dirname(os.path.abspath(args.file)))
         part = (path.replace(os.sep, "/"), [b - a for a, b in zip(low, high, strict=True)])
-    meshes = "/".join(MESH_READS).upper()
+    meshes = "/".join(PART_READS).upper()
     named = SCHEMA_FILE if args.schema else None
     texts = [(args.file, starter(os.path.basename(args.file), args.cell, args.beams, part, args.skin, meshes, named))]
     texts += [(beside, _core.schema())] if beside else []
@@ -80,6 +80,22 @@ def check(args) -> None:
     if report.chord is None and (coarser := solid.spacing()) > report.spacing:
         expect.append(f"        mesh takes {coarser:.3g} mm, or there would be more than 20 million triangles")
     print("\n".join(map(str, [report, *expect, *found])))
+
+
+def faces(args) -> None:
+    """``trabecula faces``."""
+    from .cad import read
+
+    part = read(args.file, solid=args.solid)
+    settle()
+    listed = [{"number": i, "name": name, "color": color, "area": area} for i, (name, color, area) in enumerate(part.labels, 1)]
+    if args.json:
+        return put_json({"solids": part.solids, "volume": part.volume, "faces": listed})
+    print(f"{'face':>5}  {'name':20} {'colour':8} {'area (mm²)':>12}")
+    for row in listed:
+        print(f"{row['number']:5}  {row['name'] or '-':20} {row['color'] or '-':8} {figure(row['area']):>12}")
+    within = "" if part.volume is None else f", volume {figure(part.volume)} mm³"
+    print(f"{counted(len(part.solids), 'solid')}: {', '.join(name or '-' for name in part.solids)}{within}")
 
 
 def voxels(args) -> None:

@@ -9,8 +9,10 @@ from . import _core
 
 __all__ = [
     *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "LAW_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
-    *("DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES"),
+    *("CAD_READS", "DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS"),
     *(
+        "MESH_WRITES",
+        "PART_READS",
         "RESULT_READS",
         "TET_READS",
         "TET_WRITES",
@@ -31,6 +33,9 @@ STDIN = "-"
 #: The mesh formats by suffix.
 MESHES = {row.suffix: row for row in _core.mesh_formats()}
 MESH_READS = tuple(MESHES)
+#: Files of CAD systems, and all that holds a part.
+CAD_READS = ("step", "stp", "iges", "igs")
+PART_READS = (*MESH_READS, *CAD_READS)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
 #: The exact surface of beams alone, for CAD systems.
 STEP_WRITES = ("step", "stp")

@@ -9,7 +9,7 @@ from functools import cached_property
 from . import _core
 from .camera import section_plane, towards
 from .files import extension, read_text, whole_file
-from .formats import DESIGNS, MESH_READS, MESH_WRITES
+from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, number, positive, whole
 from .machine import file_size, fits
 from .thickness import Thickness
@@ -104,13 +104,25 @@ class Mesh(Picture, Transformed):
         return Mesh(_core.Mesh.of(places, corners.astype(np.int64)))
 
     @staticmethod
-    def read(path: str | os.PathLike[str]) -> Mesh:
-        """Reads a mesh file (stl, 3mf, ply, obj, off; any letter case).
+    def read(
+        path: str | os.PathLike[str], chord: float | None = None, angle: float | None = None, solid: str | None = None
+    ) -> Mesh:
+        """Reads a mesh file (stl, 3mf, ply, obj, off; any letter case), or the solids of a file from a CAD system (step, stp,
+        iges, igs; with the extra ``cad``).
 
         Corners of an STL file that differ by no more than single precision rounds are one, if it would not be closed else.
+        The faces of a CAD system become triangles within ``chord`` mm of them (a five-thousandth of the diagonal of the bounds
+        unless given) that turn by at most ``angle`` degrees (15 unless given); ``solid`` names the one that is read.
         """
         name = os.fsdecode(path)
-        kind = extension(name, MESH_READS)
+        kind = extension(name, PART_READS)
+        if kind in CAD_READS:
+            from .cad import read
+
+            part = read(name, chord, angle, solid)
+            return Mesh.of(part.points, part.triangles)
+        if (chord, angle, solid) != (None, None, None):
+            raise ValueError(f"{name}: chord, angle and solid are for files from CAD systems; a .{kind} holds triangles")
         data = _core.read_file(name)
         try:
             return Mesh(_core.Mesh.read(data, kind))
@@ -536,7 +548,7 @@ def _revived(state: tuple, known: dict) -> Mesh:
 def region_of_file(name: str) -> _core.Region:
     """The region in a file: a design, a region alone, or a mesh."""
     folder = os.path.dirname(os.path.abspath(name))
-    kind = extension(name, (*DESIGNS, *MESH_READS))
-    if kind in MESH_READS:
+    kind = extension(name, (*DESIGNS, *PART_READS))
+    if kind in PART_READS:
         return _core.Region.from_data({"region": {"mesh": {"path": os.path.abspath(name)}}}, folder)
     return _core.Region.from_text(read_text(name), kind == "json", name, folder)

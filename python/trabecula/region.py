@@ -14,6 +14,7 @@ __all__ = [
     "capsule",
     "cylinder",
     "difference",
+    "faces",
     "halfspace",
     "intersection",
     "mesh",
@@ -104,18 +105,46 @@ def mesh(
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
     caps: float | None = None,
+    chord: float | None = None,
+    angle: float | None = None,
+    solid: str | None = None,
 ) -> dict:
-    """A triangle mesh from a file (stl, 3mf, ply, obj, off).
+    """A triangle mesh from a file (stl, 3mf, ply, obj, off), or the solids of a part from a CAD system (step, iges).
 
     path: Path of the file, relative to the design file.
-    unit: Unit of the file's coordinates (mm unless given); a 3MF file names its own. [optional]
+    unit: Unit of the file's coordinates (mm unless given); 3MF, STEP and IGES files name their own. [optional]
     scale: Factor on all coordinates, after the unit. [above 0, default 1.0]
     repair: Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
         [default "auto"]
     caps: Greatest share of the surface that caps of holes may make up, 0 to 1: a cap is a guess, flat over a flat hole.
         [from 0 to 1, default 0.1]
+    chord: Of a STEP or IGES file: greatest distance of its faces from their triangles (a five-thousandth of the
+        diagonal of its bounds unless given). [mm, above 0, optional]
+    angle: Of a STEP or IGES file: greatest angle, degrees, between the normals of a face within a triangle (15 unless
+        given). [above 0 to 90, optional]
+    solid: Of a STEP or IGES file: name of the solid that is read (all of them unless given). [optional]
     """
-    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair, caps=caps)}
+    given = settings(
+        path=os.fspath(path),
+        unit=unit,
+        scale=scale,
+        repair=repair,
+        caps=caps,
+        chord=chord,
+        angle=angle,
+        solid=solid,
+    )
+    return {"mesh": given}
+
+
+@named
+def faces(named: Sequence[str], within: float) -> dict:
+    """All points within a distance of faces of the design's region, as its STEP file names them.
+
+    named: The faces, each by its name, its colour such as "#ff0000", or its number in the file.
+    within: Distance from them. [mm, above 0]
+    """
+    return {"faces": settings(named=named, within=within)}
 
 
 @named

@@ -50,6 +50,7 @@ __all__ = [
     "StepReport",
     "StiffnessReport",
     "SurfaceReport",
+    "TessellationReport",
     "TetMeshReport",
     "TetQualityReport",
     "ThicknessReport",
@@ -753,10 +754,16 @@ class RbfReport(Report):
 class RegionReport(Report):
     """The region of a design."""
 
+    _parts = {
+        "tessellated": "TessellationReport",
+    }
+
     bounds: list[list[float]]
     """Lower and upper corner of its bounds, mm."""
     described_volume: float | None
     """Volume of the region as described, mm³, of a lattice over tetrahedra; else None."""
+    tessellated: list[TessellationReport] | None
+    """Files of CAD systems that the region is made of, as triangles; None if it is made of none."""
     volume: float
     """Volume of what the lattice fills, mm³: the region's, or of what it has in common with tetrahedra that are no mesh of
     it."""
@@ -968,6 +975,25 @@ class SurfaceReport(Report):
     """Number of triangles."""
     volume: float
     """Enclosed volume, mm³."""
+
+
+class TessellationReport(Report):
+    """A file of a CAD system as triangles."""
+
+    angle: float
+    """Greatest angle between the normals of a face within a triangle, degrees."""
+    chord: float
+    """Greatest distance between faces and triangles that was asked for, mm."""
+    faces: int
+    """Number of faces."""
+    path: str
+    """The file."""
+    triangles: int
+    """Number of triangles."""
+    volume: float | None
+    """Volume within the exact faces, mm³; None where the file holds faces alone, which were sewn."""
+    volume_error: float | None
+    """Relative error of the triangles' volume: of first order in the chord error on curved faces."""
 
 
 class TetMeshReport(Report):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -60,6 +61,10 @@ def _design(it: Report) -> Iterator[str]:
     else:
         off = 100 * (volume / described - 1)
         yield f"region  {extent} mm, {figure(described)} mm³, of which tetrahedra have {figure(volume)} mm³ ({off:+.1f} %)"
+    for part in it.region.tessellated or ():
+        off = "" if part.volume_error is None else f", its volume to {100 * part.volume_error:+.2g} %"
+        name = os.path.basename(part.path)
+        yield f"  {name}: {part.triangles} triangles within {figure(part.chord)} mm of {part.faces} faces{off}"
     for name, lattice in it.lattices.items():
         yield f"lattice {name}: {lattice.part}, wavelength {figure(lattice.wavelength)} mm"
         yield from _lattice(lattice)

@@ -83,7 +83,7 @@ pub fn nearest<'a>(word: &str, allowed: impl IntoIterator<Item = &'a str>) -> Op
     let limit = (word.chars().count() / 3).max(2);
     allowed
         .into_iter()
-        .map(|a| (strsim::osa_distance(&word, a), a))
+        .map(|a| (strsim::osa_distance(&word, &a.to_lowercase()), a))
         .filter(|&(d, a)| d <= limit && d < a.chars().count().max(word.chars().count()))
         .min_by_key(|&(d, _)| d)
         .map(|(_, a)| a)

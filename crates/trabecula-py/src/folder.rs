@@ -7,7 +7,7 @@ use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use trabecula::design::{Loader, Scan, ZonedElements};
+use trabecula::design::{CadMesh, FaceLabel, Loader, Scan, Tessellation, ZonedElements};
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
@@ -42,6 +42,10 @@ impl Loader for Folder {
 
     fn result(&self, path: &str, array: &str) -> Result<Data, String> {
         result(&self.0.join(Path::new(path)).to_string_lossy(), array)
+    }
+
+    fn cad(&self, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
+        cad(path, &self.0.join(Path::new(path)).to_string_lossy(), how)
     }
 
     fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
@@ -132,6 +136,34 @@ fn scan(path: &str) -> Result<Scan, String> {
             let (shape, origin, step, values): ([usize; 3], [f64; 3], [f64; 3], PyReadonlyArray1<'_, f64>) =
                 read.extract()?;
             Ok(Scan { shape, values: values.as_array().to_vec(), placed: Some([origin, step]) })
+        };
+        read().map_err(|e| words(py, &e))
+    })
+}
+
+/// The part of a CAD system that Python read; `name` is the file as the design names it.
+fn cad(name: &str, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
+    Python::attach(|py| {
+        let read = || -> PyResult<CadMesh> {
+            let read = py.import("trabecula.cad")?.getattr("read")?;
+            let part = read.call1((path, how.chord, how.angle, how.solid.as_deref()))?;
+            let points: PyReadonlyArray2<'_, f64> = part.getattr("points")?.extract()?;
+            let triangles: PyReadonlyArray2<'_, u32> = part.getattr("triangles")?.extract()?;
+            let face: PyReadonlyArray1<'_, u32> = part.getattr("faces")?.extract()?;
+            let labels: Vec<(String, String, f64)> = part.getattr("labels")?.extract()?;
+            let triangles = triangles.as_array();
+            Ok(CadMesh {
+                file: name.into(),
+                mesh: Mesh {
+                    vertices: rows(&points),
+                    triangles: triangles.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect(),
+                },
+                face: face.as_array().to_vec(),
+                labels: labels.into_iter().map(|(name, color, _)| FaceLabel { name, color }).collect(),
+                chord: part.getattr("chord")?.extract()?,
+                angle: part.getattr("angle")?.extract()?,
+                volume: part.getattr("volume")?.extract()?,
+            })
         };
         read().map_err(|e| words(py, &e))
     })

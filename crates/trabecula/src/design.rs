@@ -24,6 +24,7 @@ mod finish_tiling;
 mod joins;
 mod sample;
 mod sets_kind;
+mod skin_kind;
 mod study_kind;
 mod surface_net;
 #[cfg(test)]
@@ -60,6 +61,7 @@ use geometry::repair::Repaired;
 
 pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
+pub use crate::region::{CadMesh, FaceLabel, Tessellation};
 pub use build_blend::Blended;
 pub use build_tets::{TetReport, Tets};
 pub use cell_zones::CellZone;
@@ -68,6 +70,7 @@ pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
 pub use sets_kind::*;
+pub use skin_kind::*;
 pub use study_kind::*;
 
 /// A lattice part, as data.
@@ -312,7 +315,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
         build::region_of(&Design::from_node(node)?, loader)
     } else {
         let alone = RegionFile::read(&At::root(node))?;
-        environment::region(&alone.region, "region", loader, &mut crate::region::Notes::default())
+        environment::region(&alone.region, "region", loader, None, &mut crate::region::Notes::default())
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));

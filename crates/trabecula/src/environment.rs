@@ -7,7 +7,7 @@ pub(crate) use picture_stack::{names_pictures, picture_stack};
 
 use crate::csg_tree::CsgSolid;
 use crate::kind::DesignError;
-use crate::region::{Context, HalfSpace, HalfSpaceKind, Notes, Region, RegionKind};
+use crate::region::{CadMesh, Context, Files, HalfSpace, HalfSpaceKind, Notes, Region, RegionKind, Tessellation};
 use geometry::formats::{Data, Elements, RESULTS};
 use geometry::math::Vec3;
 use geometry::mesh::Mesh;
@@ -40,6 +40,12 @@ pub trait Loader {
     fn result(&self, path: &str, array: &str) -> Result<Data, String> {
         let _ = array;
         Err(format!("{path}: the name must end in {}", RESULTS.join(", ")))
+    }
+
+    /// The solids of the STEP or IGES file at `path` as triangles, in mm, each closed; or one sentence why not.
+    fn cad(&self, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
+        let _ = how;
+        Err(format!("{path}: STEP and IGES are read by the Python package alone; export the part as stl or 3mf"))
     }
 
     /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this
@@ -94,15 +100,28 @@ impl Environment<'_> {
     }
 }
 
-/// The region at `path`; its warnings and repairs are added to `notes`.
+/// The files of a loader that regions are made of.
+struct RegionFiles<'a>(&'a dyn Loader);
+
+impl Files for RegionFiles<'_> {
+    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        self.0.load(path)
+    }
+
+    fn cad(&self, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
+        self.0.cad(path, how)
+    }
+}
+
+/// The region at `path`, which may name faces of `part`; its warnings and repairs are added to `notes`.
 pub(crate) fn region(
     kind: &RegionKind,
     path: &str,
     loader: &dyn Loader,
+    part: Option<&Region>,
     notes: &mut Notes,
 ) -> Result<Region, DesignError> {
-    let load = |file: &str| loader.load(file);
-    kind.build(&mut Context::new(path, &load, notes)).map_err(|f| DesignError::fault(path, f))
+    kind.build(&mut Context::new(path, &RegionFiles(loader), part, notes)).map_err(|f| DesignError::fault(path, f))
 }
 
 /// The half-space at `path`.

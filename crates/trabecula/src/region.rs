@@ -11,13 +11,16 @@ use geometry::math::Aabb;
 use geometry::repair::Repaired;
 
 mod bodies;
+mod cad;
 mod capsule;
 mod csg;
 mod cuboid;
 mod cylinder;
 mod distance_table;
+mod faces;
 mod file;
 mod halfspace;
+mod halving;
 mod mesh;
 mod meshes;
 mod offset;
@@ -25,10 +28,12 @@ mod primitive;
 mod sphere;
 mod tetrahedron;
 
+pub use cad::{CAD, CadMesh, FaceLabel, Tessellation};
 pub use csg::{Difference, Intersection, Union};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use distance_table::DistanceTable;
+pub use faces::{FaceSet, FacesKind};
 pub use file::MeshFile;
 pub use halfspace::{HalfSpace, HalfSpaceKind};
 pub use mesh::MeshRegion;
@@ -48,6 +53,7 @@ pub enum RegionKind {
     Tetrahedron(tetrahedron::TetrahedronKind),
     HalfSpace(HalfSpaceKind),
     Mesh(MeshFile),
+    Faces(FacesKind),
     Union(csg::UnionKind),
     Intersection(csg::IntersectionKind),
     Difference(csg::DifferenceKind),
@@ -76,16 +82,31 @@ pub(crate) struct Notes {
     pub repairs: Vec<(String, Repaired)>,
 }
 
-/// Where a region is built: its path in the design, and where files come from.
+/// Where regions get files from.
+pub(crate) trait Files {
+    /// The bytes of a file, or a sentence that says why there are none.
+    fn load(&self, path: &str) -> Result<Vec<u8>, String>;
+
+    /// The triangles of a file of a CAD system, or a sentence that says why there are none.
+    fn cad(&self, path: &str, how: &Tessellation) -> Result<CadMesh, String>;
+}
+
+/// Where a region is built: its path in the design, where files come from, and the part whose faces may be named.
 pub(crate) struct Context<'a> {
     path: String,
-    load: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
+    files: &'a dyn Files,
+    part: Option<&'a Region>,
     notes: &'a mut Notes,
 }
 
 impl<'a> Context<'a> {
-    pub fn new(path: &str, load: &'a dyn Fn(&str) -> Result<Vec<u8>, String>, notes: &'a mut Notes) -> Self {
-        Context { path: path.into(), load, notes }
+    pub fn new(path: &str, files: &'a dyn Files, part: Option<&'a Region>, notes: &'a mut Notes) -> Self {
+        Context { path: path.into(), files, part, notes }
+    }
+
+    /// The region of the design, where it is known already.
+    fn part(&self) -> Option<&'a Region> {
+        self.part
     }
 
     /// Builds the value of `key`, or of an index such as "[0]"; a fault has the key before its path.
@@ -105,7 +126,7 @@ impl<'a> Context<'a> {
 
     /// The bytes of a file, or a sentence that says why there are none.
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-        (self.load)(path)
+        self.files.load(path)
     }
 
     /// Warns of the kind that is being built.
@@ -116,6 +137,21 @@ impl<'a> Context<'a> {
     /// Keeps what was repaired in a mesh.
     fn repaired(&mut self, done: Repaired) {
         self.notes.repairs.push((self.path.clone(), done));
+    }
+}
+
+/// A part of a region's surface that is left open.
+#[derive(Clone, Debug)]
+pub enum Cut {
+    /// Flat faces on the plane of a half-space that face as its normal does.
+    Plane(HalfSpace),
+    /// Faces of a CAD system.
+    Faces(FaceSet),
+}
+
+impl From<HalfSpace> for Cut {
+    fn from(plane: HalfSpace) -> Cut {
+        Cut::Plane(plane)
     }
 }
 
@@ -171,10 +207,15 @@ pub trait Shape: Field {
         None
     }
 
+    /// Adds the files of CAD systems that the shape is made of.
+    fn cad(&self, out: &mut Vec<Arc<CadMesh>>) {
+        let _ = out;
+    }
+
     /// The same region without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;
     /// `None` if at none. (Faces that are planes by themselves stay: a caller of `surfaces` can drop them.)
-    fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+    fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
         let _ = (cuts, found);
         None
     }

@@ -11,7 +11,7 @@ use crate::csg_tree::{CsgSolid, CsgTree, Sign};
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::implicit::Surface;
-use crate::region::{HalfSpace, Region};
+use crate::region::{Cut, HalfSpace, Region};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, norm, scale, sub, unit};
 
@@ -24,11 +24,11 @@ const ON: f64 = 1e-9;
 
 /// The skin of a region: all of it that is at most `thickness` (mm, positive in the region) below its surface.
 ///
-/// Nothing grows from the flat faces that lie on the planes of `open` and face as they do.
+/// Nothing grows from the faces of `open`: flat ones on its planes that face as they do, and those that a CAD system names.
 ///
 /// # Errors
-/// An opening on which the region has no flat face; openings that leave no surface. `Fault::at` is `open[i]` or `open`.
-pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<CsgSolid, Fault> {
+/// An opening on which the region has no face; openings that leave no surface. `Fault::at` is `open[i]` or `open`.
+pub fn skin(region: &Region, thickness: &Grade, open: &[Cut]) -> Result<CsgSolid, Fault> {
     let bounds = region.bounds();
     let least = thickness.bound(&bounds).lo.max(LEAST);
     let mut found = vec![false; open.len()];
@@ -42,7 +42,7 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<Cs
         .map(|surface| {
             let mut gone = false;
             for (cut, found) in open.iter().zip(&mut found) {
-                let here = lies_on(&*surface.field, cut, least, &bounds);
+                let here = matches!(cut, Cut::Plane(cut) if lies_on(&*surface.field, cut, least, &bounds));
                 *found |= here;
                 gone |= here;
             }
@@ -103,7 +103,14 @@ fn lies_on(surface: &dyn Field, cut: &HalfSpace, depth: f64, bounds: &Aabb) -> b
     level && gradients.iter().all(|g| norm(sub(*g, n)) <= ON)
 }
 
-fn no_face(i: usize, cut: &HalfSpace) -> Fault {
+fn no_face(i: usize, cut: &Cut) -> Fault {
+    let cut = match cut {
+        Cut::Plane(cut) => cut,
+        Cut::Faces(set) => {
+            let message = format!("no part of the region's surface is left of the faces {}", set.names().join(", "));
+            return Fault::new(format!("open[{i}]"), message);
+        }
+    };
     let [p, n] = [cut.point(), cut.normal()].map(|v| v.map(number).join(", "));
     let message = format!(
         "the region has no flat face on the plane through ({p}) mm that faces ({n}); open names flat faces of the region, \

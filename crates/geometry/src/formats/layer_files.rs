@@ -15,6 +15,7 @@ mod layer_array;
 mod png_stack;
 mod slice_stack;
 mod svg_layers;
+mod tiff_pages;
 
 pub use coverage::Raster;
 
@@ -127,6 +128,14 @@ pub const LAYER_FORMATS: &[LayerFormat] = &[
         uniform: false,
         encode: png_stack::encode,
         open: png_stack::open_zip,
+    },
+    LayerFormat {
+        suffix: "tif",
+        title: "TIFF, a page of grey for each layer",
+        pictures: true,
+        uniform: true,
+        encode: tiff_pages::encode,
+        open: tiff_pages::open,
     },
     LayerFormat {
         suffix: "npy",

@@ -50,7 +50,7 @@ fn given(
     loader: &dyn Loader,
     notes: &mut Notes,
 ) -> Result<(Region, Option<build_tets::Tets>), DesignError> {
-    match environment::region(&d.region, "region", loader, notes) {
+    match environment::region(&d.region, "region", loader, None, notes) {
         Ok(region) => Ok((region, None)),
         Err(why) => {
             let (made, region) = build_tiling::of_soup(d, loader, why)?;

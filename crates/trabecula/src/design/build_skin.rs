@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use super::built_report::Varied;
-use super::data::{OpenPlace, OpenSpec, SkinSpec};
+use super::skin_kind::{OpenPlace, OpenSpec, SkinSpec};
 use super::{Design, Loader, sample};
 use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
-use crate::region::{HalfSpace, Intersection, Notes, Region};
+use crate::region::{Cut, FaceSet, HalfSpace, Intersection, Notes, Region};
 use crate::skin::{outside, skin};
 use geometry::fault::number;
 use geometry::math::Vec3;
@@ -33,7 +33,7 @@ pub(super) fn filled(
     }
     for (name, spec) in &d.keep.0 {
         let path = format!("keep.{name}");
-        let zone = environment::region(spec, &path, loader, notes)?;
+        let zone = environment::region(spec, &path, loader, Some(region), notes)?;
         check_zone(&zone, region, points, &path, "the part would be solid")?;
         let mut surfaces = Vec::new();
         let tree = zone.surfaces(0.0, &mut surfaces);
@@ -74,21 +74,25 @@ fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Resul
     let (mut faces, mut places, mut openings) = (Vec::new(), Vec::new(), Vec::new());
     for (i, open) in spec.open.iter().enumerate() {
         let path = format!("skin.open[{i}]");
-        let face = match open {
+        let face: Cut = match open {
+            OpenSpec::Place(OpenPlace::Faces(of)) => {
+                let named = FaceSet::new(Some(region), &of.faces);
+                Cut::Faces(named.map_err(|f| DesignError::fault(&format!("{path}.faces"), f))?)
+            }
             OpenSpec::Place(OpenPlace::Region(r)) => {
                 let path = format!("{path}.region");
-                let opening = environment::region(&r.region, &path, loader, notes)?;
+                let opening = environment::region(&r.region, &path, loader, Some(region), notes)?;
                 check_zone(&opening, region, points, &path, "there would be no skin")?;
                 openings.push(opening);
                 continue;
             }
-            OpenSpec::Place(OpenPlace::Plane(h)) => environment::half_space(h, &path)?,
+            OpenSpec::Place(OpenPlace::Plane(h)) => environment::half_space(h, &path)?.into(),
             OpenSpec::Side(side) => {
                 let (axis, upper) = side.axis();
                 let mut normal = [0.0; 3];
                 normal[axis] = if upper { 1.0 } else { -1.0 };
                 let point = if upper { bounds.max } else { bounds.min };
-                HalfSpace::new(point, normal).map_err(|f| DesignError::fault("skin.open", f))?
+                HalfSpace::new(point, normal).map_err(|f| DesignError::fault("skin.open", f))?.into()
             }
         };
         faces.push(face);

@@ -73,7 +73,7 @@ impl Tets {
             spec.check(&Key::NONE).map_err(|f| DesignError::fault(&path, f))?;
             let region_spec = region_of(node)?;
             let mut notes = crate::region::Notes::default();
-            let region = match environment::region(&region_spec, "region", loader, &mut notes) {
+            let region = match environment::region(&region_spec, "region", loader, None, &mut notes) {
                 Ok(region) => region,
                 Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
             };
@@ -190,7 +190,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let mut notes = crate::region::Notes::default();
     if let TetsKind::Made(made) = spec {
-        mesh.zones = zones(&mesh, made, &environment.path, environment.loader, &mut notes)?;
+        mesh.zones = zones(&mesh, made, &environment.path, environment.loader, Some(environment.region), &mut notes)?;
     }
     let own = environment.region.volume().unwrap_or_else(|| {
         let (_, share) = sample::inside(environment.region, 25 * sample::COUNT);
@@ -223,6 +223,7 @@ fn zones(
     made: &MadeTetsKind,
     path: &str,
     loader: &dyn Loader,
+    part: Option<&crate::region::Region>,
     notes: &mut crate::region::Notes,
 ) -> Result<Vec<i64>, DesignError> {
     if made.zones.is_empty() {
@@ -236,7 +237,7 @@ fn zones(
     let mut of: Vec<Option<i64>> = vec![None; middles.len()];
     for (&zone, spec) in &made.zones {
         let path = format!("{path}.zones.{zone}");
-        let region = environment::region(spec, &path, loader, notes)?;
+        let region = environment::region(spec, &path, loader, part, notes)?;
         let mut values = vec![0.0; middles.len()];
         region.values(&middles, &mut values);
         let mut count = 0;
@@ -297,7 +298,7 @@ pub(super) fn of_soup(
     };
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
     let mut notes = crate::region::Notes::default();
-    mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
+    mesh.zones = zones(&mesh, made, path, loader, None, &mut notes)?;
     let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, true)?;
     made.warnings.extend(notes.warnings);
     let message = format!("no region, so the boundary of the tetrahedra is taken for one: {}", why.message);

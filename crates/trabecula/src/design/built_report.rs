@@ -1,6 +1,7 @@
 //! The report on a design, without meshing it.
 
 use std::cell::LazyCell;
+use std::sync::Arc;
 
 use super::build_blend::Functions;
 use super::default_spacing::spacing;
@@ -11,6 +12,7 @@ use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Period, SingularLine, Spread};
+use crate::region::{CadMesh, Region};
 use crate::report::*;
 use crate::truss::Beams;
 use geometry::math::Mat3;
@@ -112,6 +114,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
         volume,
         volume_exact: exact.is_some() && described.is_none_or(|own| (volume / own - 1.0).abs() < ROUNDING),
         described_volume: described,
+        tessellated: tessellated(region),
     };
     DesignReport {
         spacing: spacing(built, &lattices, &beams),
@@ -122,6 +125,22 @@ pub(super) fn report(built: &Built) -> DesignReport {
         warnings: built.warnings.clone(),
         blend: built.blend.as_ref().map(blend),
     }
+}
+
+/// The files of CAD systems of a region, if any.
+fn tessellated(region: &Region) -> Option<Vec<TessellationReport>> {
+    let mut files = Vec::new();
+    region.cad(&mut files);
+    let told = |f: Arc<CadMesh>| TessellationReport {
+        path: f.file.clone(),
+        chord: f.chord,
+        angle: f.angle,
+        triangles: f.mesh.triangles.len(),
+        faces: f.labels.len(),
+        volume: f.volume,
+        volume_error: f.volume.map(|exact| f.mesh.volume() / exact - 1.0),
+    };
+    (!files.is_empty()).then(|| files.into_iter().map(told).collect())
 }
 
 /// Share of a volume by which sums over tetrahedra and over triangles may differ.

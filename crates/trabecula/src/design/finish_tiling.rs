@@ -63,7 +63,8 @@ impl<'a> Finish<'a> {
             (net, _) => net.as_deref().cloned().unwrap_or_default(),
         };
         let mut notes = Notes::default();
-        let on = net.on.map(|on| environment::region(&on, &format!("{map}.net.on"), environment.loader, &mut notes));
+        let Environment { loader, region, .. } = *environment;
+        let on = net.on.map(|on| environment::region(&on, &format!("{map}.net.on"), loader, Some(region), &mut notes));
         Ok(Finish {
             ends: joined.surface,
             region: environment.region.clone(),

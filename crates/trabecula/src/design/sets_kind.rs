@@ -49,7 +49,7 @@ pub(super) fn sets(
     let mut made = Vec::new();
     for (name, spec) in &d.set.0 {
         let path = format!("set.{name}");
-        let zone = environment::region(spec, &path, loader, notes)?;
+        let zone = environment::region(spec, &path, loader, Some(region), notes)?;
         let (b, r) = (zone.bounds(), region.bounds());
         if (0..3).any(|k| b.min[k] > r.max[k] || b.max[k] < r.min[k]) || b.is_empty() {
             let corner = |v: [f64; 3]| v.map(number).join(", ");

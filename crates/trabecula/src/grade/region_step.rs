@@ -20,7 +20,8 @@ pub struct WithinKind {
 impl BuildGrade for WithinKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let (path, mut notes) = (format!("{}.of", of.path), Notes::default());
-        let region = environment::region(&self.of, &path, of.environment.loader, &mut notes)?;
+        let region =
+            environment::region(&self.of, &path, of.environment.loader, Some(of.environment.region), &mut notes)?;
         of.function(region_step(region, self.width))
     }
 }

@@ -297,7 +297,8 @@ impl PhaseKind {
             return Err(DesignError::new(format!("{path}.fix"), message));
         }
         let built = |(i, of): (usize, &RegionKind)| {
-            environment::region(of, &format!("{path}.fix[{i}]"), environment.loader, &mut Notes::default())
+            let Environment { loader, region, .. } = *environment;
+            environment::region(of, &format!("{path}.fix[{i}]"), loader, Some(region), &mut Notes::default())
         };
         self.fix.iter().enumerate().map(built).collect()
     }

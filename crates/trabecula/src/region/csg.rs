@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::meshes::{List, Meshes};
-use super::{BuildRegion, Context, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
+use super::{BuildRegion, CadMesh, Context, Cut, MeshRegion, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -273,8 +273,12 @@ macro_rules! joined {
                 (meshes.which.len() == self.regions().len()).then(|| &*meshes.one)
             }
 
+            fn cad(&self, out: &mut Vec<Arc<CadMesh>>) {
+                self.regions().iter().for_each(|r| r.cad(out));
+            }
+
             // What is taken away keeps its surface: grown, it has no flat faces of its own.
-            fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+            fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
                 let mut any = false;
                 let mut open = |(i, r): (usize, &Region)| {
                     let opened = if self.negated(i) { None } else { r.clone().opened(cuts, found) };
@@ -355,7 +359,7 @@ mod tests {
     #[test]
     fn bounds_follow_the_parts() {
         let [b, s, _] = parts();
-        let open: Region = Arc::new(HalfSpace::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap());
+        let open: Region = Arc::new(crate::region::HalfSpace::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap());
         let i = Intersection::new(vec![b.clone(), open.clone()]).unwrap();
         assert_eq!(i.bounds().max, [1.2, 0.8, 0.0]);
         assert!(!Union::new(vec![b.clone(), open]).unwrap().bounds().is_finite());

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{HalfSpace, Offset, Region, Shape, one_surface};
+use super::{CadMesh, Cut, Offset, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -26,6 +26,8 @@ pub struct MeshRegion {
     bounds: Aabb,
     volume: f64,
     planes: [Vec<f64>; 3],
+    /// The file of a CAD system that it comes from.
+    cad: Option<Arc<CadMesh>>,
     /// Computed at first use.
     creases: OnceLock<Arc<Creases>>,
 }
@@ -51,8 +53,14 @@ impl MeshRegion {
             volume: distance.mesh().volume(),
             planes: [0, 1, 2].map(|axis| planes(distance.triangles(), &bounds, axis)),
             distance,
+            cad: None,
             creases: OnceLock::new(),
         }
+    }
+
+    /// The solid with the faces of the file that it comes from.
+    pub(super) fn of_cad(self, cad: CadMesh) -> Self {
+        MeshRegion { cad: Some(Arc::new(cad)), ..self }
     }
 
     /// The boundary that everything is taken from: the mesh given if it was clean, else the repaired one.
@@ -160,7 +168,11 @@ impl Shape for MeshRegion {
         Some(self)
     }
 
-    fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+    fn cad(&self, out: &mut Vec<Arc<CadMesh>>) {
+        out.extend(self.cad.clone());
+    }
+
+    fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
         open::opened(self, cuts, found)
     }
 

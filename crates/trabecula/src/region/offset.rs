@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, Context, Region, RegionKind, Shape};
+use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -92,6 +92,10 @@ impl Shape for Offset {
 
     fn is_searched(&self) -> bool {
         self.of.is_searched()
+    }
+
+    fn cad(&self, out: &mut Vec<Arc<CadMesh>>) {
+        self.of.cad(out);
     }
 
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {

@@ -89,6 +89,28 @@ pub struct RegionReport {
     /// Volume of the region as described, mm³, of a lattice over tetrahedra; else None.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub described_volume: Option<f64>,
+    /// Files of CAD systems that the region is made of, as triangles; None if it is made of none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tessellated: Option<Vec<TessellationReport>>,
+}
+
+/// A file of a CAD system as triangles.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TessellationReport {
+    /// The file.
+    pub path: String,
+    /// Greatest distance between faces and triangles that was asked for, mm.
+    pub chord: f64,
+    /// Greatest angle between the normals of a face within a triangle, degrees.
+    pub angle: f64,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of faces.
+    pub faces: usize,
+    /// Volume within the exact faces, mm³; None where the file holds faces alone, which were sewn.
+    pub volume: Option<f64>,
+    /// Relative error of the triangles' volume: of first order in the chord error on curved faces.
+    pub volume_error: Option<f64>,
 }
 
 /// A blend of lattices.

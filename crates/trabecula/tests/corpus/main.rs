@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use geometry::math::{cross, norm, sub};
 use geometry::measure::size;
+use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use rayon::prelude::*;
 use toml::{Table, Value};
 use trabecula::cell::{Cell, Part, Series, catalogue};
-use trabecula::design::{Design, Loader};
+use trabecula::design::{CadMesh, Design, FaceLabel, Loader, Tessellation};
 use trabecula::surface_maker::{Islands, Options};
 
 /// Samples per smallest wavelength, where a row does not name another number.
@@ -32,6 +33,31 @@ impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
         std::fs::read(self.0.join(path)).map_err(|e| format!("{path}: {e}"))
     }
+
+    /// The triangles that scripts/step_parts.py has put next to the file.
+    fn cad(&self, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
+        let text = self.load(&path.replace(".step", ".json"))?;
+        let Triangles { points, triangles, faces, labels, volume } =
+            serde_json::from_slice(&text).map_err(|e| e.to_string())?;
+        Ok(CadMesh {
+            file: path.into(),
+            mesh: Mesh { vertices: points, triangles },
+            face: faces,
+            labels: labels.into_iter().map(|[name, color]| FaceLabel { name, color }).collect(),
+            chord: how.chord.ok_or("no chord error")?,
+            angle: how.angle.ok_or("no angle")?,
+            volume: Some(volume),
+        })
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct Triangles {
+    points: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    faces: Vec<u32>,
+    labels: Vec<[String; 2]>,
+    volume: f64,
 }
 
 fn number(value: &Value) -> f64 {

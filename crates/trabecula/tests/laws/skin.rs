@@ -14,7 +14,7 @@ use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade, Linear};
 use trabecula::implicit::Implicit;
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
+use trabecula::region::{Cut, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
 use trabecula::skin::{outside, skin};
 use trabecula::solid::Solid;
 
@@ -58,6 +58,10 @@ fn half(point: Vec3, normal: Vec3) -> HalfSpace {
     HalfSpace::new(point, normal).expect("half-space")
 }
 
+fn cuts(planes: &[HalfSpace]) -> Vec<Cut> {
+    planes.iter().map(|p| Cut::Plane(*p)).collect()
+}
+
 fn zone(region: &Region) -> CsgSolid {
     let mut surfaces = Vec::new();
     let tree = region.clone().surfaces(0.0, &mut surfaces);
@@ -71,7 +75,7 @@ fn filled(region: &Region, field: Arc<dyn Implicit>, filled: Vec<CsgSolid>) -> S
 
 /// The skin alone.
 fn shell(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Solid {
-    let skin = skin(region, thickness, open).expect("skin");
+    let skin = skin(region, thickness, &cuts(open)).expect("skin");
     filled(region, Arc::new(Nothing), vec![skin])
 }
 
@@ -158,7 +162,7 @@ fn area(mesh: &Mesh, i: usize) -> f64 {
 fn the_lattice_shows_on_the_open_face_alone() {
     let region = cuboid([0.0; 3], [8.0; 3]);
     let open = [half([0.0, 0.0, 8.0], [0.0, 0.0, 1.0])];
-    let body = skin(&region, &Grade::Constant(0.5), &open).expect("skin");
+    let body = skin(&region, &Grade::Constant(0.5), &cuts(&open)).expect("skin");
     let s = surface(&filled(&region, gyroid(0.3, 4.0), vec![body]), 0.125, &Silent).expect("surface");
     check("open lattice", &s);
     let on = |axis: usize, at: f64| -> f64 {
@@ -247,7 +251,7 @@ fn slanted_faces_open_too() {
 #[test]
 fn openings_without_a_flat_face_are_refused() {
     let w = Grade::Constant(0.2);
-    let at = |region: &Region, open: &[HalfSpace]| skin(region, &w, open).err().map(|f| f.at);
+    let at = |region: &Region, open: &[HalfSpace]| skin(region, &w, &cuts(open)).err().map(|f| f.at);
     let top = half([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
     assert_eq!(at(&ball([0.0; 3], 1.0), &[top]).as_deref(), Some("open[0]"));
     let block = cuboid([-1.0; 3], [1.0; 3]);
@@ -351,7 +355,7 @@ fn open_meshes_keep_their_bounds_and_blocks() {
     let s = surface(&Solid::new(region, None, 1.0), 0.9, &Silent).expect("surface");
     let region: Region = Arc::new(MeshRegion::new(s.mesh, Repair::Refuse).expect("mesh"));
     let cuts = [half([0.0, 0.0, 2.0], [0.0, 0.0, 1.0])];
-    let open = region.opened(&cuts, &mut [false]).expect("a flat face");
+    let open = region.opened(&cuts.map(Cut::Plane), &mut [false]).expect("a flat face");
     let axes: Vec<f64> = (0..40).map(|i| -1.0 + 0.153 * f64::from(i)).collect();
     let block = trabecula::field::Block { axes: [&axes, &axes[..30], &axes[3..35]] };
     let mut filled = vec![0f32; block.len()];
@@ -498,7 +502,7 @@ proptest! {
         };
         let top = half([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
         let open: &[HalfSpace] = if open && [0, 2, 3].contains(&kind) { &[top] } else { &[] };
-        let mut bodies = vec![skin(&region, &grade, open).expect("skin")];
+        let mut bodies = vec![skin(&region, &grade, &cuts(open)).expect("skin")];
         if boss.4 {
             bodies.push(zone(&shape(boss.0, boss.1, boss.2, boss.3).0));
         }

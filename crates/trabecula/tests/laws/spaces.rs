@@ -162,7 +162,7 @@ fn open_faces_belong_to_the_spaces() {
     let field = lattice_at("gyroid", Part::Sheet, level, [1.0; 3], [0.0; 3]);
     let region = cuboid([0.0; 3], [2.0, 2.0, 1.5]);
     let top = HalfSpace::new([0.0, 0.0, 1.5], [0.0, 0.0, 1.0]).expect("half-space");
-    let body = skin(&region, &Grade::Constant(0.1), &[top]).expect("skin");
+    let body = skin(&region, &Grade::Constant(0.1), &[top.into()]).expect("skin");
     let all = made(&Solid::new(region, Some(field), 1.0).with(body), 0.05);
     check_all("open face", &all);
     assert!((volume(&all) / 6.0 - 1.0).abs() < 1e-9);

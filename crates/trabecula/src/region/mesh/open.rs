@@ -1,10 +1,10 @@
-//! A mesh without its triangles on some planes: how far it is to the rest of its surface.
+//! A mesh without its triangles on some planes or faces: how far it is to the rest of its surface.
 
 use std::sync::Arc;
 
 use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
-use crate::region::{HalfSpace, Offset, Region, Shape};
+use crate::region::{Cut, HalfSpace, Offset, Region, Shape, halving};
 use geometry::distance::UNKNOWN;
 use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
@@ -16,26 +16,39 @@ const OFF: f64 = 1e-6;
 /// The least cosine between the normals of a plane and of a triangle on it.
 const FACING: f64 = 1.0 - 1e-6;
 
-/// Minus the distance to the triangles that are left, inside the mesh and on the far side of the planes; the distance
-/// elsewhere. There is no surface where triangles are missing, so the function runs on smoothly through the gap.
+/// A triangle that is left is as near as one that is missing if their squared distances agree so far: a corner of both.
+const AS_NEAR: f64 = 1.0 + 1e-12;
+
+/// Minus the distance to the triangles that are left, inside the mesh, on the far side of the planes and where a missing triangle
+/// of another face is the nearest; the distance elsewhere. There is no surface where triangles are missing, so the function runs on
+/// smoothly through the gap.
 struct OpenMesh {
     whole: Arc<MeshRegion>,
     /// The triangles that are left.
     rest: TriangleBvh,
-    cuts: Vec<HalfSpace>,
+    /// The planes on which triangles are missing.
+    planes: Vec<HalfSpace>,
+    /// Whether each triangle is missing that is on no plane; empty if none is.
+    missing: Vec<bool>,
 }
 
-/// The mesh without its triangles on the planes of `cuts`; `None` if there are none.
-pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+/// The mesh without its triangles on `cuts`; `None` if there are none.
+pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
     let off = OFF * norm(whole.bounds.size());
-    let on = |f: &Triangle, c: &HalfSpace| {
-        dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off)
+    let on = |f: &Triangle, c: &Cut| match c {
+        Cut::Plane(c) => dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off),
+        Cut::Faces(set) => set.hold(f, off),
     };
-    let mut rest = Vec::with_capacity(whole.distance.triangles().len());
+    let triangles = whole.distance.triangles();
+    let mut rest = Vec::with_capacity(triangles.len());
+    let mut missing = vec![false; triangles.len()];
     let mut used = vec![false; cuts.len()];
-    for f in whole.distance.triangles() {
+    for (f, missing) in triangles.iter().zip(&mut missing) {
         match cuts.iter().position(|c| on(f, c)) {
-            Some(i) => used[i] = true,
+            Some(i) => {
+                used[i] = true;
+                *missing = matches!(cuts[i], Cut::Faces(_));
+            }
             None => rest.push(*f),
         }
     }
@@ -43,10 +56,16 @@ pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bo
         return None;
     }
     found.iter_mut().zip(&used).for_each(|(f, used)| *f |= used);
-    let here = cuts.iter().zip(used).filter(|(_, used)| *used);
-    let cuts = here.map(|(c, _)| *c).collect();
+    let plane = |(c, used): (&Cut, bool)| match c {
+        Cut::Plane(plane) if used => Some(*plane),
+        _ => None,
+    };
+    let planes = cuts.iter().zip(used).filter_map(plane).collect();
+    if !missing.contains(&true) {
+        missing.clear();
+    }
     let rest = TriangleBvh::new(&rest);
-    Some(Arc::new(OpenMesh { whole, rest, cuts }))
+    Some(Arc::new(OpenMesh { whole, rest, planes, missing }))
 }
 
 impl OpenMesh {
@@ -54,12 +73,13 @@ impl OpenMesh {
     fn nearest(&self, p: Vec3, seeds: &mut [u32; 2]) -> (Nearest, f64) {
         let hit = self.rest.nearest(p, seeds[0]);
         seeds[0] = hit.triangle;
-        if self.cuts.iter().any(|c| c.value(p) >= 0.0) {
+        if self.planes.iter().any(|c| c.value(p) >= 0.0) {
             return (hit, -1.0);
         }
         let whole = self.whole.distance.nearest(p, seeds[1]);
         seeds[1] = whole.triangle;
-        let inside = self.whole.distance.signed(&whole, p, UNKNOWN) <= 0.0;
+        let before = self.missing.get(whole.triangle as usize) == Some(&true) && hit.square > whole.square * AS_NEAR;
+        let inside = before || self.whole.distance.signed(&whole, p, UNKNOWN) <= 0.0;
         (hit, if inside { -1.0 } else { 1.0 })
     }
 }
@@ -95,11 +115,12 @@ impl Field for OpenMesh {
         let (d, reach) = (hit.square.sqrt(), norm(b.size()) / 2.0);
         let reach = reach * (1.0 + 1e-12) + 2.0 * self.rest.rounding() + 1e-14 * d;
         let r = Interval::new(sign * d - reach, sign * d + reach);
-        // Outside the mesh the sign changes at a plane.
-        let parted = self.cuts.iter().any(|c| {
+        // Outside the mesh the sign changes at a plane, and between missing faces and others.
+        let parted = self.planes.iter().any(|c| {
             let side = c.bound(b);
             side.lo <= 0.0 && side.hi >= 0.0
         });
+        let parted = parted || (!self.missing.is_empty() && self.whole.bound(b).hi >= 0.0);
         if parted { r.union(-r) } else { r }
     }
 
@@ -115,13 +136,13 @@ impl Shape for OpenMesh {
 
     fn level_planes(&self, _: usize, _: f64, _: &mut Vec<f64>) {}
 
-    /// Halves the block until a part lies on one side of the level or is eight nodes: most nodes are never evaluated.
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-        if !block.is_empty() {
-            let widest = |axis: &[f64]| axis.windows(2).fold(0.0f64, |m, w| m.max(w[1] - w[0]));
-            let cell = norm(block.axes.map(widest));
-            self.fill_part(block, level, cell, [[0; 3], block.shape()], out);
-        }
+        let mut seeds = [0; 2];
+        let value = |p| {
+            let (hit, sign) = self.nearest(p, &mut seeds);
+            sign * hit.square.sqrt()
+        };
+        halving::fill(block, level, out, |b| self.bound(b), value);
     }
 
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<crate::implicit::Surface>) -> crate::csg_tree::CsgTree {
@@ -133,41 +154,5 @@ impl Shape for OpenMesh {
 
     fn volume(&self) -> Option<f64> {
         None
-    }
-}
-
-impl OpenMesh {
-    fn fill_part(&self, block: &Block, level: f64, cell: f64, [lo, hi]: [[usize; 3]; 2], out: &mut [f32]) {
-        let ends = [0, 1, 2].map(|a| [block.axes[a][lo[a]], block.axes[a][hi[a] - 1]]);
-        let b = Aabb { min: ends.map(|e| e[0]), max: ends.map(|e| e[1]) };
-        let r = self.bound(&b);
-        let far = (r.lo - level > cell).then_some(r.lo - level);
-        let far = far.or_else(|| (r.hi - level < -cell).then_some(r.hi - level));
-        let [nx, ny, _] = block.shape();
-        let size = b.size();
-        let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
-        let few = (0..3).map(|a| hi[a] - lo[a]).product::<usize>() <= 8;
-        if far.is_none() && !few && hi[longest] - lo[longest] > 1 {
-            let middle = (lo[longest] + hi[longest]) / 2;
-            let (mut end, mut begin) = (hi, lo);
-            end[longest] = middle;
-            begin[longest] = middle;
-            self.fill_part(block, level, cell, [lo, end], out);
-            self.fill_part(block, level, cell, [begin, hi], out);
-            return;
-        }
-        let mut seeds = [0; 2];
-        for k in lo[2]..hi[2] {
-            for j in lo[1]..hi[1] {
-                for i in lo[0]..hi[0] {
-                    let value = far.unwrap_or_else(|| {
-                        let p = [block.axes[0][i], block.axes[1][j], block.axes[2][k]];
-                        let (hit, sign) = self.nearest(p, &mut seeds);
-                        sign * hit.square.sqrt() - level
-                    });
-                    out[(k * ny + j) * nx + i] = value as f32;
-                }
-            }
-        }
     }
 }
