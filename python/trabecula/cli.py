@@ -622,7 +622,8 @@ COMMANDS = {
         option(
             "--show",
             choices=SHOWN,
-            help="of a solved map: angle, spacing or density off, the axes asked for, lines along them, its singular lines; "
+            help="local thickness of walls; of a solved map: angle, spacing or density off, the axes asked for, lines along them, "
+            "its singular lines; "
             "of a blend: which lattice is where",
         ),
         *(spacing(), THREADS, PROGRESS, *NOTICES),

@@ -8,7 +8,7 @@ from .files import check_place, whole_file
 from .formats import is_design
 from .inputs import build, meshed, surface
 from .mesh import Mesh
-from .shown import look
+from .shown import OF_MESH, look
 from .terminal import Progress, say, settle
 
 __all__ = ["render"]
@@ -21,7 +21,9 @@ def render(args) -> None:
     if args.show is None:
         made, shown = surface(args), {}
     elif not is_design(args.file):
-        raise Refused(f"{args.file} is a mesh; --show is for a design with a solved map (map.phase) or a blend")
+        if args.show not in OF_MESH:
+            raise Refused(f"{args.file} is a mesh; --show {args.show} is for a design with a solved map (map.phase) or a blend")
+        made, shown = surface(args), OF_MESH[args.show]
     else:
         solid = build(args.file)
         try:

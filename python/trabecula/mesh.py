@@ -272,6 +272,22 @@ class Mesh(Picture, Transformed):
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 
+    def thickness_at_vertices(
+        self,
+        step: float | None = None,
+        threads: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> NDArray[np.float64]:
+        """Local thickness of the solid (mm) at each vertex, (n,): the largest of the voxels around it, whose edge is ``step``
+        (mm; default as for ``thickness``), NaN where the solid is thinner than they are. The mesh must be closed; a
+        ValueError else.
+        """
+        wanted = None if step is None else positive("step", step)
+        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        spacing, shape, need = self._core.thickness_needs(None, wanted)
+        fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
+        return self._core.thickness_at_vertices(spacing, workers, progress)
+
     @property
     def porosity(self) -> float | None:
         """One minus the solid fraction."""
@@ -419,7 +435,7 @@ class Mesh(Picture, Transformed):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
-        color: ArrayLike | None = None,
+        color: ArrayLike | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
         shares: Mapping[str, ArrayLike] | None = None,
@@ -430,11 +446,11 @@ class Mesh(Picture, Transformed):
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
         ``color`` is a number for each vertex, shown on a scale that says ``label`` and goes over ``span``, or from the least
-        to the greatest. ``shares`` are instead numbers from 0 to 1 for each vertex by a name: each name has a colour, shares
-        mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they are ``width`` mm wide (1/100 of the diagonal
-        unless given) and are seen through the surface, which is pale unless it has colours. ``label`` is what colours say, or
-        else lines. ``section`` is what is kept of a closed surface, ``"z<10"``, ``"z>10"`` (mm), or by ``"z=10"`` what is
-        farther from the eye; the solid that is cut is hatched.
+        to the greatest; or ``"thickness"``, see ``thickness_at_vertices``. ``shares`` are instead numbers from 0 to 1 for each
+        vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they
+        are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is pale unless it has
+        colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed surface, ``"z<10"``,
+        ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched.
         """
         pixels = tuple(whole("size", v, 1, 16384) for v in size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
@@ -448,9 +464,13 @@ class Mesh(Picture, Transformed):
         plane = None if section is None else section_plane(section, towards(azimuth, elevation))
         return self._core.png(*pixels, *angles, tint, mixed, drawn, plane)
 
-    def _tint(self, color: ArrayLike, label: str, span: tuple[float, float] | None) -> tuple:
+    def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
 
+        if isinstance(color, str):
+            if color != "thickness":
+                raise ValueError(f'color is "{color}"; it must be numbers, one for each vertex, or "thickness"')
+            color, label = self.thickness_at_vertices(), label or "wall thickness, mm"
         values = self._at_vertices("color", color)
         if span is None:
             finite = values[np.isfinite(values)]
@@ -489,14 +509,14 @@ class Mesh(Picture, Transformed):
         wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
         return label, list(lines), found, wide / 2
 
-    def view(self, values: ArrayLike | None = None, label: str = "") -> View:
+    def view(self, values: ArrayLike | str | None = None, label: str = "", **look: Any) -> View:
         """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
-        for each vertex by which it is coloured, ``label`` says what they are, with their unit. Raises ValueError for any other
-        number of values.
+        for each vertex by which it is coloured, ``label`` says what they are, with their unit; or ``"thickness"``. Keywords
+        are how it is seen at first, such as ``section="z<4"``. Raises ValueError for any other number of values.
         """
         from .viewer import View
 
-        return View(self, values, label)
+        return View(self, values, label, **look)
 
     def render(
         self,
@@ -504,7 +524,7 @@ class Mesh(Picture, Transformed):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
-        color: ArrayLike | None = None,
+        color: ArrayLike | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
         shares: Mapping[str, ArrayLike] | None = None,

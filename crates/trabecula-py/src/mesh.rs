@@ -302,6 +302,19 @@ impl Mesh {
         report(py, "ThicknessReport", &told)
     }
 
+    /// Local thickness of the solid at each vertex (n,), mm, on voxels of edge `step` (mm); NaN where it is thinner than a step.
+    #[pyo3(signature = (step, threads=None, progress=None))]
+    fn thickness_at_vertices<'py>(
+        &self,
+        py: Python<'py>,
+        step: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let found = run(py, threads, progress, |p| analysis::thickness_at_vertices(&self.surface, step, p))?;
+        Ok(found.map_err(error::stopped)?.into_pyarray(py))
+    }
+
     /// Writes meshes, each with its name, to a 3MF at `path` as one object each; the design is that of the first one.
     #[staticmethod]
     fn write_objects(py: Python<'_>, path: PathBuf, objects: Vec<(String, Py<Mesh>)>, title: String) -> PyResult<()> {
