@@ -21,7 +21,7 @@ def main():
             (Path(folder) / name).write_text(design, encoding="utf-8")
         for words in re.findall(r"^trabecula (render .*)$", text, re.MULTILINE):
             subprocess.run([sys.executable, "-m", "trabecula", *words.split(), "--quiet"], cwd=folder, check=True)
-        for picture in sorted(Path(folder).glob("*.png")):
+        for picture in sorted(p for p in Path(folder).iterdir() if p.suffix in (".png", ".svg")):
             shutil.copy(picture, PICTURES)
             print(PICTURES / picture.name)
 

@@ -140,6 +140,8 @@ def test_a_browser_draws_the_widget_and_both_sides_hear_of_changes(mesh):
         page.evaluate("model.set('section', 'z<4')")
         assert page.evaluate(HATCHED) > 100 * max(nothing, 50)
         assert page.inner_text("[data-part=at]") == "z = 4.000 mm" and page.evaluate("model.saved") == 0
+        page.evaluate("model.set('color', 'overhang')")
+        assert page.input_value("[name=colours]") == "1"
         # The user turns the part and takes the other side.
         page.focus("canvas")
         page.keyboard.press("ArrowRight")

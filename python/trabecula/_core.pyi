@@ -416,4 +416,16 @@ class Mesh:
         shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
         lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
         section: tuple[tuple[float, float, float], float] | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> bytes: ...
+    def svg(
+        self,
+        width: int,
+        height: int,
+        azimuth: float,
+        elevation: float,
+        section: tuple[tuple[float, float, float], float] | None,
+        size: Sequence[float],
+        unit: str,
+    ) -> str: ...

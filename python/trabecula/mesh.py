@@ -7,7 +7,7 @@ import os
 from functools import cached_property
 
 from . import _core
-from .camera import section_plane, towards
+from .camera import BACKGROUNDS, section_plane, towards
 from .files import extension, read_text, whole_file
 from .formats import DESIGNS, MESH_READS, MESH_WRITES
 from .given import fixed, number, positive, whole
@@ -442,6 +442,8 @@ class Mesh(Picture, Transformed):
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
         section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
@@ -450,19 +452,48 @@ class Mesh(Picture, Transformed):
         vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they
         are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is pale unless it has
         colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed surface, ``"z<10"``,
-        ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched.
+        ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched. ``background`` is
+        ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in print. ValueError for
+        what cannot be drawn.
         """
-        pixels = tuple(whole("size", v, 1, 16384) for v in size)
-        angles = number("azimuth", azimuth), number("elevation", elevation)
-        if not all(map(math.isfinite, angles)):
-            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
+        if background not in BACKGROUNDS:
+            raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
+        inch = None if dpi is None else positive("dpi", dpi)
         if color is not None and shares is not None:
             raise ValueError("give color or shares, not both")
         tint = None if color is None else self._tint(color, label, span)
         mixed = None if shares is None else self._shares(shares, label)
         drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
-        plane = None if section is None else section_plane(section, towards(azimuth, elevation))
-        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane)
+        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane, background, inch)
+
+    def svg(
+        self,
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        section: str | None = None,
+        dpi: float | None = None,
+    ) -> str:
+        """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
+        where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
+        without hidden lines. A ``section`` is hatched; camera and section as for ``png``. ``size`` is in pixels, ``dpi`` of
+        them an inch: the drawing then has its size in mm. Contours, edges, section and hatching are a path each, by these
+        names. ValueError for what cannot be drawn.
+        """
+        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
+        if dpi is None:
+            return self._core.svg(*pixels, *angles, plane, [float(n) for n in pixels], "px")
+        wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+        return self._core.svg(*pixels, *angles, plane, [wide, round(wide * pixels[1] / pixels[0], 2)], "mm")
+
+    def _camera(self, size: tuple[int, int], azimuth: float, elevation: float, section: str | None) -> tuple:
+        """Pixels, angles and the plane of a section of a picture."""
+        pixels = tuple(whole("size", v, 1, 16384) for v in size)
+        angles = number("azimuth", azimuth), number("elevation", elevation)
+        if not all(map(math.isfinite, angles)):
+            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        return pixels, angles, None if section is None else section_plane(section, towards(*angles))
 
     def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
@@ -531,11 +562,21 @@ class Mesh(Picture, Transformed):
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
         section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> None:
-        """Writes a picture to a .png file; see ``png``."""
-        extension(path, ("png",))
+        """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
+
+        Raises ValueError for another suffix, for what cannot be drawn, and for an .svg with colours or lines.
+        """
+        if extension(path, ("png", "svg")) == "svg":
+            if color is not None or shares is not None or lines is not None:
+                raise ValueError("an .svg is a line drawing, without colours or lines: leave them out, or write a .png")
+            made = self.svg(size, azimuth, elevation, section, dpi).encode()
+        else:
+            made = self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi)
         with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section))
+            out.write(made)
 
     def _picture(self) -> Mesh:
         return self

@@ -252,7 +252,7 @@ function viewer(figure) {
   const position = () => { const a = "xyz".indexOf(state.axis); return head.min[a] + state.share * (head.max[a] - head.min[a]); };
   const seen = () => ({
     section: state.axis ? `${state.axis}${state.flip ? ">" : "<"}${+position().toPrecision(7)}` : "",
-    azimuth: state.azimuth, elevation: state.elevation, zoom: state.zoom, colour: COLOURS[state.colours], overhang: state.steep,
+    azimuth: state.azimuth, elevation: state.elevation, zoom: state.zoom, color: COLOURS[state.colours], overhang: state.steep,
   });
   function look(wanted) {
     const section = /^([xyz])([<>])(.+)$/.exec(wanted.section || "");
@@ -263,7 +263,7 @@ function viewer(figure) {
     } else if ("section" in wanted) state.axis = "";
     for (const key of ["azimuth", "elevation", "zoom"]) if (key in wanted) state[key] = wanted[key];
     if ("overhang" in wanted) state.steep = wanted.overhang;
-    if (COLOURS.includes(wanted.colour)) state.colours = COLOURS.indexOf(wanted.colour);
+    if (COLOURS.includes(wanted.color)) state.colours = COLOURS.indexOf(wanted.color);
     const control = (name) => figure.querySelector(`[name=${name}]`);
     control("axis").value = state.axis;
     control("share").value = state.share;

@@ -281,11 +281,12 @@ class View:
 
         Raises OSError if it cannot be written, ValueError for another suffix.
         """
-        if extension(path, ("html", "png", "svg")) == "html":
+        kind = extension(path, ("html", "png", "svg"))
+        if kind == "html":
             write_page(path, self.html(title))
             return
         colors = {}
-        if self.color == "values":
+        if self.color == "values" and kind == "png":
             colors = {"color": THICKNESS if self._computed else self._values, "label": self.label}
         self.mesh.render(path, size, self.azimuth, self.elevation, section=self.section or None, **colors)
 
