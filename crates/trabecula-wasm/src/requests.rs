@@ -24,6 +24,9 @@ use crate::resolution::{self, Resolution};
 /// Triangles of a mesh above which it is not drawn, and a picture of it must do.
 const DRAWN: usize = 1_500_000;
 
+/// Voxels at most of the thickness that colours a mesh: seconds.
+const VOXELS: f64 = 4e6;
+
 /// How many times the grid cells that are asked for make a picture of the whole wait.
 const FAR: f64 = 5.0;
 
@@ -234,7 +237,8 @@ impl Session {
 
     fn thickness(&self) -> Answer {
         let Some(surface) = &self.made else { return Err("there is no mesh yet".to_string().into()) };
-        let step = usual_step(surface, None);
+        let [x, y, z] = surface.mesh.bounds().size();
+        let step = usual_step(surface, None).max((x * y * z / VOXELS).cbrt());
         let found = thickness_at_vertices(surface, step, &Shown)?;
         let values: Vec<f32> = self.drawn.iter().map(|v| found[*v as usize] as f32).collect();
         let known = values.iter().filter(|t| t.is_finite());

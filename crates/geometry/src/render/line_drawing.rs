@@ -18,6 +18,8 @@ const SAMPLES: f64 = 3600.0;
 /// Of the width of the picture: that of contours and of edges, of hatching, and from one line of it to the next.
 const STROKES: [f64; 3] = [1.0 / 340.0, 1.0 / 500.0, 1.0 / 900.0];
 const HATCH: f64 = 1.0 / 75.0;
+/// Of the width of the picture: the length of edges that are too short to be drawn.
+const CRUMB: f64 = 0.012;
 
 /// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
 /// more than 35°, where it ends and between lattice and cuts; and the outline of a section, hatched. `size` is width and height in `unit`
@@ -46,7 +48,8 @@ pub fn line_drawing(
         let rows = samples[1].div_ceil(BAND) * BAND;
         let raster = Projected::of(surface, &camera, [samples[0], rows], section).draw(surface, 0, rows);
         let eye = add(camera.center, scale(camera.axes[2], camera.distance));
-        let lines = space_lines(surface, eye, section);
+        let least = CRUMB * samples[0] as f64 * camera.distance / camera.focal;
+        let lines = space_lines(surface, eye, section, least);
         let seen = Seen { camera: &camera, raster: &raster };
         let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
             lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();

@@ -47,9 +47,10 @@ fn key(a: u32, b: u32) -> EdgeKey {
     (a.min(b), a.max(b))
 }
 
-/// All lines of a surface as seen from `eye`; of a section only what is kept.
-pub(super) fn space_lines(surface: &SurfaceMesh, eye: Vec3, section: Option<&Section>) -> Vec<SpaceLine> {
-    let edges = sharp_edges(surface);
+/// All lines of a surface as seen from `eye`; of a section only what is kept. Edges that hang together without a loop and are shorter than
+/// `least` (mm) in all are left out: a coarse mesh has such where the surface bends strongly.
+pub(super) fn space_lines(surface: &SurfaceMesh, eye: Vec3, section: Option<&Section>, least: f64) -> Vec<SpaceLine> {
+    let edges = without_crumbs(surface, sharp_edges(surface), least);
     let mut lines = contours(surface, eye, &edges.iter().copied().collect());
     lines.extend(edge_lines(surface, &edges));
     if let Some(section) = section {
@@ -103,6 +104,22 @@ fn without_loose_ends(mut found: Vec<(EdgeKey, bool)>, vertices: usize) -> Vec<E
             return found.into_iter().map(|e| e.0).collect();
         }
     }
+}
+
+/// The edges, but for those that hang together without a loop and are shorter than `least` (mm) in all.
+fn without_crumbs(surface: &SurfaceMesh, edges: Vec<EdgeKey>, least: f64) -> Vec<EdgeKey> {
+    let at = |v: u32| surface.mesh.vertices[v as usize];
+    let mut joined = singles(surface.mesh.vertices.len());
+    // Of what hangs together, by its lowest vertex: the length, and whether it has a loop.
+    let loops: Vec<EdgeKey> = edges.iter().copied().filter(|(a, b)| !unite(&mut joined, *a, *b)).collect();
+    let mut lengths: HashMap<u32, f64> = HashMap::new();
+    for (a, b) in &edges {
+        *lengths.entry(find(&mut joined, *a)).or_default() += norm(sub(at(*a), at(*b)));
+    }
+    for (a, _) in loops {
+        lengths.insert(find(&mut joined, a), f64::INFINITY);
+    }
+    edges.into_iter().filter(|(a, _)| lengths[&find(&mut joined, *a)] >= least).collect()
 }
 
 /// The longest side of a triangle.

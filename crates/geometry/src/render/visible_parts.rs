@@ -11,8 +11,10 @@ pub(super) type Point = [f64; 2];
 const STEP: f64 = 1.0;
 /// A line may lie behind what is seen by as many samples' widths: the depth of a slope within a sample.
 const BEHIND: f64 = 3.0;
-/// Gaps shorter than this (samples) are drawn, and pieces shorter than this are not: both come from samples that are half covered.
-const SHORT: f64 = 8.0;
+/// Gaps shorter than this (samples) are drawn, and pieces shorter than this are not: both come from samples that are half covered, and from
+/// the triangles along a contour.
+const GAP: f64 = 8.0;
+const PIECE: f64 = 18.0;
 /// A polyline is simplified by so many samples at most.
 const SIMPLER: f64 = 0.4;
 
@@ -67,7 +69,7 @@ impl Seen<'_> {
         let mut parts: Vec<Vec<Point>> = Vec::new();
         let mut open = false;
         for (i, (seen, points)) in runs.into_iter().enumerate() {
-            let gap = !seen && i > 0 && i + 1 < count && length(&points) < SHORT;
+            let gap = !seen && i > 0 && i + 1 < count && length(&points) < GAP;
             if seen || gap {
                 if !open {
                     parts.push(Vec::new());
@@ -76,7 +78,7 @@ impl Seen<'_> {
             }
             open = seen || gap;
         }
-        parts.retain(|points| length(points) >= SHORT);
+        parts.retain(|points| length(points) >= PIECE);
         parts.iter().map(|points| simpler(points)).collect()
     }
 
