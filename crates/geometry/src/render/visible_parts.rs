@@ -7,7 +7,7 @@ use crate::math::add;
 /// A point of the picture, in samples.
 pub(super) type Point = [f64; 2];
 
-/// What is seen of a line is judged every so many samples.
+/// Distance (samples) between the points of a line that are judged.
 const STEP: f64 = 1.0;
 /// A line may lie behind what is seen by as many samples' widths: the depth of a slope within a sample.
 const BEHIND: f64 = 3.0;
@@ -15,7 +15,7 @@ const BEHIND: f64 = 3.0;
 /// the triangles along a contour.
 const GAP: f64 = 8.0;
 const PIECE: f64 = 18.0;
-/// A polyline is simplified by so many samples at most.
+/// Deviation (samples) of a simplified polyline.
 const SIMPLER: f64 = 0.4;
 
 /// A picture's samples, to compare lines with.
