@@ -2,6 +2,7 @@
 """Writes docs/images/shown: the pictures of docs/guide/see-it.md, made by the designs and the commands on that page."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -20,10 +21,10 @@ def main():
         for name, design in re.findall(r"^```toml\n# file: (\S+)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
             (Path(folder) / name).write_text(design, encoding="utf-8")
         for words in re.findall(r"^trabecula (render .*)$", text, re.MULTILINE):
-            subprocess.run([sys.executable, "-m", "trabecula", *words.split(), "--quiet"], cwd=folder, check=True)
-        for picture in sorted(Path(folder).glob("*.png")):
-            shutil.copy(picture, PICTURES)
-            print(PICTURES / picture.name)
+            subprocess.run([sys.executable, "-m", "trabecula", *shlex.split(words), "--quiet"], cwd=folder, check=True)
+        for name in sorted(set(re.findall(r"images/shown/([\w.]+)", text))):
+            shutil.copy(Path(folder) / name, PICTURES)
+            print(PICTURES / name)
 
 
 if __name__ == "__main__":

@@ -133,10 +133,31 @@ async function picture(cells, moving) {
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
 }
 
-function draw({ vertices, triangles }, body, [min, max]) {
+// A picture has no thickness, a mesh may be given it.
+function draw({ vertices, triangles }, body, [min, max], thick = false) {
   if (!screen_ || !body.byteLength) return;
   const position = new Float32Array(body, 0, 3 * vertices), normal = new Int16Array(body, 12 * vertices, 4 * vertices);
-  screen_.show({ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) });
+  state.shown = [{ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) }];
+  if (screen_.seen().color === "values") screen_.look({ color: "faces" });
+  thickOption.disabled = !thick;
+  screen_.show(...state.shown);
+}
+
+const thickOption = document.querySelector("figure.viewer [name=colours] [value='2']");
+
+// The thickness of the mesh's walls as its colours, and a legend of them.
+async function thickness() {
+  if (state.shown[0].span) return;
+  const found = await working(() => core.ask({ do: "thickness" }));
+  if (!found) return screen_.look({ color: "faces" });
+  const { head, body, ms } = found;
+  if (head.error) { say(head.error.text); return screen_.look({ color: "faces" }); }
+  const [low, high] = head.span, bar = document.createElement("i");
+  document.querySelector("[data-part=legend]").replaceChildren(low.toPrecision(3), bar, `${high.toPrecision(3)} mm`);
+  state.shown = [{ ...state.shown[0], span: head.span }, { ...state.shown[1], value: new Float32Array(body) }];
+  screen_.show(...state.shown);
+  screen_.look({ color: "values" });
+  say(`wall thickness on voxels of ${head.step.toPrecision(2)} mm in ${(ms / 1000).toFixed(1)} s`);
 }
 
 // --- figures ---------------------------------------------------------------------------------------------------------
@@ -224,8 +245,9 @@ async function stop() {
   say("stopped");
 }
 
-async function mesh() {
-  if (state.asked || $("mesh").disabled) return;
+// Work of the core with progress, which can be cancelled: what it gives, or null if it was, and the mesh lost with it.
+async function working(work) {
+  if (state.asked) return null;
   state.asked = true;
   while (state.busy) await pause(20);
   state.busy = state.meshing = true;
@@ -233,25 +255,35 @@ async function mesh() {
   $("mesh").hidden = true;
   $("progress").value = 0;
   core.onprogress = (share) => { $("progress").value = share; };
+  let found = null;
   try {
-    const per = +$("edge").value;
-    const { head, body, ms } = await core.ask({ do: "mesh", edge: per > 0 ? per : null, per_cell: null });
-    if (head.error) {
-      $("error").textContent = head.error.text;
-      $("error").hidden = false;
-      return say("no mesh");
-    }
-    if (head.drawn) draw(head, body, state.bounds);
-    made(head, ms);
+    found = await work();
   } catch (error) {
     if (error.name !== "stopped") throw error;
     state.stale = true;
+    $("made").hidden = true;
   } finally {
     state.busy = state.meshing = state.asked = false;
     for (const id of ["progress", "cancel"]) $(id).hidden = true;
     $("mesh").hidden = false;
   }
   if (state.stale) await live();
+  return found;
+}
+
+async function mesh() {
+  if ($("mesh").disabled) return;
+  const per = +$("edge").value;
+  const found = await working(() => core.ask({ do: "mesh", edge: per > 0 ? per : null, per_cell: null }));
+  if (!found) return;
+  const { head, body, ms } = found;
+  if (head.error) {
+    $("error").textContent = head.error.text;
+    $("error").hidden = false;
+    return say("no mesh");
+  }
+  if (head.drawn) draw(head, body, state.bounds, true);
+  made(head, ms);
 }
 
 function made(head, ms) {
@@ -356,6 +388,7 @@ async function begin() {
   text.addEventListener("input", () => { lines(); changed(); });
   text.addEventListener("scroll", lines);
   $("mesh").addEventListener("click", () => mesh().catch(broken));
+  document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); });
   $("cancel").addEventListener("click", () => stop().catch(broken));
   $("stl").addEventListener("click", () => save("stl").catch(broken));
   $("three").addEventListener("click", () => save("3mf").catch(broken));

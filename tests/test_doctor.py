@@ -10,7 +10,7 @@ from trabecula.doctor import extras, state, words
 def test_it_names_the_version_and_every_extra_with_what_is_missing():
     found = json.loads(in_process("doctor", "--json"))
     assert found["version"] == lt.__version__ and found["processors"] >= 1 and found["free_disk"] > 0
-    assert set(found["extras"]) == {"cad", "dicom", "fe", "scale", "tets"} == set(extras())
+    assert set(found["extras"]) == {"cad", "dicom", "fe", "notebook", "scale", "tets"} == set(extras())
     assert "meshio" in found["extras"]["fe"] and "test" not in found["extras"]
 
 

@@ -216,6 +216,13 @@ def test_the_page_designs_meshes_and_saves_what_the_command_does(browser, tmp_pa
             made = json.loads(in_process("mesh", tmp_path / "box.toml", "-o", tmp_path / f"command.{kind}", "--json"))
             assert sum_of(tmp_path / f"page.{kind}") == sum_of(tmp_path / f"command.{kind}")
         assert int(page.get_attribute("figure.viewer", "data-drawn")) == made["triangles"]
+        # Its walls are coloured by their thickness, until the design changes.
+        thick = "[name=colours] [value='2']"
+        page.select_option("[name=colours]", "2")
+        page.wait_for_function("state.shown[0].span", timeout=60_000)
+        least, most = page.evaluate("state.shown[0].span")
+        assert 0 < least < figures["lattices"]["core"]["thickness"] < most < 1.5
+        assert page.inner_text("[data-part=legend]").split()[-2:] == [f"{most:.3g}", "mm"] and page.is_enabled(thick)
         # The address holds the design.
         page.wait_for_function("location.hash.startsWith('#d=')", timeout=5_000)
         page.wait_for_timeout(400)
@@ -386,6 +393,17 @@ def test_of_a_large_part_the_middle_is_shown_while_it_changes(browser):
         page.click("#mesh")
         page.wait_for_selector("#error:not([hidden])", timeout=60_000)
         assert "million triangles do not fit into the memory of a page" in page.inner_text("#error")
+
+
+def test_a_change_takes_the_colours_of_thickness_away(browser):
+    with served() as url, opened(browser, url) as page:
+        write(page, BOX)
+        page.click("#mesh")
+        page.wait_for_selector("#made:not([hidden])", timeout=60_000)
+        page.select_option("[name=colours]", "2")
+        page.wait_for_function("state.shown[0].span", timeout=60_000)
+        write(page, BOX.replace("0.3", "0.31"))
+        assert page.input_value("[name=colours]") == "0" and page.is_disabled("[name=colours] [value='2']")
 
 
 def test_a_mesh_is_cancelled_and_the_page_goes_on(browser):

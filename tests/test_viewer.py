@@ -90,7 +90,8 @@ def test_a_large_mesh_is_shown_lighter_and_a_broken_one_as_it_is():
     assert torn.view()._light is torn
 
 
-def test_a_page_is_whole_and_asks_for_nothing_outside(mesh, tmp_path):
+def test_a_page_is_whole_and_asks_for_nothing_outside(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr("trabecula.viewer.has_widgets", lambda: False)
     mesh.view().save(tmp_path / "part.html", title='<"A & B">')
     text = (tmp_path / "part.html").read_text()
     page = Balance()

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
+    from .viewer import View, view
     from .volumes import VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
@@ -50,6 +51,7 @@ __all__ = [
     "TetMesh",
     "Thickness",
     "Transitions",
+    "View",
     "VolumeMesh",
     "VolumeSet",
     "VoxelElements",
@@ -71,6 +73,7 @@ __all__ = [
     "skin",
     "spartan",
     "sweep",
+    "view",
     "write_parts",
 ]
 
@@ -101,6 +104,8 @@ _HOMES = {
     "objective": "sweeps",
     "spartan": "design",
     "sweep": "sweeps",
+    "View": "viewer",
+    "view": "viewer",
     "write_parts": "parts",
     "iso": "levels",
     "fraction": "levels",

@@ -400,6 +400,9 @@ class Mesh:
     def thickness(
         self, region: Region | None, step: float, threads: int | None = None, progress: Progress | None = None
     ) -> ThicknessReport: ...
+    def thickness_at_vertices(
+        self, step: float, threads: int | None = None, progress: Progress | None = None
+    ) -> NDArray[np.float64]: ...
     @staticmethod
     def write_objects(path: str | PathLike[str], objects: list[tuple[str, Mesh]], title: str) -> None: ...
     def write(self, path: str | PathLike[str], extension: str, title: str) -> None: ...
@@ -413,4 +416,16 @@ class Mesh:
         shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
         lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
         section: tuple[tuple[float, float, float], float] | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> bytes: ...
+    def svg(
+        self,
+        width: int,
+        height: int,
+        azimuth: float,
+        elevation: float,
+        section: tuple[tuple[float, float, float], float] | None,
+        size: Sequence[float],
+        unit: str,
+    ) -> str: ...

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import re
 
-__all__ = ["VIEWS", "section_plane", "towards"]
+__all__ = ["BACKGROUNDS", "VIEWS", "section_plane", "towards"]
 
+#: What lies behind a surface in a picture.
+BACKGROUNDS = ("shaded", "white", "transparent")
 #: Azimuth about +z and elevation above xy, degrees, of views by name.
 VIEWS = {
     "iso": (45.0, math.degrees(math.atan(math.sqrt(0.5)))),

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from .camera import VIEWS
+from .camera import BACKGROUNDS, VIEWS
 from .completion import SHELLS, script
 from .formats import (
     BEAM_WRITES,
@@ -90,6 +90,7 @@ FRACTION = number("a fraction", lambda v: 0 < v < 1, " between 0 and 1")
 POINTS = number("a whole number", lambda v: 2 <= v <= 1000, " from 2 to 1000", int)
 SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")
 VOXELS = number("a whole number", lambda v: 8 <= v <= 4096, " from 8 to 4096", int)
+DPI = number("pixels an inch", lambda v: 1 <= v <= 10000, " from 1 to 10000")
 FRAMES = number("a whole number", lambda v: 2 <= v <= 720, " from 2 to 720", int)
 PORT = number("a port", lambda v: 0 <= v <= 65535, " from 0 to 65535", int)
 SECONDS = number("a time in s", lambda v: v > 0, " greater than 0")
@@ -97,12 +98,21 @@ SECONDS = number("a time in s", lambda v: v > 0, " greater than 0")
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
 
-def size(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT in pixels."""
-    parts = text.lower().split("x")
-    if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, found {text!r}")
-    return int(parts[0]), int(parts[1])
+def size(text: str) -> tuple[float, float, str]:
+    """WIDTHxHEIGHT in pixels, or with mm behind it in mm, where the height is three quarters of the width unless given."""
+    small = text.lower()
+    parts = small.removesuffix("mm").split("x")
+    if not small.endswith("mm"):
+        if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
+            raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, or WIDTHmm, found {text!r}")
+        return int(parts[0]), int(parts[1]), "px"
+    try:
+        wide, high = [float(p) for p in parts] if len(parts) == 2 else (float(parts[0]), 0.75 * float(parts[0]))
+    except ValueError:
+        wide = high = 0.0
+    if len(parts) > 2 or not (0 < wide <= 5000 and 0 < high <= 5000):
+        raise argparse.ArgumentTypeError(f"expected WIDTHmm or WIDTHxHEIGHTmm, each up to 5000 mm, found {text!r}")
+    return wide, high, "mm"
 
 
 def exposure(text: str) -> tuple[float, float]:
@@ -615,10 +625,19 @@ COMMANDS = {
         *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),
     "render": (
-        "Draw a design or a mesh file as PNG.",
-        "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25",
-        *(DESIGN_OR_MESH, output(("png",), "the picture (.png)")),
-        option("--size", type=size, default=(1600, 1200), metavar="WxH", help="pixels (default: 1600x1200)"),
+        "Draw a design or a mesh file as PNG, or as SVG in lines.",
+        "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25\n"
+        "  trabecula render part.toml -o figure.svg --size 85mm --section x=0",
+        *(DESIGN_OR_MESH, output(("png", "svg"), "the picture (.png), or line drawing (.svg)")),
+        option(
+            "--size",
+            type=size,
+            default=(1600, 1200, "px"),
+            metavar="WxH",
+            help="pixels, or mm as 85mm or 85x60mm (default: 1600x1200)",
+        ),
+        option("--dpi", type=DPI, metavar="N", help="pixels an inch in print (default, of a size in mm: 300)"),
+        option("--background", choices=BACKGROUNDS, help="what is behind the part in a PNG (default: shaded)"),
         option("--azimuth", type=ANGLE, metavar="DEG", help="camera about +z (default: 30)"),
         option("--elevation", type=ANGLE, metavar="DEG", help="camera above xy (default: 25)"),
         option("--view", choices=VIEWS, help="camera by name, in place of its angles"),
@@ -632,8 +651,8 @@ COMMANDS = {
         option(
             "--show",
             choices=SHOWN,
-            help="of a solved map: angle, spacing or density off, the axes asked for, lines along them, its singular lines; "
-            "of a blend: which lattice is where",
+            help="local thickness of walls; of a solved map: angle, spacing or density off, the axes asked for, lines along "
+            "them, its singular lines; of a blend: which lattice is where",
         ),
         *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from .camera import VIEWS, section_plane, towards
 from .errors import Refused
-from .files import check_place, whole_file
+from .files import check_place, kind_of, whole_file
 from .formats import is_design
 from .inputs import build, meshed, surface
 from .mesh import Mesh
-from .shown import look
+from .shown import OF_MESH, look
 from .terminal import Progress, say, settle
 
 __all__ = ["render"]
@@ -18,10 +18,14 @@ def render(args) -> None:
     """``trabecula render``."""
     check_place(args.output)
     angles = camera(args)
+    pixels, dpi = resolution(args)
+    line_art = drawn_in_lines(args)
     if args.show is None:
         made, shown = surface(args), {}
     elif not is_design(args.file):
-        raise Refused(f"{args.file} is a mesh; --show is for a design with a solved map (map.phase) or a blend")
+        if args.show not in OF_MESH:
+            raise Refused(f"{args.file} is a mesh; --show {args.show} is for a design with a solved map (map.phase) or a blend")
+        made, shown = surface(args), dict(OF_MESH[args.show])
     else:
         solid = build(args.file)
         try:
@@ -29,13 +33,47 @@ def render(args) -> None:
         except ValueError as error:
             raise Refused(f"{args.file}: {error}") from None
         made = meshed(solid, args)
-        shown = seen(made, towards(*angles))
+        shown = dict(seen(made, towards(*angles)))
     settle()
-    if args.turn is None:
-        made.render(args.output, args.size, *angles, section=args.section, **shown)
+    if line_art:
+        # Not a whole number of pixels an inch, so that the width is the one asked for.
+        exact = 25.4 * pixels[0] / args.size[0] if args.size[2] == "mm" else dpi
+        made.render(args.output, pixels, *angles, section=args.section, dpi=exact)
     else:
-        turning(made, args, angles, shown)
-    say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels" + (f", {args.turn} pictures" if args.turn else ""))
+        shown |= {"background": args.background or "shaded", "dpi": dpi}
+        if args.turn is None:
+            made.render(args.output, pixels, *angles, section=args.section, **shown)
+        else:
+            turning(made, args, pixels, angles, shown)
+    wide, high, unit = args.size
+    more = f", {args.turn} pictures" if args.turn else f", {wide:g} × {high:g} mm" if unit == "mm" else ""
+    say(
+        f"{args.output}: {pixels[0]} × {pixels[1]} pixels{more}"
+        if not line_art
+        else f"{args.output}: {wide:g} × {high:g} {unit}"
+    )
+
+
+def resolution(args) -> tuple[tuple[int, int], float | None]:
+    """Pixels across and down, and how many are an inch, if that is said."""
+    wide, high, unit = args.size
+    if unit == "px":
+        return (int(wide), int(high)), args.dpi
+    dpi = args.dpi or 300.0
+    across, down = (max(1, round(v / 25.4 * dpi)) for v in (wide, high))
+    if max(across, down) > 16384:
+        raise Refused(f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels; at most 16384 are possible each")
+    return (across, down), dpi
+
+
+def drawn_in_lines(args) -> bool:
+    """Whether a line drawing is asked for; refused with what it cannot show."""
+    if kind_of(args.output) != "svg":
+        return False
+    for name in ("show", "turn", "background"):
+        if getattr(args, name) is not None:
+            raise Refused(f"--{name} is for a .png; an .svg is a drawing in lines of one view, on no background")
+    return True
 
 
 def camera(args) -> tuple[float, float]:
@@ -56,7 +94,7 @@ def camera(args) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def turning(made: Mesh, args, angles: tuple[float, float], shown: dict) -> None:
+def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, float], shown: dict) -> None:
     """Pictures from all round as one that is animated."""
     from .turntable import animated
 
@@ -64,7 +102,7 @@ def turning(made: Mesh, args, angles: tuple[float, float], shown: dict) -> None:
     with Progress("drawing", args.progress) as progress:
         for i in range(args.turn):
             azimuth = angles[0] + 360 * i / args.turn
-            frames.append(made.png(args.size, azimuth, angles[1], section=args.section, **shown))
+            frames.append(made.png(pixels, azimuth, angles[1], section=args.section, **shown))
             progress(i + 1, args.turn)
     with whole_file(args.output) as temporary, open(temporary, "wb") as out:
         out.write(animated(frames, args.seconds))

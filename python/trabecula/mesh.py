@@ -7,7 +7,7 @@ import os
 from functools import cached_property
 
 from . import _core
-from .camera import section_plane, towards
+from .camera import BACKGROUNDS, section_plane, towards
 from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, number, positive, whole
@@ -284,6 +284,22 @@ class Mesh(Picture, Transformed):
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 
+    def thickness_at_vertices(
+        self,
+        step: float | None = None,
+        threads: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> NDArray[np.float64]:
+        """Local thickness of the solid (mm) at each vertex, (n,): the largest of the voxels around it, whose edge is ``step``
+        (mm; default as for ``thickness``), NaN where the solid is thinner than they are. The mesh must be closed; a
+        ValueError else.
+        """
+        wanted = None if step is None else positive("step", step)
+        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        spacing, shape, need = self._core.thickness_needs(None, wanted)
+        fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
+        return self._core.thickness_at_vertices(spacing, workers, progress)
+
     @property
     def porosity(self) -> float | None:
         """One minus the solid fraction."""
@@ -431,38 +447,73 @@ class Mesh(Picture, Transformed):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
-        color: ArrayLike | None = None,
+        color: ArrayLike | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
         shares: Mapping[str, ArrayLike] | None = None,
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
         section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
         ``color`` is a number for each vertex, shown on a scale that says ``label`` and goes over ``span``, or from the least
-        to the greatest. ``shares`` are instead numbers from 0 to 1 for each vertex by a name: each name has a colour, shares
-        mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they are ``width`` mm wide (1/100 of the diagonal
-        unless given) and are seen through the surface, which is pale unless it has colours. ``label`` is what colours say, or
-        else lines. ``section`` is what is kept of a closed surface, ``"z<10"``, ``"z>10"`` (mm), or by ``"z=10"`` what is
-        farther from the eye; the solid that is cut is hatched.
+        to the greatest; or ``"thickness"``, see ``thickness_at_vertices``. ``shares`` are instead numbers from 0 to 1 for each
+        vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they
+        are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is pale unless it has
+        colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed surface, ``"z<10"``,
+        ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched. ``background`` is
+        ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in print. ValueError for
+        what cannot be drawn.
         """
-        pixels = tuple(whole("size", v, 1, 16384) for v in size)
-        angles = number("azimuth", azimuth), number("elevation", elevation)
-        if not all(map(math.isfinite, angles)):
-            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
+        if background not in BACKGROUNDS:
+            raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
+        inch = None if dpi is None else positive("dpi", dpi)
         if color is not None and shares is not None:
             raise ValueError("give color or shares, not both")
         tint = None if color is None else self._tint(color, label, span)
         mixed = None if shares is None else self._shares(shares, label)
         drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
-        plane = None if section is None else section_plane(section, towards(azimuth, elevation))
-        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane)
+        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane, background, inch)
 
-    def _tint(self, color: ArrayLike, label: str, span: tuple[float, float] | None) -> tuple:
+    def svg(
+        self,
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        section: str | None = None,
+        dpi: float | None = None,
+    ) -> str:
+        """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
+        where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
+        without hidden lines. A ``section`` is hatched; camera and section as for ``png``. ``size`` is in pixels, ``dpi`` of
+        them an inch: the drawing then has its size in mm. Contours, edges, section and hatching are a path each, by these
+        names. ValueError for what cannot be drawn.
+        """
+        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
+        if dpi is None:
+            return self._core.svg(*pixels, *angles, plane, [float(n) for n in pixels], "px")
+        wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+        return self._core.svg(*pixels, *angles, plane, [wide, round(wide * pixels[1] / pixels[0], 2)], "mm")
+
+    def _camera(self, size: tuple[int, int], azimuth: float, elevation: float, section: str | None) -> tuple:
+        """Pixels, angles and the plane of a section of a picture."""
+        pixels = tuple(whole("size", v, 1, 16384) for v in size)
+        angles = number("azimuth", azimuth), number("elevation", elevation)
+        if not all(map(math.isfinite, angles)):
+            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        return pixels, angles, None if section is None else section_plane(section, towards(*angles))
+
+    def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
 
+        if isinstance(color, str):
+            if color != "thickness":
+                raise ValueError(f'color is "{color}"; it must be numbers, one for each vertex, or "thickness"')
+            color, label = self.thickness_at_vertices(), label or "wall thickness, mm"
         values = self._at_vertices("color", color)
         if span is None:
             finite = values[np.isfinite(values)]
@@ -501,14 +552,14 @@ class Mesh(Picture, Transformed):
         wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
         return label, list(lines), found, wide / 2
 
-    def view(self, values: ArrayLike | None = None, label: str = "") -> View:
+    def view(self, values: ArrayLike | str | None = None, label: str = "", **look: Any) -> View:
         """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
-        for each vertex by which it is coloured, ``label`` says what they are, with their unit. Raises ValueError for any other
-        number of values.
+        for each vertex by which it is coloured, ``label`` says what they are, with their unit; or ``"thickness"``. Keywords
+        are how it is seen at first, such as ``section="z<4"``. Raises ValueError for any other number of values.
         """
         from .viewer import View
 
-        return View(self, values, label)
+        return View(self, values, label, **look)
 
     def render(
         self,
@@ -516,18 +567,28 @@ class Mesh(Picture, Transformed):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
-        color: ArrayLike | None = None,
+        color: ArrayLike | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
         shares: Mapping[str, ArrayLike] | None = None,
         lines: Mapping[str, Iterable[ArrayLike]] | None = None,
         width: float | None = None,
         section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> None:
-        """Writes a picture to a .png file; see ``png``."""
-        extension(path, ("png",))
+        """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
+
+        Raises ValueError for another suffix, for what cannot be drawn, and for an .svg with colours or lines.
+        """
+        if extension(path, ("png", "svg")) == "svg":
+            if color is not None or shares is not None or lines is not None:
+                raise ValueError("an .svg is a line drawing, without colours or lines: leave them out, or write a .png")
+            made = self.svg(size, azimuth, elevation, section, dpi).encode()
+        else:
+            made = self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi)
         with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section))
+            out.write(made)
 
     def _picture(self) -> Mesh:
         return self

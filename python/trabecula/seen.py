@@ -10,11 +10,14 @@ from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from typing import Any
+
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from . import _core
     from .reports import DesignReport
+    from .viewer import View
 
 __all__ = ["Seen"]
 
@@ -69,18 +72,33 @@ class Seen(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
     ) -> None:
-        """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file; the camera as for ``Mesh.png``.
+        """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file, or a line drawing to an .svg
+        file; camera, section, background and dpi as for ``Mesh.png``.
 
-        ``show`` is what it shows beside the form. Of a solved map (``map.phase``): ``angle``, ``spacing``, ``density``, the
-        deviation from the one asked for, see ``map_error``; ``axes``, the directions asked for, at places on the region's
-        surface; ``trajectories``, lines along them on that surface; ``singularities``, the lines round which they do not come
-        back to themselves. Of a blend: ``lattice``, which lattice is where. A ValueError where the design has none.
+        ``show`` is what it shows beside the form: ``thickness``, the local thickness of walls. Of a solved map
+        (``map.phase``): ``angle``, ``spacing``, ``density``, the deviation from the one asked for, see ``map_error``;
+        ``axes``, the directions asked for, at places on the region's surface; ``trajectories``, lines along them on that
+        surface; ``singularities``, the lines round which they do not come back to themselves. Of a blend: ``lattice``, which
+        lattice is where. A ValueError where the design has none.
         """
         seen = None if show is None else look(self, show)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
         shown = seen(made, towards(azimuth, elevation)) if seen else {}
-        made.render(path, size, azimuth, elevation, section=section, **shown)
+        made.render(path, size, azimuth, elevation, section=section, background=background, dpi=dpi, **shown)
+
+    def view(
+        self,
+        values: ArrayLike | str | None = None,
+        label: str = "",
+        edge: float | None = None,
+        per_cell: float | None = None,
+        **look: Any,
+    ) -> View:
+        """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``."""
+        return self.mesh(edge=edge, per_cell=per_cell).view(values, label, **look)
 
     def _solved(self, lattice: str | None) -> str:
         """The lattice of that name, or else the first whose map was solved for."""

@@ -86,6 +86,9 @@ def _trajectories(solid: Solid) -> Look:
     return drawn
 
 
+#: What a mesh shows without its design.
+OF_MESH: dict[str, dict[str, Any]] = {"thickness": {"color": "thickness"}}
+
 #: What can be shown: of a solid (a ValueError where it has none) the look of its meshes.
 SHOWN: dict[str, Callable[[Solid], Look]] = {
     "angle": _error("angle", "angle off, degrees"),
@@ -95,6 +98,7 @@ SHOWN: dict[str, Callable[[Solid], Look]] = {
     "trajectories": _trajectories,
     "singularities": _singularities,
     "lattice": _lattices,
+    **{name: lambda _, drawn=drawn: lambda *_: drawn for name, drawn in OF_MESH.items()},
 }
 
 

@@ -1,6 +1,6 @@
 // A viewer of closed meshes, without any library: turn, move, zoom; a section plane; colours.
 // A page has <figure class="viewer"> with a canvas; one that is of a single mesh has <script type="application/octet-stream"> of it:
-// the DEFLATE stream, in base64, of a header of JSON, a line feed, and arrays (see viewer.py).
+// the DEFLATE stream, in base64, of a header of JSON, a line feed, and arrays (see viewer.py). A notebook's widget is handed the stream.
 "use strict";
 
 const CREASE = Math.cos((35 * Math.PI) / 180);
@@ -47,8 +47,7 @@ void main() {
   colour = vec4(base * (0.30 + 0.62 * key + 0.18 * fill), 1.0);
 }`;
 
-async function unpacked(text) {
-  const raw = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+async function unpacked(raw) {
   const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const end = bytes.indexOf(10);
@@ -135,8 +134,12 @@ function drawnBySoftware() {
   return !!known && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
 }
 
+// Colours by number, as Python names them.
+const COLOURS = ["faces", "overhang", "values"];
+
 // A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays: of each
-// corner, or of vertices with an `index`. The camera and the section stay where they are.
+// corner, or of vertices with an `index`. The camera and the section stay where they are. `seen()` is what the user sees, by names and
+// units of Python's View; `look(wanted)` changes some of it; the figure has an event "look" when the user has.
 function viewer(figure) {
   const canvas = figure.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: !drawnBySoftware(), alpha: true, preserveDrawingBuffer: true });
@@ -230,15 +233,51 @@ function viewer(figure) {
       line.querySelector("text").setAttribute("x", 1.35 * x);
       line.querySelector("text").setAttribute("y", 1.35 * y);
     });
-    const at = a < 0 ? "" : `${state.axis} = ${(head.min[a] + state.share * (head.max[a] - head.min[a])).toPrecision(4)} mm`;
-    part("at").textContent = at;
+    part("at").textContent = a < 0 ? "" : `${state.axis} = ${position().toPrecision(4)} mm`;
   }
 
-  let waiting = false;
-  const redraw = () => {
+  let waiting = false, touched = false;
+  const later = () => {
     if (waiting) return;
     waiting = true;
-    requestAnimationFrame(() => { waiting = false; draw(); });
+    requestAnimationFrame(() => {
+      waiting = false;
+      draw();
+      if (touched) figure.dispatchEvent(new Event("look"));
+      touched = false;
+    });
+  };
+  const redraw = () => { touched = true; later(); };
+
+  const position = () => { const a = "xyz".indexOf(state.axis); return head.min[a] + state.share * (head.max[a] - head.min[a]); };
+  const seen = () => ({
+    section: state.axis ? `${state.axis}${state.flip ? ">" : "<"}${+position().toPrecision(7)}` : "",
+    azimuth: state.azimuth, elevation: state.elevation, zoom: state.zoom, color: COLOURS[state.colours], overhang: state.steep,
+  });
+  function look(wanted) {
+    const section = /^([xyz])([<>])(.+)$/.exec(wanted.section || "");
+    if (section) {
+      const a = "xyz".indexOf(section[1]);
+      Object.assign(state, { axis: section[1], flip: section[2] === ">" });
+      state.share = Math.max(0, Math.min(1, (section[3] - head.min[a]) / (head.max[a] - head.min[a]) || 0));
+    } else if ("section" in wanted) state.axis = "";
+    for (const key of ["azimuth", "elevation", "zoom"]) if (key in wanted) state[key] = wanted[key];
+    if ("overhang" in wanted) state.steep = wanted.overhang;
+    if (COLOURS.includes(wanted.color)) state.colours = COLOURS.indexOf(wanted.color);
+    const control = (name) => figure.querySelector(`[name=${name}]`);
+    control("axis").value = state.axis;
+    control("share").value = state.share;
+    control("flip").checked = state.flip;
+    control("colours").value = state.colours;
+    control("steep").value = state.steep;
+    toggled();
+    later();
+  }
+  const toggled = () => {
+    part("share").disabled = !state.axis;
+    part("steep").hidden = state.colours !== 1;
+    part("legend").hidden = state.colours !== 2;
+    part("angle").textContent = `${state.steep}°`;
   };
   const tilt = (right, up) => {
     state.azimuth -= right;
@@ -278,25 +317,42 @@ function viewer(figure) {
   });
   figure.addEventListener("input", (e) => {
     const { name, value } = e.target;
-    if (name === "axis") { state.axis = value; part("share").disabled = !value; }
+    if (name === "axis") state.axis = value;
     if (name === "share") state.share = +value;
     if (name === "flip") state.flip = e.target.checked;
-    if (name === "colours") { state.colours = +value; part("steep").hidden = state.colours !== 1; part("legend").hidden = state.colours !== 2; }
-    if (name === "steep") { state.steep = +value; part("angle").textContent = `${value}°`; }
+    if (name === "colours") state.colours = +value;
+    if (name === "steep") state.steep = +value;
+    toggled();
     redraw();
   });
-  new ResizeObserver(redraw).observe(canvas);
+  const resized = new ResizeObserver(later);
+  resized.observe(canvas);
   figure.classList.add("live");
-  return { show, draw };
+  // Browsers keep few contexts; one that is not needed any more is given back.
+  const close = () => { resized.disconnect(); gl.getExtension("WEBGL_lose_context")?.loseContext(); };
+  return { show, draw, seen, look, close };
 }
 
-async function view(figure) {
-  const it = "DecompressionStream" in window ? viewer(figure) : null;
-  if (!it) return figure.classList.add("still");
-  const mesh = await unpacked(figure.querySelector("script").textContent);
-  it.show(mesh.head, corners(mesh));
+// Shows the mesh of a stream in a figure; the viewer, or null where the browser cannot draw and a still picture stands for it.
+async function view(figure, stream) {
+  try {
+    const it = "DecompressionStream" in window ? viewer(figure) : null;
+    if (!it) throw new Error("this browser has no WebGL 2, or cannot unpack the mesh");
+    const mesh = await unpacked(stream);
+    it.show(mesh.head, corners(mesh));
+    return it;
+  } catch (error) {
+    console.error(error);
+    figure.classList.add("still");
+    return null;
+  }
 }
 
-for (const figure of document.querySelectorAll("figure.viewer")) {
-  if (figure.querySelector("script")) view(figure).catch((error) => { console.error(error); figure.classList.add("still"); });
+async function viewAll() {
+  for (const figure of document.querySelectorAll("figure.viewer")) {
+    const given = figure.querySelector("script");
+    if (!given) continue;
+    const it = await view(figure, Uint8Array.from(atob(given.textContent.trim()), (c) => c.charCodeAt(0)));
+    if (it && given.dataset.look) it.look(JSON.parse(given.dataset.look));
+  }
 }

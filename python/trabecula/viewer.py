@@ -10,20 +10,24 @@ from functools import cached_property
 from html import escape
 from importlib.resources import files
 
+from .camera import section_plane, towards
 from .files import extension, whole_file
+from .given import number
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from .mesh import Mesh
+    from .solid import Solid
+    from .widget import Widget
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["View", "script", "style"]
+__all__ = ["View", "script", "style", "view"]
 
 #: Triangles of a page above which a mesh is made lighter.
 LIGHT = 150_000
@@ -41,24 +45,151 @@ def style() -> str:
     return files(__package__).joinpath("viewer.css").read_text(encoding="utf-8")
 
 
+#: What of a view can be set and read, and its limits.
+NAMES = ("section", "azimuth", "elevation", "zoom", "overhang", "color")
+LIMITS = {"azimuth": (-1e6, 1e6), "elevation": (-90.0, 90.0), "zoom": (0.2, 200.0), "overhang": (0.0, 90.0)}
+COLORS = ("faces", "overhang", "values")
+#: The word for values that are computed, and what they are then.
+THICKNESS, WALL = "thickness", "wall thickness, mm"
+
+
+def view(
+    shape: Mesh | Solid,
+    values: ArrayLike | str | None = None,
+    label: str = "",
+    edge: float | None = None,
+    per_cell: float | None = None,
+    **look: Any,
+) -> View:
+    """A mesh or a solid to turn in a notebook; see ``View``. A solid is meshed at a spacing as for ``Solid.mesh``.
+
+    Raises TypeError for anything else, ValueError for values that are not one number for each vertex.
+    """
+    from .mesh import Mesh
+    from .seen import Seen
+
+    if isinstance(shape, Seen):
+        shape = shape.mesh(edge=edge, per_cell=per_cell)
+    elif edge is not None or per_cell is not None:
+        raise ValueError("edge and per_cell are for a solid, which is meshed; this is a mesh")
+    if not isinstance(shape, Mesh):
+        raise TypeError(f"view takes a Mesh or a Solid, found {type(shape).__name__}")
+    return View(shape, values, label, **look)
+
+
+def checked(view: View, name: str, value: Any) -> Any:
+    """What of a view is to be, in its normal form.
+
+    Raises ValueError for what cannot be shown.
+    """
+    if name == "section":
+        if not value:
+            return ""
+        (normal, offset) = section_plane(value, towards(view.azimuth, view.elevation))
+        side = sum(normal)
+        return f"{'xyz'[[abs(v) for v in normal].index(1)]}{'<' if side > 0 else '>'}{side * offset:.7g}"
+    if name == "color":
+        known = COLORS if view.colored else COLORS[:2]
+        if value not in known:
+            raise ValueError(f"color is {value!r}; it must be one of {', '.join(known)}")
+        return value
+    low, high = LIMITS[name]
+    found = number(name, value)
+    if not low <= found <= high:
+        raise ValueError(f"{name} is {found:g}; it must be from {low:g} to {high:g}")
+    return found
+
+
+def _part(name: str, words: str) -> property:
+    def get(self: View) -> Any:
+        return self.look[name]
+
+    def put(self: View, value: Any) -> None:
+        self.look[name] = checked(self, name, value)
+        if self._widget is not None:
+            setattr(self._widget, name, self.look[name])
+
+    return property(get, put, doc=words)
+
+
 class View:
     """A mesh to turn: by the pointer, fingers or arrow keys; with a section plane, and colours by the faces that the region
-    cut, by the angle of overhang, or by ``values``, a number for each vertex that ``label`` names. A notebook shows it;
-    ``save`` makes a page. Of a mesh of more than 150,000 triangles, without values, a lighter one is shown; while it is made
-    ``progress(done, total)`` is called. Raises ValueError for values that are not one number for each vertex.
+    cut, by the angle of overhang, or by ``values``: a number for each vertex that ``label`` names, or ``"thickness"`` for the
+    local thickness of walls. A notebook shows it, with anywidget (extra ``notebook``) as a widget; ``save`` makes a page or a
+    picture. Of a mesh of more than 150,000 triangles, without values, a lighter one is shown; while it is made
+    ``progress(done, total)`` is called. ``section``, ``azimuth``, ``elevation``, ``zoom``, ``overhang`` and ``color`` are how
+    it is seen at first; in a widget what is set is shown at once, and what the user turns can be read.
+
+    Raises ValueError for values that are not one number for each vertex, and for a look that cannot be.
     """
 
-    def __init__(self, mesh: Mesh, values: ArrayLike | None = None, label: str = "", progress: Progress | None = None):
+    def __init__(
+        self,
+        mesh: Mesh,
+        values: ArrayLike | str | None = None,
+        label: str = "",
+        progress: Progress | None = None,
+        **look: Any,
+    ):
         self.mesh = mesh
-        self.label = label
-        self.values = None if values is None else mesh._at_vertices("values", values)
+        self._computed = isinstance(values, str)
+        if self._computed and values != THICKNESS:
+            raise ValueError(f'values is "{values}"; it must be numbers, one for each vertex, or "{THICKNESS}"')
+        self.label = label or (WALL if self._computed else "")
+        self._values = None if values is None or self._computed else mesh._at_vertices("values", values)
         self._progress = progress
+        self._widget: Widget | None = None
+        self.look: dict[str, Any] = {
+            "section": "",
+            "azimuth": 30.0,
+            "elevation": 25.0,
+            "zoom": 1.0,
+            "overhang": 45.0,
+            "color": "values" if self.colored else "faces",
+        }
+        for name in look:
+            if name not in NAMES:
+                raise TypeError(f"a view has no {name!r}; it has {', '.join(NAMES)}")
+        # The side that a section keeps depends on the camera.
+        for name in sorted(look, key=lambda name: name == "section"):
+            setattr(self, name, look[name])
+
+    section = _part("section", 'What is kept: ``"z<4"``, ``"z>4"``, mm, or by ``"z=4"`` what is farther from the eye.')
+    azimuth = _part("azimuth", "Degrees about +z from which it is seen.")
+    elevation = _part("elevation", "Degrees above the xy plane from which it is seen.")
+    zoom = _part("zoom", "How many times larger than the whole part in the picture.")
+    overhang = _part("overhang", "Degrees to the horizontal below which faces are coloured as overhanging.")
+    color = _part("color", '``"faces"``, ``"overhang"``, or ``"values"`` where there are some.')
+
+    @property
+    def colored(self) -> bool:
+        """Whether it has values."""
+        return self._computed or self._values is not None
+
+    @property
+    def widget(self) -> Widget:
+        """The widget, made when it is first asked for; its traits are what a view has.
+
+        Raises ImportError without anywidget.
+        """
+        if self._widget is None:
+            try:
+                from .widget import Widget
+            except ImportError:
+                raise ImportError("anywidget is not installed: pip install 'trabecula[notebook]'", name="anywidget") from None
+            self._widget = Widget(self)
+        return self._widget
+
+    @cached_property
+    def values(self) -> NDArray | None:
+        """The values at the vertices of the mesh that is shown, None without."""
+        return self._light.thickness_at_vertices(progress=self._progress) if self._computed else self._values
 
     @cached_property
     def _light(self) -> Mesh:
-        """The mesh, made lighter if it is large, closed and has no values."""
+        """The mesh, made lighter if it is large, closed and has no values of its own."""
         mesh = self.mesh
-        if mesh.counts[1] <= LIGHT or self.values is not None or mesh.defects or mesh.self_intersections:
+        if mesh.counts[1] <= LIGHT or self._values is not None or mesh.defects or mesh.self_intersections:
             return mesh
         return mesh.simplified(triangles=LIGHT, progress=self._progress)
 
@@ -73,8 +204,8 @@ class View:
         return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
 
     @cached_property
-    def packed(self) -> str:
-        """The mesh as text: base64 of a DEFLATE stream of a line of JSON (``vertices``, ``triangles``, ``min``, ``max`` in mm,
+    def stream(self) -> bytes:
+        """The mesh as bytes: a DEFLATE stream of a line of JSON (``vertices``, ``triangles``, ``min``, ``max`` in mm,
         ``span`` of values or null), then positions (3 × uint16 of the bounds each, little-endian), triangles (3 × uint32 each),
         whether each triangle is on the region's surface (uint8), and values (uint16 of the span) if there are any.
         """
@@ -92,10 +223,21 @@ class View:
             share = (np.nan_to_num(self.values, nan=least) - span[0]) / (span[1] - span[0])
             parts.append(np.rint(share.clip(0, 1) * STEPS).astype("<u2").tobytes())
         head = {"vertices": mesh.counts[0], "triangles": mesh.counts[1], "min": list(low), "max": list(high), "span": span}
-        return base64.b64encode(zlib.compress(json.dumps(head).encode() + b"\n" + b"".join(parts), 9)).decode()
+        return zlib.compress(json.dumps(head).encode() + b"\n" + b"".join(parts), 9)
+
+    @cached_property
+    def packed(self) -> str:
+        """``stream`` as text, base64."""
+        return base64.b64encode(self.stream).decode()
 
     def figure(self, high: str = "62vh") -> str:
-        """The figure for a page that has ``style()`` and ``script()``; ``high`` is its height in CSS."""
+        """The figure for a page that has ``style()`` and ``script()``, with the mesh; ``high`` is its height in CSS."""
+        look = escape(json.dumps(self.look))
+        mesh = f'<script type="application/octet-stream" data-look="{look}">{self.packed}</script>'
+        return self.markup(high).replace("</figure>", f"{mesh}\n</figure>")
+
+    def markup(self, high: str) -> str:
+        """The figure without the mesh."""
         still = base64.b64encode(self.mesh._png).decode()
         lines = "".join(
             f'<g data-part="{name}"><line stroke="{colour}" stroke-width="2"/><text text-anchor="middle" dy=".35em" '
@@ -103,9 +245,9 @@ class View:
             for name, colour in (("x", "#d1483c"), ("y", "#3c9d4e"), ("z", "#3a72d8"))
         )
         label = escape(self.label or "value")
-        chosen = ("0", "2")[self.values is not None]
-        options = [("0", "region's faces"), ("1", "overhang"), *([("2", label)] if self.values is not None else [])]
-        choices = "".join(f'<option value="{v}"{" selected" * (v == chosen)}>{word}</option>' for v, word in options)
+        words = ("region's faces", "overhang", label)[: len(COLORS) if self.colored else 2]
+        chosen = COLORS.index(self.color)
+        choices = "".join(f'<option value="{v}"{" selected" * (v == chosen)}>{word}</option>' for v, word in enumerate(words))
         legend = ""
         if self._span is not None:
             legend = "{:.4g}<i></i>{:.4g}".format(*self._span)
@@ -127,33 +269,59 @@ class View:
 <output data-part="angle">45°</output></label>
 <span class="legend" data-part="legend"{"" if legend else " hidden"}>{legend}</span>
 </div>
-<script type="application/octet-stream">{self.packed}</script>
 </figure>"""
 
     def html(self, title: str = "Part") -> str:
         """A whole page with the figure; it needs no network."""
         return page(title, self.figure("calc(100vh - 46px)"))
 
-    def save(self, path: str | os.PathLike[str], title: str = "Part") -> None:
-        """Writes the page to an .html file.
+    def save(self, path: str | os.PathLike[str], title: str = "Part", size: tuple[int, int] = (1600, 1200)) -> None:
+        """Writes the page to an .html file; or a picture of the whole mesh to a .png or .svg file, ``size`` pixels large,
+        with the section, the colours and from the side that are seen now.
 
         Raises OSError if it cannot be written, ValueError for another suffix.
         """
-        write_page(path, self.html(title))
+        kind = extension(path, ("html", "png", "svg"))
+        if kind == "html":
+            write_page(path, self.html(title))
+            return
+        colors = {}
+        if self.color == "values" and kind == "png":
+            colors = {"color": THICKNESS if self._computed else self._values, "label": self.label}
+        self.mesh.render(path, size, self.azimuth, self.elevation, section=self.section or None, **colors)
 
-    def _repr_html_(self) -> str:
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        # Where no widget is known, such as on a site that shows notebooks, the still picture stands for it.
+        if not has_widgets():
+            return None
+        bundle = self.widget._repr_mimebundle_(include=include, exclude=exclude)
+        data, meta = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
+        return {"image/png": base64.b64encode(self.mesh._png).decode(), **data}, meta
+
+    def _repr_html_(self) -> str | None:
+        if has_widgets():
+            return None
         return (
             f'<iframe srcdoc="{escape(self.html())}" style="width: 100%; height: 520px; border: 0" '
             'sandbox="allow-scripts" title="The part in three dimensions"></iframe>'
         )
 
 
+def has_widgets() -> bool:
+    """Whether a notebook's widgets can be made."""
+    try:
+        import anywidget  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
 def page(title: str, body: str, more: str = "") -> str:
     """A page of its own with the viewer's style and program."""
     return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<!doctype html>\n<html lang="en" class="page">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
-        f"<style>{style()}{more}</style>\n</head>\n<body>\n{body}\n<script>\n{script()}</script>\n</body>\n</html>\n"
+        f"<style>{style()}{more}</style>\n</head>\n<body>\n{body}\n<script>\n{script()}viewAll();\n</script>\n</body>\n</html>\n"
     )
 
 

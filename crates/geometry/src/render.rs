@@ -8,7 +8,9 @@ use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
 mod font;
+mod hatching;
 mod legend;
+mod line_drawing;
 mod lines;
 mod occlusion;
 mod paper;
@@ -17,8 +19,11 @@ mod raster;
 mod section;
 mod shade;
 mod shares;
+mod space_lines;
 mod tint;
+mod visible_parts;
 
+pub use line_drawing::line_drawing;
 pub use lines::Lines;
 use lines::Tubes;
 use paper::Paper;
@@ -41,6 +46,25 @@ pub struct View {
     pub elevation: f64,
 }
 
+/// What lies behind a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Background {
+    /// A light grey that darkens towards the corners.
+    #[default]
+    Shaded,
+    /// White.
+    White,
+    /// Nothing: pixels have alpha.
+    Transparent,
+}
+
+impl Background {
+    /// Bytes of a pixel: RGB or RGBA.
+    pub fn channels(self) -> usize {
+        if self == Background::Transparent { 4 } else { 3 }
+    }
+}
+
 /// What a picture shows besides the form of a surface; a legend says what is what.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
@@ -50,6 +74,8 @@ pub struct Look {
     pub lines: Option<Lines>,
     /// What is left out, of a closed surface; what the plane cuts is hatched.
     pub section: Option<Section>,
+    /// What lies behind the surface.
+    pub background: Background,
 }
 
 /// The largest picture, in pixels.
@@ -126,7 +152,7 @@ impl Camera {
     }
 }
 
-/// Draws the surface; returns RGB rows from the top.
+/// Draws the surface; returns rows from the top, RGB, or RGBA (not premultiplied) on a transparent background.
 ///
 /// Perspective with a narrow lens, fitted to the bounds, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
 /// boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
@@ -144,7 +170,8 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
     }
     let bounds = surface.mesh.bounds();
     let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
-    let mut paper = Paper { size: [w, h], rgb: vec![0u8; 3 * pixels] };
+    let channels = look.background.channels();
+    let mut paper = Paper { size: [w, h], channels, bytes: vec![0u8; channels * pixels] };
     let legend = legend::rows(look, &paper);
     if drawn {
         let size = [w * OVER, h * OVER];
@@ -162,21 +189,21 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
         let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
-        for (i, part) in paper.rgb.chunks_mut(rows / OVER * w * 3).enumerate() {
-            let (first, count) = (i * rows / BAND, part.len() / (3 * w) * OVER);
+        for (i, part) in paper.bytes.chunks_mut(rows / OVER * w * channels).enumerate() {
+            let (first, count) = (i * rows / BAND, part.len() / (channels * w) * OVER);
             let (raster, mut picture) = body.draw(first, count);
             if let Some((over, drawn)) = lines.as_ref().map(|l| l.draw(first, count)) {
                 lines::overlay(&mut picture, &raster, &drawn, &over);
             }
-            resolve(&picture, view.size, i * rows / OVER, part);
+            resolve(&picture, view.size, i * rows / OVER, look.background, part);
         }
     } else {
-        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, &mut paper.rgb);
+        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, look.background, &mut paper.bytes);
     }
     if !legend.is_empty() {
         legend::draw(&legend, &mut paper);
     }
-    paper.rgb
+    paper.bytes
 }
 
 /// A surface in a picture.
@@ -206,9 +233,11 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// Averages the samples of each pixel over the background and encodes them as sRGB, for the rows from `first` on.
-fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], first: usize, rgb: &mut [u8]) {
-    rgb.par_chunks_mut(w * 3).enumerate().for_each(|(y, row)| {
+/// Averages the samples of each pixel over the background and encodes them as sRGB, for the rows from `first` on. On a transparent one the
+/// colour is that of what covers the pixel alone: programs that mix it with theirs by alpha then show no seam.
+fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], first: usize, background: Background, bytes: &mut [u8]) {
+    let channels = background.channels();
+    bytes.par_chunks_mut(w * channels).enumerate().for_each(|(y, row)| {
         for x in 0..w {
             let mut sum = [0.0f32; 4];
             for j in 0..OVER {
@@ -218,10 +247,19 @@ fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], first: usize, rgb: &mut [u8
                 }
             }
             let n = (OVER * OVER) as f32;
-            let back = shade::background((x as f32 + 0.5) / w as f32, ((first + y) as f32 + 0.5) / h as f32);
+            let back = match background {
+                Background::Shaded => {
+                    shade::background((x as f32 + 0.5) / w as f32, ((first + y) as f32 + 0.5) / h as f32)
+                }
+                Background::White => [1.0; 3],
+                Background::Transparent => [0.0; 3],
+            };
+            let whole = if background == Background::Transparent { sum[3].max(1e-6) } else { n };
             for k in 0..3 {
-                let v = (sum[k] + (n - sum[3]) * back[k]) / n;
-                row[3 * x + k] = encode(v);
+                row[channels * x + k] = encode((sum[k] + (n - sum[3]) * back[k]) / whole);
+            }
+            if channels == 4 {
+                row[4 * x + 3] = (sum[3] / n * 255.0 + 0.5) as u8;
             }
         }
     });

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
-use geometry::render::{Colours, Lines, Look, Section, Shares, Tint, View, png, render};
+use geometry::render::{Background, Colours, Lines, Look, Section, Shares, Tint, View, line_drawing, png, render};
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
@@ -302,6 +302,19 @@ impl Mesh {
         report(py, "ThicknessReport", &told)
     }
 
+    /// Local thickness of the solid at each vertex (n,), mm, on voxels of edge `step` (mm); NaN where it is thinner than a step.
+    #[pyo3(signature = (step, threads=None, progress=None))]
+    fn thickness_at_vertices<'py>(
+        &self,
+        py: Python<'py>,
+        step: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let found = run(py, threads, progress, |p| analysis::thickness_at_vertices(&self.surface, step, p))?;
+        Ok(found.map_err(error::stopped)?.into_pyarray(py))
+    }
+
     /// Writes meshes, each with its name, to a 3MF at `path` as one object each; the design is that of the first one.
     #[staticmethod]
     fn write_objects(py: Python<'_>, path: PathBuf, objects: Vec<(String, Py<Mesh>)>, title: String) -> PyResult<()> {
@@ -327,8 +340,9 @@ impl Mesh {
     }
 
     /// A picture as PNG bytes: with a number at each vertex to be seen as a colour, between the two ends of a scale, or with shares of
-    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset.
-    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None, section=None))]
+    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset; on a `background`
+    /// ("shaded", "white" or "transparent"), `dpi` pixels an inch.
+    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None, section=None, background="shaded", dpi=None))]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn png<'py>(
         &self,
@@ -341,17 +355,43 @@ impl Mesh {
         shares: Option<(String, Vec<String>, Vec<f64>)>,
         lines: Option<NamedLines>,
         section: Option<([f64; 3], f64)>,
+        background: &str,
+        dpi: Option<f64>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let size = [width, height];
         let scale = tint.map(|(title, values, span)| Colours::Scale(Tint { title, values, span }));
         let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
         let lines = lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius });
         let section = section.map(|(normal, offset)| Section { normal, offset });
-        let look = Look { colours: scale.or(parts), lines, section };
+        let background = match background {
+            "white" => Background::White,
+            "transparent" => Background::Transparent,
+            _ => Background::Shaded,
+        };
+        let look = Look { colours: scale.or(parts), lines, section, background };
         let bytes = run(py, None, None, |_| {
             let view = View { size, azimuth, elevation };
-            png(&render(&self.surface, &view, &look), size)
+            png(&render(&self.surface, &view, &look), size, background.channels(), dpi)
         })?;
         Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of a view of `width` × `height`.
+    #[pyo3(signature = (width, height, azimuth, elevation, section, size, unit))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
+    fn svg(
+        &self,
+        py: Python<'_>,
+        width: usize,
+        height: usize,
+        azimuth: f64,
+        elevation: f64,
+        section: Option<([f64; 3], f64)>,
+        size: [f64; 2],
+        unit: &str,
+    ) -> PyResult<String> {
+        let section = section.map(|(normal, offset)| Section { normal, offset });
+        let view = View { size: [width, height], azimuth, elevation };
+        run(py, None, None, |_| line_drawing(&self.surface, &view, section.as_ref(), size, unit))
     }
 }

@@ -10,8 +10,8 @@ const ONE: f64 = 32767.0;
 
 /// Arrays for drawing.
 pub struct Arrays {
-    /// Number of vertices.
-    pub vertices: usize,
+    /// Of each vertex that of the mesh.
+    pub vertices: Vec<u32>,
     /// Of each vertex its position (3 × f32, mm); then of each its normal and whether its triangles are cut (4 × i16, 32767 is one);
     /// then of each triangle its vertices (3 × u32).
     pub bytes: Vec<u8>,
@@ -50,7 +50,7 @@ pub fn arrays(surface: &SurfaceMesh) -> Arrays {
     let mut bytes: Vec<u8> = positions.flat_map(|x| (x as f32).to_le_bytes()).collect();
     bytes.extend(found.normals.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
     bytes.extend(index);
-    Arrays { vertices: found.vertices.len(), bytes }
+    Arrays { vertices: found.vertices, bytes }
 }
 
 /// No vertex.

@@ -9,6 +9,7 @@ use geometry::progress::{Progress, Silent, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
+use trabecula::analysis::{thickness_at_vertices, usual_step};
 use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::extract;
 use trabecula::region::{Cuboid, Intersection, Region, Shape};
@@ -22,6 +23,9 @@ use crate::resolution::{self, Resolution};
 
 /// Triangles of a mesh above which it is not drawn, and a picture of it must do.
 const DRAWN: usize = 1_500_000;
+
+/// Voxels at most of the thickness that colours a mesh: seconds.
+const VOXELS: f64 = 4e6;
 
 /// How many times the grid cells that are asked for make a picture of the whole wait.
 const FAR: f64 = 5.0;
@@ -53,6 +57,8 @@ enum Request {
     },
     /// The surface as `trabecula mesh` makes it: its figures, and its arrays.
     Mesh { edge: Option<f64>, per_cell: Option<f64> },
+    /// The local thickness of that surface's solid (mm), f32 for each vertex that was drawn; 0 where it is thinner than a voxel.
+    Thickness,
     /// That surface as the bytes of a file.
     Write { suffix: String },
 }
@@ -107,6 +113,8 @@ pub struct Session {
     /// The design as the command would write it.
     text: String,
     made: Option<SurfaceMesh>,
+    /// Of each vertex that was drawn of it, that of the surface.
+    drawn: Vec<u32>,
 }
 
 /// Files that were given to the page, by name.
@@ -156,6 +164,7 @@ impl Session {
             Request::Figures => self.figures(),
             Request::Picture { cells, part } => picture(self.built()?, cells, part),
             Request::Mesh { edge, per_cell } => self.mesh(edge, per_cell),
+            Request::Thickness => self.thickness(),
             Request::Write { suffix } => self.write(&suffix),
         }
     }
@@ -216,12 +225,26 @@ impl Session {
         };
         let drawn = (triangles <= DRAWN).then(|| arrays(&surface));
         let head = json!({
-            "figures": figures, "vertices": drawn.as_ref().map(|a| a.vertices), "triangles": triangles, "edge": spacing, "chord": chord, "drawn": drawn.is_some(),
+            "figures": figures, "vertices": drawn.as_ref().map(|a| a.vertices.len()), "triangles": triangles, "edge": spacing, "chord": chord, "drawn": drawn.is_some(),
             "islands": IslandsReport::from(&made.components), "open": built.is_open(),
             "notes": notes,
         });
         self.made = Some(surface);
-        Ok((head, drawn.map_or_else(Vec::new, |a| a.bytes)))
+        let (vertices, bytes) = drawn.map_or_else(Default::default, |a| (a.vertices, a.bytes));
+        self.drawn = vertices;
+        Ok((head, bytes))
+    }
+
+    fn thickness(&self) -> Answer {
+        let Some(surface) = &self.made else { return Err("there is no mesh yet".to_string().into()) };
+        let [x, y, z] = surface.mesh.bounds().size();
+        let step = usual_step(surface, None).max((x * y * z / VOXELS).cbrt());
+        let found = thickness_at_vertices(surface, step, &Shown)?;
+        let values: Vec<f32> = self.drawn.iter().map(|v| found[*v as usize] as f32).collect();
+        let known = values.iter().filter(|t| t.is_finite());
+        let (low, high) = known.fold((f32::INFINITY, 0.0f32), |(l, h), t| (l.min(*t), h.max(*t)));
+        let bytes = values.iter().flat_map(|t| if t.is_finite() { *t } else { 0.0 }.to_le_bytes()).collect();
+        Ok((json!({ "span": [low.min(high), high], "step": step }), bytes))
     }
 
     fn write(&self, suffix: &str) -> Answer {
@@ -269,7 +292,7 @@ fn picture(built: &Built, cells: f64, part: bool) -> Answer {
     let surface = if built.is_open() { surface.uncapped() } else { surface };
     let drawn = arrays(&surface);
     let head = json!({
-        "triangles": surface.mesh.triangles.len(), "vertices": drawn.vertices, "edge": edge,
+        "triangles": surface.mesh.triangles.len(), "vertices": drawn.vertices.len(), "edge": edge,
         "cells": if partly { share * whole } else { whole }, "part": partly, "bounds": [bounds.min, bounds.max],
     });
     Ok((head, drawn.bytes))

@@ -9,5 +9,7 @@ mod transition;
 
 pub use cut_triangles::cut_triangles;
 pub use dangling::{Dangling, dangling};
-pub use local_thickness::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
+pub use local_thickness::{
+    BYTES_PER_VOXEL, Spread, Thickness, thickness, thickness_at_vertices, usual_step, voxels_for,
+};
 pub use transition::{Transition, transitions};

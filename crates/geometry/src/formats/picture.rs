@@ -256,12 +256,12 @@ mod tests {
         let size = [37, 23];
         let level = |i: usize| ((i % 37) * 5 + (i / 37) * (i / 37) + (i * i) % 7) as u8;
         let rgb: Vec<u8> = (0..37 * 23).flat_map(|i| [level(i); 3]).collect();
-        let bytes = render::png(&rgb, size);
+        let bytes = render::png(&rgb, size, 3, None);
         let made = read_pictures(&bytes).expect("picture");
         let want: Vec<f64> = (0..37 * 23).map(|i| f64::from(level(i))).collect();
         assert_eq!(made, [Picture { size, values: want }]);
         let coloured: Vec<u8> = (0..37 * 23).flat_map(|i| [level(i), 0, 9]).collect();
-        let words = read_pictures(&render::png(&coloured, size)).expect_err("colours").message;
+        let words = read_pictures(&render::png(&coloured, size, 3, None)).expect_err("colours").message;
         assert!(words.contains("colours"), "{words}");
         for end in [3, 20, 60, bytes.len() - 13] {
             assert!(read_pictures(&bytes[..end]).is_err(), "{end}");

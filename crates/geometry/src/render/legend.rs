@@ -125,10 +125,10 @@ mod tests {
         assert!(rows.len() > 2);
         draw(&rows, &mut paper);
         for i in 0..many.len() {
-            let patch = paper.rgb.chunks(3).filter(|p| *p == colour(&AREAS, i)).count();
+            let patch = paper.bytes.chunks(3).filter(|p| *p == colour(&AREAS, i)).count();
             assert_eq!(patch, paper.letter().pow(2), "{i}");
         }
         let border = (0..300).flat_map(|y| [3 * 400 * y, 3 * (400 * y + 399)]);
-        assert!(border.into_iter().all(|at| paper.rgb[at..at + 3] == [255; 3]));
+        assert!(border.into_iter().all(|at| paper.bytes[at..at + 3] == [255; 3]));
     }
 }

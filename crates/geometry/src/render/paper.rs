@@ -10,10 +10,12 @@ pub(super) const INK: Colour = [40, 40, 44];
 /// Dots between letters.
 const GAP: usize = 1;
 
-/// RGB rows from the top.
+/// Rows from the top, of RGB or RGBA.
 pub(super) struct Paper {
     pub size: [usize; 2],
-    pub rgb: Vec<u8>,
+    /// Bytes of a pixel, 3 or 4.
+    pub channels: usize,
+    pub bytes: Vec<u8>,
 }
 
 impl Paper {
@@ -34,10 +36,9 @@ impl Paper {
 
     /// Fills a rectangle from one corner to another, clipped to the paper.
     pub fn fill(&mut self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2], colour: Colour) {
-        let [w, h] = self.size;
-        for y in y0..y1.min(h) {
-            for x in x0..x1.min(w) {
-                self.rgb[3 * (y * w + x)..][..3].copy_from_slice(&colour);
+        for y in y0..y1 {
+            for x in x0..x1 {
+                self.blend([x, y], colour, 1.0);
             }
         }
     }
@@ -64,9 +65,17 @@ impl Paper {
     fn blend(&mut self, [x, y]: [usize; 2], colour: Colour, cover: f32) {
         let [w, h] = self.size;
         if x < w && y < h && cover > 0.0 {
-            let pixel = &mut self.rgb[3 * (y * w + x)..][..3];
+            let n = self.channels;
+            let pixel = &mut self.bytes[n * (y * w + x)..][..n];
+            let cover = cover.min(1.0);
+            // The share of what there was in what is seen then.
+            let under = pixel.get(3).map_or(1.0, |a| f32::from(*a) / 255.0);
+            let all = cover + (1.0 - cover) * under;
             for (p, c) in pixel.iter_mut().zip(colour) {
-                *p = (f32::from(*p) + cover.min(1.0) * (f32::from(c) - f32::from(*p))).round() as u8;
+                *p = (f32::from(*p) + cover / all * (f32::from(c) - f32::from(*p))).round() as u8;
+            }
+            if let Some(alpha) = pixel.get_mut(3) {
+                *alpha = (255.0 * all).round() as u8;
             }
         }
     }
@@ -85,7 +94,7 @@ pub(super) fn short(v: f64) -> String {
 #[cfg(test)]
 impl Paper {
     pub fn blank(size: [usize; 2]) -> Paper {
-        Paper { size, rgb: vec![255; 3 * size[0] * size[1]] }
+        Paper { size, channels: 3, bytes: vec![255; 3 * size[0] * size[1]] }
     }
 }
 
@@ -101,15 +110,15 @@ mod tests {
             let drawn = |letter: char| {
                 let mut paper = Paper::blank(size);
                 paper.write(&letter.to_string(), 20, 20, 0.0, INK);
-                let dark = |i: usize| paper.rgb[3 * i] < 250;
+                let dark = |i: usize| paper.bytes[3 * i] < 250;
                 let [right, below] = [20 + paper.wide(&letter.to_string()), 20 + font::DEEP * paper.dot()];
                 assert!(
                     (0..size[0] * size[1])
                         .filter(|i| dark(*i))
                         .all(|i| { (20..right).contains(&(i % size[0])) && (20..below).contains(&(i / size[0])) })
                 );
-                assert!((0..size[0] * size[1]).any(|i| paper.rgb[3 * i] == INK[0]), "{letter}");
-                paper.rgb
+                assert!((0..size[0] * size[1]).any(|i| paper.bytes[3 * i] == INK[0]), "{letter}");
+                paper.bytes
             };
             let all: Vec<Vec<u8>> = letters.iter().map(|l| drawn(*l)).collect();
             for (i, one) in all.iter().enumerate() {

@@ -15,7 +15,7 @@ pub struct Section {
 
 impl Section {
     /// Height of a point above the plane (mm).
-    fn height(&self, p: Vec3) -> f64 {
+    pub(super) fn height(&self, p: Vec3) -> f64 {
         dot(self.normal, p) - self.offset
     }
 

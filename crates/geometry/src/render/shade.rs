@@ -213,17 +213,17 @@ fn lit([n, eye, key]: [Vec3; 3], sun: f32, camera: &Camera, colour: [f32; 3], op
 }
 
 /// Normals at vertices, weighted by area: one for each vertex, but where faces meet in an edge, one for each side.
-struct Normals {
-    smooth: Vec<[f32; 3]>,
+pub(super) struct Normals {
+    pub(super) smooth: Vec<[f32; 3]>,
     /// The triangles about a vertex on an edge.
     edges: HashMap<usize, Vec<u32>>,
 }
 
 impl Normals {
     /// Cosine of the angle from which on faces meet in an edge: 35°.
-    const EDGE: f64 = 0.82;
+    pub(super) const EDGE: f64 = 0.82;
 
-    fn of(surface: &SurfaceMesh) -> Normals {
+    pub(super) fn of(surface: &SurfaceMesh) -> Normals {
         let mesh = &surface.mesh;
         let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
         for (i, t) in mesh.triangles.iter().enumerate() {
@@ -251,7 +251,7 @@ impl Normals {
     }
 
     /// The normal at a vertex of a face whose own is `flat`.
-    fn at(&self, surface: &SurfaceMesh, vertex: usize, flat: Vec3) -> Vec3 {
+    pub(super) fn at(&self, surface: &SurfaceMesh, vertex: usize, flat: Vec3) -> Vec3 {
         let Some(around) = self.edges.get(&vertex) else {
             return self.smooth[vertex].map(f64::from);
         };
@@ -262,7 +262,7 @@ impl Normals {
 }
 
 /// Twice the area of a triangle, along its normal.
-fn area(surface: &SurfaceMesh, triangle: usize) -> Vec3 {
+pub(super) fn area(surface: &SurfaceMesh, triangle: usize) -> Vec3 {
     let [a, b, c] = surface.mesh.corners(triangle);
     cross(sub(b, a), sub(c, a))
 }

@@ -2,7 +2,7 @@ use super::*;
 use crate::mesh::Mesh;
 
 /// A surface of a function on a cube by cutting the six tetrahedra of each grid cell, closed at the cube's faces.
-fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {
+pub(super) fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {
     let mut s = SurfaceMesh::default();
     let corner = |i: usize, k: usize| (i >> k) & 1;
     let mut ids = std::collections::HashMap::new();
@@ -52,6 +52,11 @@ fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {
         }
     }
     s
+}
+
+/// A ball in the middle of the cube.
+pub(super) fn sphere(n: usize) -> SurfaceMesh {
+    contour(n, |p| norm(sub(p, [0.5; 3])) - 0.37)
 }
 
 fn gyroid(cells: f64) -> impl Fn(Vec3) -> f64 {
@@ -293,7 +298,7 @@ fn gallery() {
         let t = std::time::Instant::now();
         let rgb = render(&s, &view, &Look::default());
         let drawn = t.elapsed();
-        let file = png(&rgb, view.size);
+        let file = png(&rgb, view.size, 3, None);
         println!(
             "{name}: {} triangles, {drawn:?}, {:?}, {} bytes",
             s.mesh.triangles.len(),
@@ -302,4 +307,38 @@ fn gallery() {
         );
         assert!(std::fs::write(dir.join(format!("trabecula-{name}.png")), file).is_ok());
     }
+}
+
+/// On a transparent background a pixel has the colour of what covers it, and alpha the share that is covered: over the same background it is
+/// the same picture.
+#[test]
+fn a_transparent_background_mixes_to_the_same_picture() {
+    let s = sphere(24);
+    let [white, clear] = [Background::White, Background::Transparent]
+        .map(|background| render(&s, &VIEW, &Look { background, ..Look::default() }));
+    assert_eq!((white.len(), clear.len()), (200 * 150 * 3, 200 * 150 * 4));
+    let (mut partly, mut inside) = (0, 0);
+    for (w, c) in white.chunks(3).zip(clear.chunks(4)) {
+        let cover = f32::from(c[3]) / 255.0;
+        for k in 0..3 {
+            // In linear light; a byte of alpha and one of colour are half a step off at most each, and steps are 2/255 at most in the light.
+            let mixed = cover * tint::decode(c[k]) + 1.0 - cover;
+            assert!((mixed - tint::decode(w[k])).abs() < 0.02, "{w:?} {c:?}");
+        }
+        partly += usize::from(c[3] > 0 && c[3] < 255);
+        inside += usize::from(c[3] == 255);
+    }
+    assert!(partly > 100 && inside > 4000 && clear[3] == 0, "{partly} {inside}");
+    // Writing covers what it is written on.
+    let legend = Look {
+        colours: Some(Colours::Scale(Tint {
+            title: "t".into(),
+            values: vec![0.0; s.mesh.vertices.len()],
+            span: [0.0, 1.0],
+        })),
+        background: Background::Transparent,
+        ..Look::default()
+    };
+    let drawn = render(&s, &VIEW, &legend);
+    assert!(drawn.chunks(4).any(|p| p == [40, 40, 44, 255]) && drawn[3] == 0);
 }

@@ -183,6 +183,64 @@ pub fn thickness(
     step: f64,
     progress: &dyn Progress,
 ) -> Result<Thickness, Stopped> {
+    in_solid(surface, region, step, progress, |space, watch| {
+        let wall = spread(&space, watch)?;
+        let mut pore = None;
+        if let Some(region) = region {
+            let pores = pores(space.grid, region);
+            let room = |v: [usize; 3]| -region.value(space.grid.place(v)) / step;
+            if pores.count() > 0 {
+                pore = Some(spread(&Space { inside: &pores, side: 1.0, open: Some(&room), ..space }, watch)?);
+            }
+        }
+        Ok(Thickness { step, accuracy: ACCURACY * step, wall, pore })
+    })
+}
+
+/// Local thickness (mm) of the solid at each vertex of its closed mesh, on voxels of edge `step` (mm): the largest of
+/// the eight voxels around the vertex, else of the 27 nearest. NaN where none of those has its centre in the solid: it is
+/// thinner than a step there.
+///
+/// # Errors
+/// As for `thickness`.
+pub fn thickness_at_vertices(surface: &SurfaceMesh, step: f64, progress: &dyn Progress) -> Result<Vec<f64>, Stopped> {
+    in_solid(surface, None, step, progress, |space, watch| {
+        let balls = space.needed(&space.balls(watch)?);
+        let radii = space.paint(&balls, watch)?;
+        Ok(surface.mesh.vertices.par_iter().map(|p| 2.0 * step * radius_at(space.grid, &radii, *p)).collect())
+    })
+}
+
+/// The local radius (steps) at a point of the surface.
+fn radius_at(grid: &Grid, radii: &[f32], p: Vec3) -> f64 {
+    let at: Vec3 = core::array::from_fn(|a| (p[a] - grid.first[a]) / grid.step);
+    let radius = |v: [i64; 3]| {
+        let within = (0..3).all(|a| (0..grid.shape[a] as i64).contains(&v[a]));
+        if within { f64::from(radii[grid.index(v.map(|c| c as usize))]) } else { 0.0 }
+    };
+    // A voxel that its ball just misses has a smaller one, so the largest counts.
+    let corners = (0..8).map(|k| radius(core::array::from_fn(|a| at[a].floor() as i64 + (k >> a & 1))));
+    let most = corners.fold(0.0, f64::max);
+    if most > 0.0 {
+        return most;
+    }
+    let about = (0..27i64).map(|k| {
+        let off = [k % 3, k / 3 % 3, k / 9];
+        radius(core::array::from_fn(|a| at[a].round() as i64 + off[a] - 1))
+    });
+    let most = about.fold(0.0, f64::max);
+    if most > 0.0 { most } else { f64::NAN }
+}
+
+/// Voxels of edge `step` (mm) over a closed mesh and the region, if there is one, and their nearest places of the surface:
+/// what `work` makes of the solid's.
+fn in_solid<T>(
+    surface: &SurfaceMesh,
+    region: Option<&Region>,
+    step: f64,
+    progress: &dyn Progress,
+    work: impl FnOnce(Space, &Watch) -> Result<T, Stopped>,
+) -> Result<T, Stopped> {
     let refuse = |message: String| Err(Stopped::Refused(Fault::new("", message)));
     let mesh = &surface.mesh;
     let about = size(mesh);
@@ -228,7 +286,7 @@ pub fn thickness(
     drop(lines);
 
     let lattice = surface.cut.iter().any(|c| !*c);
-    let mut space = Space {
+    let space = Space {
         grid: &grid,
         shape: &scaled,
         sites: &sites,
@@ -238,19 +296,7 @@ pub fn thickness(
         side: -1.0,
         open: None,
     };
-    let wall = spread(&space, &watch)?;
-    let mut pore = None;
-    if let Some(region) = region {
-        let pores = pores(&grid, region);
-        let room = |v: [usize; 3]| -region.value(grid.place(v)) / step;
-        space.inside = &pores;
-        space.side = 1.0;
-        space.open = Some(&room);
-        if pores.count() > 0 {
-            pore = Some(spread(&space, &watch)?);
-        }
-    }
-    Ok(Thickness { step, accuracy: ACCURACY * step, wall, pore })
+    work(space, &watch)
 }
 
 /// The voxels whose centres are in the solid.

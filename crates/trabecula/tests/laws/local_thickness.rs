@@ -7,7 +7,7 @@ use geometry::measure::size;
 use geometry::mesh::Mesh;
 use geometry::progress::{Progress, Silent, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
-use trabecula::analysis::{Spread, thickness, usual_step, voxels_for};
+use trabecula::analysis::{Spread, thickness, thickness_at_vertices, usual_step, voxels_for};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
@@ -207,4 +207,21 @@ fn it_can_be_stopped() {
     }
     let made = bare(block([0.0; 3], [1.0; 3]));
     assert!(matches!(thickness(&made, None, 0.05, &Stop), Err(Stopped::Interrupted)));
+}
+
+#[test]
+fn vertices_have_the_thickness_of_the_solid_at_them() {
+    // A slab away from its edges; a ball everywhere: its local thickness is its diameter at all points.
+    let step = 0.1;
+    let slab = full(Arc::new(Cuboid::new([0.0; 3], [6.0, 6.0, 1.0]).expect("box")), 0.25);
+    let found = thickness_at_vertices(&slab, step, &Silent).expect("thickness");
+    let inner = |p: &Vec3| (0..2).all(|a| (1.2..4.8).contains(&p[a]));
+    let within: Vec<f64> = slab.mesh.vertices.iter().zip(&found).filter(|(p, _)| inner(p)).map(|(_, t)| *t).collect();
+    assert!(within.len() > 100 && within.iter().all(|t| (t - 1.0).abs() < 0.01));
+    let sphere = full(Arc::new(ball([0.3, 0.2, 0.1], 1.0)), 0.1);
+    let found = thickness_at_vertices(&sphere, step, &Silent).expect("thickness");
+    let low = found.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(low > 2.0 - 0.2 * step && found.iter().all(|t| *t < 2.0 + 0.2 * step), "{low}");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool");
+    assert_eq!(found, pool.install(|| thickness_at_vertices(&sphere, step, &Silent).expect("thickness")));
 }

@@ -1,0 +1,222 @@
+//! Line drawings as SVG: contours and edges with hidden lines left out, sections hatched.
+
+use std::fmt::Write;
+
+use rayon::prelude::*;
+
+use super::hatching::hatching;
+use super::raster::Projected;
+use super::space_lines::{LineKind, SpaceLine, space_lines};
+use super::visible_parts::{Point, Seen, simpler};
+use super::{BAND, Camera, Section, View};
+use crate::math::{add, scale};
+use crate::surface_mesh::SurfaceMesh;
+use std::borrow::Cow;
+
+/// Samples along the longer side of the picture by which lines are judged to be seen.
+const SAMPLES: f64 = 3600.0;
+/// Of the width of the picture: that of contours and of edges, of hatching, and from one line of it to the next.
+const STROKES: [f64; 3] = [1.0 / 340.0, 1.0 / 500.0, 1.0 / 900.0];
+const HATCH: f64 = 1.0 / 75.0;
+/// Of the width of the picture: the length of edges that are too short to be drawn.
+const CRUMB: f64 = 0.012;
+
+/// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
+/// more than 35°, where it ends and between lattice and cuts; and the outline of a section, hatched. `size` is width and height in `unit`
+/// (`mm` or `px`), of the same aspect as that of the view. Empty for views that are no picture (see `render`).
+pub fn line_drawing(
+    surface: &SurfaceMesh,
+    view: &View,
+    section: Option<&Section>,
+    size: [f64; 2],
+    unit: &str,
+) -> String {
+    let [w, h] = view.size.map(|n| n as f64);
+    let bounds = surface.mesh.bounds();
+    if !(w > 0.0 && h > 0.0 && view.azimuth.is_finite() && view.elevation.is_finite()) {
+        return String::new();
+    }
+    let fine = SAMPLES / w.max(h);
+    let samples = [w, h].map(|n| ((n * fine).round() as usize).max(1));
+    // Pixels of the drawing for each sample.
+    let part = size[0] / samples[0] as f64;
+    let mut groups: [Vec<Vec<Point>>; 3] = Default::default();
+    let mut hatched = Vec::new();
+    if !bounds.is_empty() && bounds.is_finite() {
+        let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
+        let camera = Camera::new(&bounds, &shown, view, samples);
+        let rows = samples[1].div_ceil(BAND) * BAND;
+        let raster = Projected::of(surface, &camera, [samples[0], rows], section).draw(surface, 0, rows);
+        let eye = add(camera.center, scale(camera.axes[2], camera.distance));
+        let least = CRUMB * samples[0] as f64 * camera.distance / camera.focal;
+        let lines = space_lines(surface, eye, section, least);
+        let seen = Seen { camera: &camera, raster: &raster };
+        let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
+            lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();
+        for (kind, lines) in parts {
+            groups[kind as usize].extend(lines);
+        }
+        if section.is_some_and(|s| s.height(eye) > 0.0) {
+            hatched = hatching(&polygons(&lines, &camera), HATCH * samples[0] as f64);
+        }
+    }
+    let drawn =
+        groups.map(|lines| lines.into_iter().map(|line| line.iter().map(|p| p.map(|c| c * part)).collect()).collect());
+    let hatched = hatched.iter().map(|line| line.map(|p| p.map(|c| c * part)).to_vec()).collect();
+    text(&drawn, &hatched, size, unit)
+}
+
+/// The outlines of the section in the picture.
+fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<Point>> {
+    let closed = lines.iter().filter(|line| line.kind == LineKind::Section);
+    let place = |line: &SpaceLine| -> Vec<Point> {
+        let placed = line.points.iter().map(|p| camera.project(p.at));
+        simpler(&placed.map(|[x, y, _]| [x, y]).collect::<Vec<Point>>())
+    };
+    closed.map(place).collect()
+}
+
+/// The file.
+fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, [w, h]: [f64; 2], unit: &str) -> String {
+    let [contours, edges, section] = groups;
+    let [strong, thin, fine] = STROKES.map(|share| share * w);
+    // A hundredth of a stroke.
+    let digits = (4.0 - w.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}{unit}\" height=\"{h}{unit}\" viewBox=\"0 0 {w} {h}\">\n\
+         <g fill=\"none\" stroke=\"#000\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
+    );
+    for (name, width, lines) in [
+        ("hatching", fine, hatched),
+        ("edges", thin, edges),
+        ("contours", strong, contours),
+        ("section", strong, section),
+    ] {
+        if !lines.is_empty() {
+            let _ =
+                writeln!(out, "<path id=\"{name}\" stroke-width=\"{width:.digits$}\" d=\"{}\"/>", path(lines, digits));
+        }
+    }
+    out.push_str("</g>\n</svg>\n");
+    out
+}
+
+fn path(lines: &[Vec<Point>], digits: usize) -> String {
+    let mut out = String::new();
+    for line in lines {
+        let closed = line.len() > 2 && line.first() == line.last();
+        let points = &line[..line.len() - usize::from(closed)];
+        for (i, [x, y]) in points.iter().enumerate() {
+            let before = ["M", "L", " "][i.min(2)];
+            let _ = write!(out, "{before}{x:.digits$} {y:.digits$}");
+        }
+        out.push_str(if closed { "Z" } else { "" });
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{contour, sphere};
+    use super::*;
+    use crate::mesh::Mesh;
+
+    const VIEW: View = View { size: [400, 300], azimuth: 35.0, elevation: 25.0 };
+
+    /// The points of a path by its name.
+    fn lines(svg: &str, name: &str) -> Vec<Vec<Point>> {
+        let Some(at) = svg.find(&format!("id=\"{name}\"")) else {
+            return Vec::new();
+        };
+        let from = at + svg[at..].find(" d=\"").expect("path") + 4;
+        let path = &svg[from..from + svg[from..].find('"').expect("end")];
+        let whole = path.split('M').filter(|p| !p.is_empty());
+        whole
+            .map(|p| {
+                let numbers: Vec<f64> =
+                    p.trim_end_matches('Z').split(['L', ' ']).map(|v| v.parse().expect("number")).collect();
+                let mut points: Vec<Point> = numbers.chunks(2).map(|c| [c[0], c[1]]).collect();
+                if p.ends_with('Z') {
+                    points.push(points[0]);
+                }
+                points
+            })
+            .collect()
+    }
+
+    /// Of a cube three sides are seen: nine of twelve edges, and no contour but along them.
+    #[test]
+    fn a_cube_is_nine_edges() {
+        let mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
+        let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
+        let svg = line_drawing(&surface, &VIEW, None, [85.0, 63.75], "mm");
+        assert!(svg.contains("width=\"85mm\" height=\"63.75mm\" viewBox=\"0 0 85 63.75\""));
+        let found = lines(&svg, "edges");
+        let bounds = surface.mesh.bounds();
+        let camera = Camera::new(&bounds, &surface.mesh.vertices, &VIEW, [400, 300]);
+        let place = |p: [f64; 3]| {
+            let [x, y, _] = camera.project(p);
+            [x, y].map(|c| c * 85.0 / 400.0)
+        };
+        // From +x +y +z the corner at the origin is hidden.
+        let mut expected = 0.0;
+        for (a, b) in [(1, 3), (1, 5), (3, 7), (5, 7), (2, 3), (2, 6), (6, 7), (4, 5), (4, 6)] {
+            let corner = |i: usize| place(core::array::from_fn(|k| (i >> k & 1) as f64));
+            let (p, q) = (corner(a), corner(b));
+            expected += (p[0] - q[0]).hypot(p[1] - q[1]);
+        }
+        let total: f64 = found.iter().map(|line| super::super::visible_parts::length(line)).sum();
+        // Each of the three hidden ends may be seen for the samples around it.
+        assert!((total - expected).abs() < 6.0 * 8.0 * 85.0 / SAMPLES, "{total} {expected}");
+        assert!(lines(&svg, "hatching").is_empty());
+    }
+
+    /// The contour of a ball is one circle of the radius at which the lens sees it.
+    #[test]
+    fn a_ball_is_one_circle() {
+        let surface = sphere(40);
+        let svg = line_drawing(&surface, &VIEW, None, [400.0, 300.0], "px");
+        let found = lines(&svg, "contours");
+        assert_eq!(found.len(), 1, "{svg:.300}");
+        let span = |k: usize| found[0].iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        let middle = [0, 1].map(|k| (span(k).0 + span(k).1) / 2.0);
+        let radii: Vec<f64> = found[0].iter().map(|p| (p[0] - middle[0]).hypot(p[1] - middle[1])).collect();
+        let (low, high) = radii.iter().fold((f64::INFINITY, 0.0f64), |(l, h), r| (l.min(*r), h.max(*r)));
+        // 92 % of the height, but for the chords of the mesh, (edge / radius)² / 8.
+        assert!(low > 0.985 * 138.0 && high < 1.005 * 138.0, "{low} {high}");
+        assert!(lines(&svg, "edges").is_empty());
+        assert!(svg.len() < 20_000, "{}", svg.len());
+    }
+
+    /// Half a ball: the outline of the section is hatched by as much as it has area.
+    #[test]
+    fn a_section_is_hatched() {
+        let surface = sphere(40);
+        let eye = View { azimuth: 0.0, elevation: 0.0, ..VIEW };
+        let section = Section { normal: [1.0, 0.0, 0.0], offset: 0.5 };
+        let svg = line_drawing(&surface, &eye, Some(&section), [400.0, 300.0], "px");
+        let outline = lines(&svg, "section");
+        assert_eq!(outline.len(), 1);
+        let corners = &outline[0];
+        let area = corners.windows(2).map(|p| (p[0][0] * p[1][1] - p[0][1] * p[1][0]) / 2.0).sum::<f64>().abs();
+        let hatch = lines(&svg, "hatching");
+        let total: f64 = hatch.iter().map(|line| super::super::visible_parts::length(line)).sum();
+        assert!((total * 400.0 * HATCH / area - 1.0).abs() < 0.02, "{total} {area}");
+        // From behind, the section is not seen.
+        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, Some(&section), [400.0, 300.0], "px");
+        assert!(lines(&behind, "hatching").is_empty());
+        assert_eq!(lines(&behind, "contours").len() + lines(&behind, "section").len(), 1);
+    }
+
+    /// What lies behind is not drawn, and the drawing is the same for any number of threads.
+    #[test]
+    fn the_same_for_any_number_of_threads_and_nothing_of_nothing() {
+        let surface = contour(16, |p| (0..3).map(|k| (2.0 * core::f64::consts::TAU * p[k]).cos()).sum::<f64>());
+        let drawn = || line_drawing(&surface, &VIEW, None, [400.0, 300.0], "px");
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool").install(drawn);
+        assert_eq!(one, drawn());
+        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, None, [400.0, 300.0], "px");
+        assert!(!nothing.contains("<path"));
+        assert!(line_drawing(&surface, &View { size: [0, 3], ..VIEW }, None, [1.0, 1.0], "px").is_empty());
+    }
+}

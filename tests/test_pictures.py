@@ -1,0 +1,104 @@
+"""Pictures for papers: transparent backgrounds, sizes in mm, line drawings."""
+
+import re
+import struct
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import trabecula as lt
+from conftest import in_process
+from test_viewer import BOX, box
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return box().mesh(per_cell=16)
+
+
+def header(png):
+    """Width, height, colour type and pixels a metre of a PNG."""
+    width, height, _, colour = struct.unpack(">IIBB", png[16:26])
+    at = png.find(b"pHYs")
+    return width, height, colour, struct.unpack(">II", png[at + 4 : at + 12]) if at > 0 else None
+
+
+def paths(svg):
+    """The polylines (n, 2) of a drawing by the names of its paths; width and height as they are written."""
+    root = ElementTree.fromstring(svg)
+    found = {}
+    for path in root.iter(f"{SVG}path"):
+        lines = [re.split(r"[ L]", part.rstrip("Z")) for part in path.get("d").split("M") if part]
+        found[path.get("id")] = [np.array(line, float).reshape(-1, 2) for line in lines]
+    return found, root.get("width"), root.get("height"), [float(v) for v in root.get("viewBox").split()]
+
+
+def test_a_picture_has_a_background_or_none_and_its_size_in_print(mesh):
+    assert header(mesh.png((80, 60))) == (80, 60, 2, None)
+    assert header(mesh.png((80, 60), background="transparent", dpi=600)) == (80, 60, 6, (23622, 23622))
+    assert len({mesh.png((80, 60), background=name) for name in ("shaded", "white", "transparent")}) == 3
+    with pytest.raises(ValueError, match="background is 'grey'; it must be one of shaded, white, transparent"):
+        mesh.png(background="grey")
+    with pytest.raises(ValueError, match="dpi"):
+        mesh.png((80, 60), dpi=0)
+
+
+def test_a_line_drawing_is_small_within_its_size_and_hatched_where_it_is_cut(mesh):
+    svg = mesh.svg((850, 600), 40, 30, section="z=4", dpi=254)
+    found, width, height, view = paths(svg)
+    assert (width, height, view) == ("85mm", "60mm", [0, 0, 85, 60])
+    assert set(found) == {"contours", "edges", "section", "hatching"}
+    for lines in found.values():
+        points = np.concatenate(lines)
+        assert (points >= 0).all() and (points <= [85, 60]).all()
+    # Hatching is within the section's outlines: as many crossings of each line with them are on either side of its middle.
+    outlines = found["section"]
+    for line in found["hatching"][::20]:
+        x, y = line.mean(axis=0)
+        crossings = 0
+        for loop in outlines:
+            a, b = loop, np.roll(loop, -1, axis=0)
+            over = (a[:, 1] > y) != (b[:, 1] > y)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+            crossings += (over & (at > x)).sum()
+        assert crossings % 2 == 1, line
+    assert len(svg) < 250_000
+    assert mesh.svg((850, 600), 40, 30, section="z=4", dpi=254) == svg
+
+
+def test_what_lies_behind_is_not_drawn():
+    """A small box before a large one, and the same behind it."""
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    triangles = np.array([t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])])
+
+    def pair(x):
+        large, small = 4 * corners - [0, 2, 2], corners + np.array([x, -0.5, -0.5])
+        return lt.Mesh.of(np.concatenate([large, small]), np.concatenate([triangles, triangles + 8]))
+
+    drawn = {x: len(paths(pair(x).svg((400, 400), 0, 0))[0]["edges"]) for x in (8, -8)}
+    alone = len(paths(lt.Mesh.of(4 * corners, triangles).svg((400, 400), 0, 0))[0]["edges"])
+    assert drawn[8] > drawn[-8] == alone
+
+
+def test_the_command_draws_at_a_size_in_print(mesh, tmp_path):
+    (tmp_path / "box.toml").write_text(BOX)
+    mesh.write(tmp_path / "box.stl")
+    in_process("render", tmp_path / "box.stl", "-o", tmp_path / "a.svg", "--size", "85mm", "--section", "x=6")
+    assert paths((tmp_path / "a.svg").read_text())[1:3] == ("85mm", "63.75mm")
+    in_process("render", tmp_path / "box.stl", "-o", tmp_path / "a.png", "--size", "8x6mm", "--background", "transparent")
+    assert header((tmp_path / "a.png").read_bytes()) == (94, 71, 6, (11811, 11811))
+    in_process("render", tmp_path / "box.stl", "-o", tmp_path / "t.png", "--size", "80x60", "--show", "thickness")
+    assert header((tmp_path / "t.png").read_bytes()) == (80, 60, 2, None)
+    for wrong in (["--show", "thickness"], ["--turn", "4"], ["--background", "white"]):
+        in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.svg", *wrong, status=1)
+    in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.png", "--size", "900mm", "--dpi", 600, status=1)
+    assert not (tmp_path / "b.svg").exists() and not (tmp_path / "b.png").exists()
+    with pytest.raises(ValueError, match=r"an \.svg is a line drawing"):
+        mesh.render(tmp_path / "c.svg", color=np.zeros(mesh.counts[0]))
+    seen = mesh.view("thickness", section="z=4")
+    seen.save(tmp_path / "seen.svg", size=(400, 300))
+    assert "hatching" in (tmp_path / "seen.svg").read_text()
