@@ -131,9 +131,6 @@ fn the_boundary_of_what_is_cut_is_the_surface() {
     let mut values = vec![0.0; made.mesh.vertices.len()];
     can.values(&made.mesh.vertices, &mut values);
     let far = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    for (p, v) in made.mesh.vertices.iter().zip(&values) {
-        if v.abs() > 1e-3 {}
-    }
     // Distances of points of a sharp edge by planes taken a hundredth of a face away.
     assert!(far < 1e-3, "{far}");
 }
