@@ -21,7 +21,7 @@ pub enum TetsKind {
 /// A tetrahedral mesh that is made.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct MadeTetsKind {
-    /// Edge of a regular tetrahedron of the volume that tetrahedra are to have, a number or a grade.
+    /// Edge of a regular tetrahedron of the greatest volume that tetrahedra have, a number or a grade.
     #[kind(unit = "mm", above = 0.0)]
     pub size: GradeSpec,
     /// The program that makes it.

@@ -1,0 +1,86 @@
+"""Writes docs/generated/tets_fit.md: how tetrahedral meshes of regions fit them, at a fifteenth of the longest side.
+
+python scripts/tets_fit.py [MESH ...]
+
+The parts are those of the repository and mesh files that are given, such as fandisk.obj.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import trabecula as lt
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "docs" / "generated" / "tets_fit.md"
+
+R = lt.region
+
+
+def regions():
+    """(name, region), of the repository."""
+    holes = [R.cylinder(base=[x, y, -1], radius=r, height=8) for x, y, r in ((8, 8, 2.5), (52, 8, 2.5), (8, 32, 2.5), (30, 20, 8))]
+    box = R.box(min=[0, 0, 0], max=[60, 40, 6])
+    axis = [1, 2, 3]
+    tilted = [R.halfspace(point=p, normal=n) for n, p in ((axis, [1, 2, 3]), ([-1, -2, -3], [-1, -2, -3]), ([2, -1, 0], [4, -2, 0]))]
+    tilted += [R.halfspace(point=p, normal=n) for n, p in (([-2, 1, 0], [-4, 2, 0]), ([3, 6, -5], [1.5, 3, -2.5]), ([-3, -6, 5], [-1.5, -3, 2.5]))]
+    return {
+        "plate with holes": R.difference(box, *holes),
+        "turned box": R.intersection(R.sphere(radius=20), *tilted),
+        "slanted cylinder": R.cylinder(base=[0, 0, 0], axis=axis, radius=4, height=10),
+        "slanted tube": R.difference(
+            R.cylinder(base=[0, 0, 0], axis=axis, radius=5, height=12),
+            R.cylinder(base=[-1, -2, -3], axis=axis, radius=3.5, height=30),
+        ),
+        "shell of a twentieth": R.difference(R.sphere(radius=10), R.sphere(radius=9.5)),
+        "hip stem": R.mesh(path=str(ROOT / "examples" / "parts" / "hip_stem.stl")),
+    }
+
+
+def longest(region):
+    """Of the sides of the region's bounds, mm."""
+    low, high = lt.Design(region=region).build().report()["region"]["bounds"]
+    return max(h - l for l, h in zip(low, high, strict=True))
+
+
+def row(name, region):
+    """One of the table."""
+    size = longest(region) / 15
+    start = time.process_time()
+    report = lt.TetMesh.of({"region": region, "lattice": {"a": {"map": lt.map.tets(size=size)}}}).report()
+    seconds = time.process_time() - start
+    quality, fit = report["quality"], report["fit"]
+    angles = quality["dihedral"]
+    cells = [
+        name,
+        f"{quality['tets']:,}".replace(",", " "),
+        f"{100 * (quality['volume'] / report['region_volume'] - 1):+.2f} %",
+        f"{fit['from_part']['p99'] / size:.3f}, {fit['from_part']['max'] / size:.3f}",
+        f"{fit['to_part']['p99'] / size:.3f}, {fit['to_part']['max'] / size:.3f}",
+        f"{angles['min']:.1f}° to {angles['max']:.1f}°",
+        str(quality["pieces"]),
+        f"{seconds:.1f}",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main():
+    """Write the page."""
+    given = {Path(p).stem: R.mesh(path=str(Path(p).resolve())) for p in sys.argv[1:]}
+    rows = [row(name, region) for name, region in (regions() | given).items()]
+    about = (
+        "# Fit of tetrahedral meshes",
+        "",
+        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth of the longest side of the part. Volume of the flat tetrahedra",
+        "against the region's; distances from the part to the mesh and back, 99th percentile and greatest, in sizes; dihedral angles;",
+        "processor seconds for the mesh and its fit. See [tetrahedral meshes](../concepts/tets.md).",
+        "",
+        "| part | tetrahedra | volume | part to mesh | mesh to part | angles | pieces | s |",
+        "|---|---|---|---|---|---|---|---|",
+    )
+    OUT.write_text("\n".join([*about, *rows]) + "\n", encoding="utf-8", newline="\n")
+    print(OUT)
+
+
+if __name__ == "__main__":
+    main()
