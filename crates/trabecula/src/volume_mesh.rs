@@ -82,9 +82,10 @@ pub struct Named<'a> {
 /// An edge too fine; a side of what is no sheet; periodic where the solid is not; nothing to mesh; an empty set of the solid's surface;
 /// an interruption.
 pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
-    let domains = Domains::new(solid, options.of).map_err(Stopped::Refused)?;
-    if domains.surfaces.len() > MOST {
-        let count = domains.surfaces.len();
+    let by_patches = (!options.periodic).then_some(options.edge);
+    let domains = Domains::new(solid, options.of, by_patches).map_err(Stopped::Refused)?;
+    if domains.own > MOST {
+        let count = domains.own;
         let m = format!(
             "the design has {count} surfaces; a volume mesh takes at most {MOST}: unite keep zones, or mesh a part of it"
         );
@@ -100,7 +101,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
         );
         return Err(Stopped::Refused(Fault::new("edge", m)));
     }
-    let total = domains.surfaces.len() as u64 + 18;
+    let total = domains.own as u64 + 18;
     let done = std::sync::atomic::AtomicU64::new(0);
     let goes_on = || progress.step(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
     let mut partition = background(&domains, &cubes, &planes);
@@ -111,7 +112,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     let step = cubes.step().into_iter().fold(0.0, f64::max);
     let structural: Vec<usize> = planes.iter().flatten().flatten().copied().collect();
-    for s in (0..domains.surfaces.len()).filter(|s| !structural.contains(s)) {
+    for s in (0..domains.own).filter(|s| !structural.contains(s)) {
         if !goes_on() {
             return Err(Stopped::Interrupted);
         }
@@ -177,7 +178,7 @@ fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Parti
     }
     let next = (0..nodes.len() as u32).collect();
     let tets = tets.into_iter().map(|nodes| Tet { nodes, negative, positive: 0 }).collect();
-    Partition { surfaces: &domains.surfaces, patched: &[], trees: &domains.trees, nodes, on, next, tets }
+    Partition { surfaces: &domains.surfaces, patched: &domains.patched, trees: &domains.trees, nodes, on, next, tets }
 }
 
 /// The improved mesh with sets, pairs and, of order 2, nodes on edges.
@@ -194,7 +195,7 @@ fn assembled(
     let mut tets: Vec<[u32; 4]> = order.iter().map(|t| tets[*t as usize]).collect();
     let domain: Vec<u8> = order.iter().map(|t| domain[*t as usize]).collect();
     let next = compacted(&mut nodes, &mut on, next, &mut tets);
-    let faces = faces_on_surfaces(&tets, &domain, &on);
+    let mut faces = faces_on_surfaces(&tets, &domain, &on);
     let upper = core::array::from_fn(|a| planes[a][1].map_or(0, only));
     let mut pairs = if options.periodic { cyclic_nodes::pairs(&nodes, &on, &next, upper) } else { Vec::new() };
     let (mut middles, mut straight) = (Vec::new(), 0);
@@ -215,6 +216,9 @@ fn assembled(
         nodes.extend(&mids.nodes);
         middles = mids.of.into_iter().map(|t| t.map(|n| n + corners)).collect();
         straight = mids.straight;
+    }
+    for patched in &domains.patched {
+        faces.iter_mut().for_each(|f| f.1 = patched.folded(f.1));
     }
     let period = if options.periodic {
         core::array::from_fn(|a| {

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::node_surfaces::{MOST, members, only};
+use super::node_surfaces::{MOST, SurfaceSet, members, only};
 use super::partition::{Partition, Tet};
 use super::surface_cuts::evaluated;
 use crate::field::Field;
 use crate::implicit::Surface;
-use geometry::math::{Aabb, Interval, Vec3};
+use geometry::math::{Aabb, Interval, Vec3, norm, sub};
 use geometry::surface_patches::{PatchGroup, patch_groups};
 use rayon::prelude::*;
 
@@ -25,6 +25,12 @@ impl Patched {
     /// The numbers of the groups.
     pub fn groups(&self) -> Range<usize> {
         self.first..self.first + self.groups.len()
+    }
+
+    /// A set with the mesh in place of its groups.
+    pub fn folded(&self, set: SurfaceSet) -> SurfaceSet {
+        let groups = self.groups().fold(0, |all, g| all | only(g));
+        if set & groups == 0 { set } else { set & !groups | only(self.mesh) }
     }
 
     /// Whether a patch of the group with this number meets a tetrahedron.
@@ -69,11 +75,29 @@ impl Field for GroupField {
 impl Partition<'_> {
     /// Cuts tetrahedra along the patches of a mesh that meet them, and notes on which side of it all lie.
     pub fn cut_by_patches(&mut self, patched: &Patched, step: f64) {
+        self.settle_far(patched.mesh);
         for g in patched.groups() {
             let dependent = self.met(patched, g);
             self.cut_where(g, &dependent, step);
         }
         self.settle(patched, step);
+    }
+
+    /// Notes on which side of a mesh those lie that it cannot reach.
+    fn settle_far(&mut self, mesh: usize) {
+        let field = &*self.surfaces[mesh].field;
+        let (nodes, trees) = (&self.nodes, self.trees);
+        self.tets.par_iter_mut().filter(|t| t.depends_on(mesh, trees)).for_each(|t| {
+            let p = t.nodes.map(|n| nodes[n as usize]);
+            let middle = mean(&p);
+            let reach = p.iter().map(|p| norm(sub(*p, middle))).fold(0.0, f64::max);
+            let v = field.value(middle);
+            if v < -reach {
+                t.negative |= only(mesh);
+            } else if v > reach {
+                t.positive |= only(mesh);
+            }
+        });
     }
 
     /// Which tetrahedra depend on a mesh and meet a group of its patches.
@@ -116,7 +140,7 @@ impl Partition<'_> {
         asked.iter().zip(evaluated(field, &points)).for_each(|(n, v)| values[*n] = v);
         let groups = patched.groups().fold(0, |set, g| set | only(g));
         let (nodes, surfaces) = (&self.nodes, self.surfaces);
-        self.tets.par_iter_mut().for_each(|t| {
+        self.tets.par_iter_mut().filter(|t| (t.negative | t.positive) & only(patched.mesh) == 0).for_each(|t| {
             let farthest = t
                 .nodes
                 .map(|n| values[n as usize])
@@ -126,7 +150,7 @@ impl Partition<'_> {
                 farthest < 0.0
             } else {
                 let p = t.nodes.map(|n| nodes[n as usize]);
-                let middle = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
+                let middle = mean(&p);
                 let v = field.value(middle);
                 let nearest = |g: &usize| (surfaces[*g].field.value(middle).abs() - v.abs()).abs() <= ROUNDING * step;
                 match members((t.negative | t.positive) & groups).find(nearest) {
@@ -137,4 +161,9 @@ impl Partition<'_> {
             if inside { t.negative |= only(patched.mesh) } else { t.positive |= only(patched.mesh) }
         });
     }
+}
+
+/// The mean of the corners of a tetrahedron.
+fn mean(p: &[Vec3; 4]) -> Vec3 {
+    core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0)
 }

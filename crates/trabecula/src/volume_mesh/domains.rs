@@ -1,5 +1,6 @@
 //! What is meshed: domains over common surfaces, and whose each surface is.
 
+use crate::conforming_tets::Patched;
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::solid::{Solid, Space};
@@ -29,22 +30,29 @@ impl Of {
 /// Domains over common surfaces; no two overlap.
 pub(super) struct Domains {
     pub names: Vec<&'static str>,
+    /// The surfaces, then the groups of patches of those that are meshes.
     pub surfaces: Vec<Surface>,
+    /// The number of surfaces without those groups.
+    pub own: usize,
+    /// Those that are meshes with feature edges.
+    pub patched: Vec<Patched>,
     pub trees: Vec<CsgTree>,
     /// The number of surfaces of the region, which come first.
     pub region: usize,
-    /// The number of the first surface of the lattice, which come last.
+    /// The number of the first surface of the lattice, which come last of these.
     pub lattice: usize,
     /// What is solid whatever the lattice says.
     pub filled: Vec<CsgSolid>,
 }
 
 impl Domains {
+    /// The domains of a solid; meshes are cut patch by patch for tetrahedra of `edge` (mm) if that is given.
+    ///
     /// # Errors
     /// A side of what is no sheet.
-    pub fn new(solid: &Solid, of: Of) -> Result<Domains, Fault> {
+    pub fn new(solid: &Solid, of: Of, edge: Option<f64>) -> Result<Domains, Fault> {
         let sheet = solid.field.as_ref().is_some_and(|f| f.faces().is_some());
-        let (names, surfaces, trees) = match of {
+        let (names, mut surfaces, trees) = match of {
             Of::Lower | Of::Upper | Of::All if sheet || of != Of::All => {
                 let spaces = solid.spaces().map_err(|f| Fault { at: "of".into(), ..f })?;
                 let chosen: &[Space] = match of {
@@ -70,7 +78,9 @@ impl Domains {
         let region = surfaces.iter().take_while(|s| s.cut).count();
         let filled: Vec<CsgSolid> = if solid.field.is_some() { solid.filled.clone() } else { Vec::new() };
         let lattice = region + filled.iter().map(|b| b.surfaces.len()).sum::<usize>();
-        Ok(Domains { names, surfaces, trees, region, lattice, filled })
+        let own = surfaces.len();
+        let patched = edge.map(|edge| Patched::of(&mut surfaces, edge)).unwrap_or_default();
+        Ok(Domains { names, surfaces, own, patched, trees, region, lattice, filled })
     }
 }
 
