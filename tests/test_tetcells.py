@@ -179,7 +179,7 @@ def test_zones_that_do_not_join_are_told_before_a_surface_is_made():
     tets = solid.report()["lattices"]["a"]["tets"]
     # Several pieces are counted again in finer steps.
     assert not tets["joins"][0]["joined"] and tets["pieces"] > 1
-    assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 32).pieces
+    assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 48).pieces
     # Without zones the pieces are told too.
     assert design().build().report()["lattices"]["a"]["tets"]["pieces"] == 1
 

@@ -194,7 +194,7 @@ def tets(
 ) -> dict:
     """Piecewise affine over a tetrahedral mesh of the region, made or from a file: a cell in each tetrahedron.
 
-    size: Edge of a regular tetrahedron of the volume that tetrahedra are to have, a number or a grade. [mm, above 0,
+    size: Edge of a regular tetrahedron of the greatest volume that tetrahedra have, a number or a grade. [mm, above 0,
         optional]
     mesher: The program that makes it. [default "background"]
     limit: Time that another mesher than the background one may take. [s, above 0, default 600.0]
