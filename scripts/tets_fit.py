@@ -19,28 +19,36 @@ R = lt.region
 
 def regions():
     """(name, region), of the repository."""
-    holes = [R.cylinder(base=[x, y, -1], radius=r, height=8) for x, y, r in ((8, 8, 2.5), (52, 8, 2.5), (8, 32, 2.5), (30, 20, 8))]
-    box = R.box(min=[0, 0, 0], max=[60, 40, 6])
-    axis = [1, 2, 3]
-    tilted = [R.halfspace(point=p, normal=n) for n, p in ((axis, [1, 2, 3]), ([-1, -2, -3], [-1, -2, -3]), ([2, -1, 0], [4, -2, 0]))]
-    tilted += [R.halfspace(point=p, normal=n) for n, p in (([-2, 1, 0], [-4, 2, 0]), ([3, 6, -5], [1.5, 3, -2.5]), ([-3, -6, 5], [-1.5, -3, 2.5]))]
+    along = [1, 2, 3]
+    drilled = ((8, 8, 2.5), (52, 8, 2.5), (8, 32, 2.5), (30, 20, 8))
+    holes = [R.cylinder(base=[x, y, -1], radius=r, height=8) for x, y, r in drilled]
+    plate = R.box(min=[0, 0, 0], max=[60, 40, 6])
+    # Three directions normal to each other, and how far the planes are from the origin in their lengths.
+    planes = ((along, 1.0), ([2, -1, 0], 2.0), ([3, 6, -5], 0.5))
+    sides = [(scaled(n, s), scaled(n, s * far)) for n, far in planes for s in (1, -1)]
     return {
-        "plate with holes": R.difference(box, *holes),
-        "turned box": R.intersection(R.sphere(radius=20), *tilted),
-        "slanted cylinder": R.cylinder(base=[0, 0, 0], axis=axis, radius=4, height=10),
+        "plate with holes": R.difference(plate, *holes),
+        "turned box": R.intersection(R.sphere(radius=20), *(R.halfspace(point=p, normal=n) for n, p in sides)),
+        "slanted cylinder": R.cylinder(base=[0, 0, 0], axis=along, radius=4, height=10),
         "slanted tube": R.difference(
-            R.cylinder(base=[0, 0, 0], axis=axis, radius=5, height=12),
-            R.cylinder(base=[-1, -2, -3], axis=axis, radius=3.5, height=30),
+            R.cylinder(base=[0, 0, 0], axis=along, radius=5, height=12),
+            R.cylinder(base=[-1, -2, -3], axis=along, radius=3.5, height=30),
         ),
-        "shell of a twentieth": R.difference(R.sphere(radius=10), R.sphere(radius=9.5)),
+        "shell, thickness a twentieth of its radius": R.difference(R.sphere(radius=10), R.sphere(radius=9.5)),
         "hip stem": R.mesh(path=str(ROOT / "examples" / "parts" / "hip_stem.stl")),
     }
 
 
+def scaled(vector, by):
+    """A vector times a number."""
+    return [by * v for v in vector]
+
+
 def longest(region):
     """Of the sides of the region's bounds, mm."""
-    low, high = lt.Design(region=region).build().report()["region"]["bounds"]
-    return max(h - l for l, h in zip(low, high, strict=True))
+    gyroid = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=1), level=lt.level.fraction(0.3))
+    low, high = lt.Design(region=region, lattice={"a": gyroid}).build().report()["region"]["bounds"]
+    return max(b - a for a, b in zip(low, high, strict=True))
 
 
 def row(name, region):
@@ -71,9 +79,9 @@ def main():
     about = (
         "# Fit of tetrahedral meshes",
         "",
-        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth of the longest side of the part. Volume of the flat tetrahedra",
-        "against the region's; distances from the part to the mesh and back, 99th percentile and greatest, in sizes; dihedral angles;",
-        "processor seconds for the mesh and its fit. See [tetrahedral meshes](../concepts/tets.md).",
+        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth of the longest side of the part. Volume of the",
+        "flat tetrahedra against the region's; distances from the part to the mesh and back, 99th percentile and greatest, in",
+        "sizes; dihedral angles; processor seconds for the mesh and its fit. See [tetrahedral meshes](../concepts/tets.md).",
         "",
         "| part | tetrahedra | volume | part to mesh | mesh to part | angles | pieces | s |",
         "|---|---|---|---|---|---|---|---|",
