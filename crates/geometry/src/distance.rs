@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 use crate::repair::{self, Boundary, Repair, Repaired};
 
 mod disc;
-mod normals;
+pub(crate) mod normals;
 pub mod periodic;
 pub mod triangle;
 pub mod triangle_bvh;

@@ -3,9 +3,9 @@
 //! A signed distance bends at the feature edges of a solid, and between two sheets of a thin wall. The function of one patch does not:
 //! beyond its boundary it goes on as the tangent plane there, so that two of them meet in the feature edge and three in the corner.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use crate::distance::normals::Normals;
 use crate::distance::triangle::{Feature, Triangle, normal};
 use crate::distance::triangle_bvh::{Nearest, TriangleBvh};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -25,10 +25,9 @@ const APART: f64 = 2.5;
 #[derive(Debug)]
 pub struct PatchGroup {
     tree: TriangleBvh,
-    /// Outward normals of the edges and corners of each triangle, in the tree's order.
-    normals: Vec<[Vec3; 6]>,
-    /// Whether these are on the boundary of the patch, by bits.
-    at_boundary: Vec<u8>,
+    normals: Normals,
+    /// Which corners of each triangle are on the boundary of its patch, in the tree's order.
+    at_boundary: Vec<[bool; 3]>,
 }
 
 /// The patches of a closed mesh that elements of a size (mm) resolve, in groups. The groups of a mesh without feature edges are none.
@@ -41,7 +40,7 @@ pub fn patch_groups(mesh: &Mesh, size: f64) -> Vec<PatchGroup> {
     let group = groups(mesh, &patch, count, size);
     let groups = group.iter().max().map_or(0, |g| g + 1);
     let of = |g: usize| (0..patch.len()).filter(|t| group[patch[*t] as usize] == g).collect::<Vec<_>>();
-    (0..groups).map(|g| PatchGroup::new(mesh, &of(g), &patch)).collect()
+    (0..groups).map(|g| PatchGroup::new(&part(mesh, &of(g)))).collect()
 }
 
 /// Two adjacent triangles, the length of their edge, and whether it is a feature edge.
@@ -144,61 +143,54 @@ fn groups(mesh: &Mesh, patch: &[u32], count: usize, size: f64) -> Vec<usize> {
     group
 }
 
+/// Some triangles of a mesh as one of their own.
+fn part(mesh: &Mesh, of: &[usize]) -> Mesh {
+    let mut number: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut vertices = Vec::new();
+    let mut renamed = |v: u32| {
+        *number.entry(v).or_insert_with(|| {
+            vertices.push(mesh.vertices[v as usize]);
+            vertices.len() as u32 - 1
+        })
+    };
+    let triangles = of.iter().map(|t| mesh.triangles[*t].map(&mut renamed)).collect();
+    Mesh { vertices, triangles }
+}
+
 impl PatchGroup {
-    /// The function of some triangles of a mesh, whose patches are given.
-    fn new(mesh: &Mesh, of: &[usize], patch: &[u32]) -> PatchGroup {
-        let triangles: Vec<Triangle> = of.iter().map(|t| Triangle::new(mesh.corners(*t))).collect();
-        let tree = TriangleBvh::new(&triangles);
-        // By edge: the sum of normals, and how many triangles of the group have it.
-        let mut edges: FxHashMap<[u32; 2], (Vec3, u8)> = FxHashMap::default();
-        let mut corners: FxHashMap<(u32, u32), Vec3> = FxHashMap::default();
-        let edge = |t: usize, k: usize| {
-            let [a, b] = [mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]];
-            [a.min(b), a.max(b)]
-        };
-        for (t, f) in of.iter().zip(&triangles) {
-            for k in 0..3 {
-                let e = edges.entry(edge(*t, k)).or_default();
-                *e = (add(e.0, f.normal), e.1 + 1);
-                let [a, b, c] = [0, 1, 2].map(|i| f.corners[(k + i) % 3]);
-                let (u, v) = (sub(b, a), sub(c, a));
-                let angle = norm(cross(u, v)).atan2(dot(u, v));
-                let n = corners.entry((mesh.triangles[*t][k], patch[*t])).or_default();
-                *n = add(*n, scale(f.normal, angle));
-            }
+    /// The function of a mesh that is open where its patches end.
+    fn new(mesh: &Mesh) -> PatchGroup {
+        let faces: Vec<Triangle> = (0..mesh.triangles.len()).map(|i| Triangle::new(mesh.corners(i))).collect();
+        let tree = TriangleBvh::new(&faces);
+        let halves = halves(mesh);
+        let edges = || halves.chunk_by(|a, b| a.0 == b.0);
+        let pairs: Vec<[u32; 2]> = edges().filter(|e| e.len() == 2).map(|e| [e[0].1, e[1].1]).collect();
+        let normals = Normals::new(mesh, &faces, &pairs, tree.order());
+        let mut at_boundary = vec![false; mesh.vertices.len()];
+        for e in edges().filter(|e| e.len() == 1) {
+            ends(mesh, e[0].1).into_iter().for_each(|v| at_boundary[v as usize] = true);
         }
-        let mut boundary_vertices: Vec<u32> = edges.iter().filter(|e| e.1.1 == 1).flat_map(|e| *e.0).collect();
-        boundary_vertices.sort_unstable();
-        let about = |i: &u32| {
-            let t = of[*i as usize];
-            let of_edges = [0, 1, 2].map(|k| edges[&edge(t, k)]);
-            let at = mesh.triangles[t];
-            let of_corners = at.map(|v| unit(corners[&(v, patch[t])]));
-            let mut bits = 0;
-            for k in 0..3 {
-                bits |= u8::from(of_edges[k].1 == 1) << k;
-                bits |= u8::from(boundary_vertices.binary_search(&at[k]).is_ok()) << (3 + k);
-            }
-            let [a, b, c] = of_edges.map(|e| unit(e.0));
-            let [d, e, f] = of_corners;
-            ([a, b, c, d, e, f], bits)
-        };
-        let (normals, at_boundary) = tree.order().par_iter().map(about).unzip();
-        PatchGroup { tree, normals, at_boundary }
+        let of = |i: &u32| mesh.triangles[*i as usize].map(|v| at_boundary[v as usize]);
+        PatchGroup { normals, at_boundary: tree.order().iter().map(of).collect(), tree }
     }
 
     /// The value (mm), positive outside, and its gradient, of a point whose nearest triangle is `hit`.
     fn at(&self, hit: &Nearest) -> (f64, Vec3) {
         let i = hit.triangle as usize;
-        let (n, bit) = match hit.feature {
-            Feature::Face => (self.tree.triangles()[i].normal, 0),
-            Feature::Edge(k) => (self.normals[i][usize::from(k)], 1 << k),
-            Feature::Corner(k) => (self.normals[i][3 + usize::from(k)], 8 << k),
+        let outward = unit(self.normals.outward(&self.tree, hit));
+        // An edge of one triangle has no normal of two.
+        let (n, flat) = match hit.feature {
+            Feature::Face => (outward, true),
+            Feature::Edge(_) if outward == [0.0; 3] => (self.tree.triangles()[i].normal, true),
+            Feature::Edge(_) => (outward, false),
+            Feature::Corner(k) => (outward, self.at_boundary[i][usize::from(k)]),
         };
-        let height = dot(hit.away, n);
-        let d = hit.square.sqrt();
-        if hit.feature == Feature::Face || self.at_boundary[i] & bit != 0 || d <= self.tree.rounding() {
-            return (if d <= self.tree.rounding() { 0.0 } else { height }, n);
+        let (height, d) = (dot(hit.away, n), hit.square.sqrt());
+        if d <= self.tree.rounding() {
+            return (0.0, n);
+        }
+        if flat {
+            return (height, n);
         }
         let signed = if height < 0.0 { -d } else { d };
         (signed, scale(hit.away, 1.0 / signed))
@@ -279,4 +271,67 @@ fn clipped(corners: [Vec3; 3], planes: &[(Vec3, f64); 4]) -> Vec<Vec3> {
 fn area(polygon: &[Vec3]) -> f64 {
     let fan = polygon.windows(2).skip(1).map(|w| cross(sub(w[0], polygon[0]), sub(w[1], polygon[0])));
     0.5 * norm(fan.fold([0.0; 3], add))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box between the origin and `size`.
+    fn cuboid(size: Vec3) -> Mesh {
+        let corner = |i: usize| -> Vec3 { core::array::from_fn(|k| if i >> k & 1 == 1 { size[k] } else { 0.0 }) };
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+        Mesh { vertices: (0..8).map(corner).collect(), triangles }
+    }
+
+    #[test]
+    fn each_side_of_a_box_goes_on_as_its_plane() {
+        let groups = patch_groups(&cuboid([1.0, 2.0, 3.0]), 1.0);
+        assert_eq!(groups.len(), 6, "sides closer than two and a half sizes are in groups of their own");
+        for p in [[0.3, 0.4, 0.5], [1.5, -0.4, 0.2], [-2.0, 3.0, 4.5], [1.0, 2.0, 3.0]] {
+            let mut found: Vec<f64> = groups
+                .iter()
+                .map(|g| {
+                    let (mut v, mut n) = ([0.0], [[0.0; 3]]);
+                    g.gradients(&[p], &mut v, &mut n);
+                    assert!((norm(n[0]) - 1.0).abs() < 1e-12);
+                    v[0]
+                })
+                .collect();
+            let [x, y, z] = p;
+            let mut planes = [-x, x - 1.0, -y, y - 2.0, -z, z - 3.0];
+            found.sort_by(f64::total_cmp);
+            planes.sort_by(f64::total_cmp);
+            assert!(found.iter().zip(planes).all(|(a, b)| (a - b).abs() < 1e-12), "{p:?}: {found:?}, not {planes:?}");
+        }
+    }
+
+    #[test]
+    fn far_sides_share_a_group_and_narrow_ones_are_joined() {
+        // Ten times as long as apart: both ends are of one group.
+        assert_eq!(patch_groups(&cuboid([10.0, 1.0, 1.0]), 1.0).len(), 5);
+        // Sides a hundredth of a size wide are no patches of their own.
+        let (patch, count) = {
+            let mesh = cuboid([1.0, 1.0, 0.01]);
+            patches(&mesh, &feature_edges(&mesh), 0.05)
+        };
+        assert_eq!(count, 2, "{patch:?}");
+    }
+
+    #[test]
+    fn a_patch_meets_what_it_enters_or_covers_and_nothing_that_it_touches() {
+        let groups = patch_groups(&cuboid([4.0, 4.0, 4.0]), 1.0);
+        let met = |at: Vec3| {
+            let tet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| add(p, at));
+            groups.iter().filter(|g| g.meets(&tet)).count()
+        };
+        // Across one plane, with a face on one, across an edge, and with nothing but an edge of its own on one.
+        assert_eq!(met([1.0, 1.0, -0.5]), 1);
+        assert_eq!(met([1.0, 1.0, 4.0]), 1);
+        assert_eq!(met([1.0, -0.3, -0.3]), 2);
+        assert_eq!(met([4.0, 1.0, 1.0]), 1);
+        assert_eq!(met([1.5, 1.5, 1.5]), 0);
+        assert_eq!(met([1.0, 4.0, -1.0]), 0);
+    }
 }

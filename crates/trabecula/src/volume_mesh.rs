@@ -1,11 +1,7 @@
 //! Volume meshes: tetrahedra of a solid, of the pore or of both, that conform to its surfaces, edges and corners.
 //!
-//! A body-centred background that ends exactly at the region's bounding planes is cut along each implicit surface in turn
-//! (`surface_cuts.rs`). Nodes know the surfaces they lie on, so that faces, feature edges and corners of the solid are faces, edges and
-//! nodes of the mesh, at any wall thickness. Shapes are then improved by moving nodes along their surfaces, by flips and by collapses, and
-//! the volume that chords cut off is balanced.
-//!
-//! Background and first cut are those of isosurface stuffing: F. Labelle, J. R. Shewchuk, ACM Transactions on Graphics 26(3), 2007.
+//! A body-centred background that ends exactly at the region's bounding planes is cut along each implicit surface in turn, and shapes
+//! are improved (`conforming_tets.rs`); the volume that chords cut off is balanced.
 
 use geometry::fault::{Fault, number};
 use geometry::fe_mesh::FeMesh;
