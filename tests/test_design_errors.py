@@ -162,7 +162,7 @@ CASES = [
     ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["size and min at once"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = -2", "region.sphere.radius", ["-2"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'none.stl'", "region.mesh.path", ["does not exist"]),
-    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.step'", "region.mesh.path", ["stl"]),
+    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.x_t'", "region.mesh.path", ["stl"]),
     (
         "[region.box]\nsize = [8, 8, 8]",
         "[region.mesh]\npath = 'a.stl'\nunit = 'inches'",
