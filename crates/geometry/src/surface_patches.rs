@@ -3,11 +3,14 @@
 //! A signed distance bends at the feature edges of a solid, and between two sheets of a thin wall. The function of one patch does not:
 //! beyond its boundary it goes on as the tangent plane there, so that two of them meet in the feature edge and three in the corner.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashMap;
 
 use crate::distance::normals::Normals;
 use crate::distance::triangle::{Feature, Triangle, normal};
 use crate::distance::triangle_bvh::{Nearest, TriangleBvh};
+use crate::feature_edges::{Creases, creases};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 use crate::repair::half_edges::{ends, halves};
@@ -28,6 +31,8 @@ pub struct PatchGroup {
     normals: Normals,
     /// Which corners of each triangle are on the boundary of its patch, in the tree's order.
     at_boundary: Vec<[bool; 3]>,
+    /// The creases within its patches: shallow ones, and those that end in a patch.
+    pub creases: Arc<Creases>,
 }
 
 /// The patches of a closed mesh that elements of a size (mm) resolve, in groups. The groups of a mesh without feature edges are none.
@@ -171,7 +176,8 @@ impl PatchGroup {
             ends(mesh, e[0].1).into_iter().for_each(|v| at_boundary[v as usize] = true);
         }
         let of = |i: &u32| mesh.triangles[*i as usize].map(|v| at_boundary[v as usize]);
-        PatchGroup { normals, at_boundary: tree.order().iter().map(of).collect(), tree }
+        let at_boundary = tree.order().iter().map(of).collect();
+        PatchGroup { normals, at_boundary, tree, creases: Arc::new(creases(mesh)) }
     }
 
     /// The value (mm), positive outside, and its gradient, of a point whose nearest triangle is `hit`.

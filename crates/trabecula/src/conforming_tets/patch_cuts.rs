@@ -48,7 +48,11 @@ impl Patched {
                 continue;
             }
             let first = surfaces.len();
-            surfaces.extend(groups.iter().map(|g| Surface::distance(Arc::new(GroupField(g.clone())))));
+            let surface = |g: &Arc<PatchGroup>| Surface {
+                creases: g.creases.clone(),
+                ..Surface::distance(Arc::new(GroupField(g.clone())))
+            };
+            surfaces.extend(groups.iter().map(surface));
             found.push(Patched { mesh, first, groups });
         }
         found
