@@ -292,6 +292,20 @@ def test_commands_take_step(tmp_path, monkeypatch):
     assert 'path = "b.STEP"' in (tmp_path / "new.toml").read_text()
 
 
+def test_tetrahedra_follow_a_part_from_a_file():
+    region = lt.region.mesh(path=str(BRACKET))
+    mesh = lt.TetMesh.of({"region": region, "lattice": {"a": {"map": lt.map.tets(size=8)}}})
+    # Chords on holes of radius 3 and 10, at most as long as the radius.
+    assert mesh.volume == pytest.approx(VOLUME, rel=0.02) and mesh.report()["quality"]["pieces"] == 1
+
+
+@pytest.mark.parametrize("wrong", [{"chord": -1}, {"chord": float("nan")}, {"angle": 0}, {"angle": 100}, {"solid": 3}])
+def test_accuracy_is_checked(wrong):
+    (key,) = wrong
+    with pytest.raises((ValueError, TypeError), match=rf"^{key} is .* must be"):
+        cad.read(BRACKET, **wrong)
+
+
 def test_damaged_files_are_refused_in_one_sentence(tmp_path):
     text = BRACKET.read_text()
     hollow = "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n"

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import children
+from .given import positive
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,7 +72,12 @@ def read(
     if not os.path.isfile(name):
         raise ValueError(f"{os.fsdecode(path)} does not exist" if not os.path.exists(name) else f"{path} is no file")
     about = os.stat(name)
-    turn = ANGLE if angle is None else angle
+    turn = ANGLE if angle is None else positive("angle", angle)
+    if turn > 90:
+        raise ValueError(f"angle is {turn:g}; it must be at most 90 degrees")
+    if not (solid is None or isinstance(solid, str)):
+        raise TypeError(f"solid is {solid!r}; it must be a name")
+    chord = None if chord is None else positive("chord", chord)
     return _read(name, os.fsdecode(path), (about.st_size, about.st_mtime_ns), chord, turn, solid, limit)
 
 

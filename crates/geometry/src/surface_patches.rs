@@ -13,6 +13,7 @@ use crate::distance::triangle_bvh::{Nearest, TriangleBvh};
 use crate::feature_edges::{Creases, creases};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
+use crate::progress::checkpoint;
 use crate::repair::half_edges::{ends, halves};
 use crate::tetmesh::FACES;
 use crate::union_find;
@@ -95,13 +96,23 @@ fn patches(mesh: &Mesh, edges: &[Adjacent], least: f64) -> (Vec<u32>, usize) {
                 }
             }
         }
-        let narrow = |p: usize| length[p] > 0.0 && 2.0 * area[p] < least * length[p];
-        let least_area = (0..count).filter(|p| narrow(*p)).min_by(|a, b| area[*a].total_cmp(&area[*b]).then(a.cmp(b)));
-        let Some(p) = least_area else { return (label, count) };
-        let mut to: Vec<_> = shared.iter().filter(|(k, _)| k[0] as usize == p).collect();
-        to.sort_unstable_by(|a, b| b.1.0.total_cmp(&a.1.0).then(a.0.cmp(b.0)));
-        let [a, b] = to[0].1.1;
-        union_find::unite(&mut root, a, b);
+        // All narrow ones at a time, each to its widest neighbour: the number of patches halves, or more, in a pass.
+        let mut to: Vec<Option<(f64, u32, [u32; 2])>> = vec![None; count];
+        for ([a, b], (length, triangles)) in shared {
+            let best = &mut to[a as usize];
+            if best.is_none_or(|(l, c, _)| length > l || length == l && b < c) {
+                *best = Some((length, b, triangles));
+            }
+        }
+        let narrow = |p: &usize| length[*p] > 0.0 && 2.0 * area[*p] < least * length[*p];
+        let joined: Vec<[u32; 2]> = (0..count).filter(narrow).filter_map(|p| to[p].map(|t| t.2)).collect();
+        if joined.is_empty() {
+            return (label, count);
+        }
+        for [a, b] in joined {
+            union_find::unite(&mut root, a, b);
+        }
+        checkpoint();
     }
 }
 
@@ -110,6 +121,7 @@ fn groups(mesh: &Mesh, patch: &[u32], count: usize, size: f64) -> Vec<usize> {
     let (spacing, cell) = (0.5 * size, (APART + 0.5) * size);
     let mut cells: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
     for (t, p) in patch.iter().enumerate() {
+        checkpoint();
         let mut todo = vec![mesh.corners(t)];
         while let Some([a, b, c]) = todo.pop() {
             // Halved at its longest side.

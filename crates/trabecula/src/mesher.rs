@@ -3,7 +3,9 @@
 //! Cutting and the improvement of shapes are those of `conforming_tets`, shared with volume meshes.
 
 use crate::conforming_tets::{GONE, MOST as SURFACES, Partition, Patched, Shaping, Tet, prepared};
+use crate::csg_tree::CsgTree;
 use crate::grade::Grade;
+use crate::implicit::Surface;
 use crate::region::Region;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
@@ -19,6 +21,8 @@ pub use region_fit::{Fit, Uncovered, fit};
 
 /// Maximum number of tetrahedra.
 const MOST: usize = 20_000_000;
+/// Where more than this fraction of the volume is left out, the region is cut as one surface, and the better mesh is kept.
+const LOSS: f64 = 1e-3;
 /// Least and greatest stretch of the lattice along an axis, so that both bounding planes are planes of it.
 const STRETCH: [f64; 2] = [0.67, 1.5];
 
@@ -30,7 +34,7 @@ const STRETCH: [f64; 2] = [0.67, 1.5];
 /// The result does not depend on the number of threads.
 ///
 /// **Errors**: a size that is not positive, a size so large that no tetrahedron fits, or so small that there are more
-/// than twenty million tetrahedra; a region of more than 127 surfaces.
+/// than twenty million tetrahedra.
 pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, f64), Fault> {
     let mut sizes = vec![0.0; inside.len()];
     size.values(inside, &mut sizes);
@@ -39,39 +43,88 @@ pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3])
         let message = format!("size is {} mm; it must be a finite number greater than 0", number(*v));
         return Err(Fault::new("size", message));
     }
-    let mut surfaces = Vec::new();
-    let trees = [region.clone().surfaces(0.0, &mut surfaces)];
-    let own = surfaces.len();
-    if own > SURFACES {
-        let message = format!("the region has {own} surfaces; a mesh of it takes at most {SURFACES}");
-        return Err(Fault::new("size", message));
-    }
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let extent = bounds.size().into_iter().fold(0.0, f64::max);
     // A cube holds twelve tetrahedra: ∛√2 times the edge of the regular tetrahedron of a twelfth of its volume.
     let cube = 2f64.powf(1.0 / 6.0) * largest.min(extent);
-    let patched = Patched::of(&mut surfaces, cube);
-    let mut grid = bcc_grid::Grid::new(&**region, bounds, fitted(region, bounds, cube), MOST)?;
-    let needs = needs::Needs { region, surfaces: &surfaces, patched: &patched, size };
-    grid.refine(MOST, |p| needs.coarse(p))?;
-    let tets = grid.tets.iter().map(|t| Tet { nodes: *t, negative: 0, positive: 0 }).collect();
-    let nodes = grid.positions();
-    let (on, next) = (vec![0; nodes.len()], (0..nodes.len() as u32).collect());
-    let mut partition = Partition { surfaces: &surfaces, patched: &patched, trees: &trees, nodes, on, next, tets };
-    partition.hold_nodes(own, cube);
-    for s in 0..own {
-        checkpoint();
-        partition.cut(s, cube);
+    let grid = bcc_grid::Grid::new(&**region, bounds, fitted(region, bounds, cube), MOST)?;
+    // Less exact ways are for too many surfaces, and for features too fine for their edges to be followed.
+    let ways: [&dyn Fn() -> Option<Cuts>; 3] =
+        [&|| Cuts::by_surfaces(region, cube), &|| Some(Cuts::as_one(region, true)), &|| {
+            Some(Cuts::as_one(region, false))
+        }];
+    let mut best = (TetMesh::default(), f64::INFINITY);
+    for cuts in ways.iter().filter_map(|way| way()) {
+        let made = cuts.mesh(region, grid.clone(), size, cube)?;
+        if made.1 < best.1 {
+            best = made;
+        }
+        if best.1 <= LOSS * best.0.volume() {
+            break;
+        }
     }
-    let (shaping, dropped) = prepared(partition, true);
-    if shaping.tets.is_empty() {
+    if best.0.tets.is_empty() {
         let message = format!(
             "no tetrahedron of size {} mm fits into the region; use a smaller one, at most half its thickness",
             number(largest)
         );
         return Err(Fault::new("size", message));
     }
-    Ok(shaped(shaping, cube, dropped))
+    Ok(best)
+}
+
+/// What the lattice is cut along.
+struct Cuts {
+    /// The region's own surfaces, then the groups of patches of those that are meshes.
+    surfaces: Vec<Surface>,
+    own: usize,
+    patched: Vec<Patched>,
+    trees: [CsgTree; 1],
+    /// Whether tetrahedra are smaller where a surface is curved.
+    finer: bool,
+}
+
+impl Cuts {
+    /// Each surface of a region, of meshes each patch; `None` if there are more than a node can know.
+    fn by_surfaces(region: &Region, cube: f64) -> Option<Cuts> {
+        let mut surfaces = Vec::new();
+        let trees = [region.clone().surfaces(0.0, &mut surfaces)];
+        let own = surfaces.len();
+        (own <= SURFACES).then(|| {
+            let patched = Patched::of(&mut surfaces, cube);
+            Cuts { surfaces, own, patched, trees, finer: true }
+        })
+    }
+
+    /// The distance of the region as one surface, whose edges are not followed.
+    fn as_one(region: &Region, finer: bool) -> Cuts {
+        let surfaces = vec![Surface::distance(region.clone())];
+        Cuts { surfaces, own: 1, patched: Vec::new(), trees: [CsgTree::Leaf(0)], finer }
+    }
+
+    /// The lattice cut and improved, and the volume left out.
+    fn mesh(
+        &self,
+        region: &Region,
+        mut grid: bcc_grid::Grid,
+        size: &Grade,
+        cube: f64,
+    ) -> Result<(TetMesh, f64), Fault> {
+        let Cuts { surfaces, patched, trees, .. } = self;
+        let needs = needs::Needs { region, surfaces: if self.finer { surfaces } else { &[] }, patched, size };
+        grid.refine(MOST, |p| needs.coarse(p))?;
+        let tets = grid.tets.iter().map(|t| Tet { nodes: *t, negative: 0, positive: 0 }).collect();
+        let nodes = grid.positions();
+        let (on, next) = (vec![0; nodes.len()], (0..nodes.len() as u32).collect());
+        let mut partition = Partition { surfaces, patched, trees, nodes, on, next, tets };
+        partition.hold_nodes(self.own, cube);
+        for s in 0..self.own {
+            checkpoint();
+            partition.cut(s, cube);
+        }
+        let (shaping, dropped) = prepared(partition, true);
+        Ok(shaped(shaping, cube, dropped))
+    }
 }
 
 /// The mesh with its shapes improved, and the volume left out.
@@ -84,7 +137,7 @@ fn shaped(mut shaping: Shaping, cube: f64, mut dropped: f64) -> (TetMesh, f64) {
     if shaping.follow_creases(cube) {
         shaping.improve(&goes_on);
     }
-    dropped += shaping.shell();
+    dropped += shaping.shell(true);
     let tets = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
     (TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact(), dropped)
 }

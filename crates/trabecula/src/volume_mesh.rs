@@ -132,7 +132,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
         return Err(Stopped::Interrupted);
     }
     if options.of != Of::All {
-        dropped += shaping.shell();
+        dropped += shaping.shell(false);
     }
     if options.order == 1 {
         shaping.balance();

@@ -14,10 +14,12 @@ const BAD: f64 = 1.73;
 const OTHERS: usize = 3;
 
 impl Shaping<'_> {
-    /// Leaves out badly shaped tetrahedra of a mesh of one domain; gives their volume.
-    pub fn shell(&mut self) -> f64 {
+    /// Leaves out badly shaped tetrahedra of a mesh of one domain, of those with all nodes on one surface if `flat`; gives their volume.
+    pub fn shell(&mut self, flat: bool) -> f64 {
         let mut bad = self.bad();
-        bad.retain(|t| self.shapes[*t as usize] < BAD);
+        let on_one =
+            |t: u32| self.tets[t as usize].iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]) & !HELD != 0;
+        bad.retain(|t| self.shapes[*t as usize] < BAD && (!flat || on_one(*t)));
         let mut gone: Vec<u32> = Vec::new();
         let mut before = usize::MAX;
         while bad.len() < before {

@@ -3,9 +3,8 @@
 use geometry::math::Vec3;
 use geometry::tetmesh::{tet_quality::dihedral_cosines, volume};
 
-/// The minimum and maximum dihedral angle (degrees) after stuffing a uniform lattice.
-///
-/// Source: Labelle & Shewchuk 2007, proven by enumeration of all cuts.
+/// The dihedral angles (degrees) at which a shape counts 1: the least and the greatest that isosurface stuffing of a uniform lattice may
+/// leave, by enumeration of all cuts (Labelle & Shewchuk 2007). Here they are a scale, and what meshes of smooth surfaces are tested for.
 pub const ANGLES: [f64; 2] = [10.7, 164.8];
 
 /// 1 where the worst dihedral angle is one of `ANGLES`, more where all are better (16 in a regular tetrahedron); a small

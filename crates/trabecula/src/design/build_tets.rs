@@ -333,7 +333,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
         ));
     }
     let Some(fit) = &report.fit else { return out };
-    if fit.mended > 0.0 {
+    if fit.mended > 1e-6 * q.volume {
         say(format!(
             "{} mm³ were left out where the region is too thin for tetrahedra of this size: the boundary would meet itself, or \
              crumbs come loose; use a smaller one",

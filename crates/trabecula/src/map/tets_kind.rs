@@ -43,7 +43,7 @@ pub struct MadeTetsKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(name = "Mesher", noun = "mesher")]
 pub enum MesherKind {
-    /// A body-centred cubic lattice fitted to the region: nodes moved onto its surface, the rest cut. Takes any region.
+    /// A body-centred cubic lattice cut along the surfaces of the region, of meshes along the patches between feature edges. Takes any region.
     #[default]
     #[kind(hints("stuffing"))]
     Background,

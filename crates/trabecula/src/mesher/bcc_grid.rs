@@ -20,6 +20,7 @@ const UNIT: i32 = 1 << 12;
 const BLOCK: i32 = 4;
 
 /// Tetrahedra with nodes of integer coordinates.
+#[derive(Clone)]
 pub(super) struct Grid {
     /// Node coordinates, in units.
     pub keys: Vec<[i32; 3]>,
@@ -158,6 +159,9 @@ impl Grid {
             let mut changed = false;
             let mut i = 0;
             while i < self.tets.len() {
+                if i % 4096 == 0 {
+                    checkpoint();
+                }
                 let t = self.tets[i];
                 let torn = geometry::tetmesh::EDGES.iter().any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
                 if !torn && (fine[i] || !coarse(t.map(|n| self.position(self.keys[n as usize])))?) {

@@ -345,6 +345,64 @@ fn thin_walls_are_kept() {
     }
 }
 
+/// So is a plate of a fiftieth of the size: nothing of it is left out for its flat tetrahedra.
+#[test]
+fn plates_are_kept() {
+    let plate = cuboid([0.0; 3], [4.0, 4.0, 0.02]);
+    let (mesh, _) = mesh(&plate, &Grade::Constant(1.0));
+    sound("plate", &mesh);
+    assert!((mesh.volume() / 0.32 - 1.0).abs() < 1e-9, "{}", mesh.volume());
+}
+
+/// More surfaces, or patches near each other, than a node can know are cut as one surface.
+#[test]
+fn regions_of_many_features_lose_little() {
+    let hole = |i: usize| -> Region {
+        let at = [0.5 + (i % 8) as f64, 0.5 + (i / 8) as f64, -1.0];
+        Arc::new(Cylinder::new(at, [0.0, 0.0, 1.0], 0.2, 4.0).expect("cylinder"))
+    };
+    let mut parts = vec![cuboid([0.0; 3], [8.0, 8.0, 1.0])];
+    parts.extend((0..64).map(hole));
+    let sieve: Region = Arc::new(Difference::new(parts).expect("difference"));
+    let (made, fit) = mesh(&sieve, &Grade::Constant(0.8));
+    sound("sieve", &made);
+    assert!(fit.missed < 0.03 * made.volume() && made.pieces().0 == 1, "{fit:?}");
+    // A block with 6 × 6 pyramids of 45 degrees, much finer than the size.
+    let (made, fit) = mesh(&pyramids(6, 1.5), &Grade::Constant(4.0));
+    sound("pyramids", &made);
+    println!("pyramids: {} of {} left out", fit.mended, made.volume());
+    assert!(fit.mended < 2e-3 * made.volume() && made.pieces().0 == 1, "{fit:?}");
+}
+
+/// A block of depth 6 whose top is n × n pyramids of half the height of their width.
+fn pyramids(n: usize, width: f64) -> Region {
+    let node = |i: usize, j: usize| (i * (n + 1) + j) as u32;
+    let corners = (n + 1) * (n + 1);
+    let at = |k: usize, z: f64| [(k / (n + 1)) as f64 * width, (k % (n + 1)) as f64 * width, z];
+    let mut vertices: Vec<Vec3> = (0..corners).map(|k| at(k, 0.0)).collect();
+    vertices.extend((0..corners).map(|k| at(k, -6.0)));
+    let below = corners as u32;
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        for j in 0..n {
+            let top = vertices.len() as u32;
+            vertices.push([(i as f64 + 0.5) * width, (j as f64 + 0.5) * width, 0.5 * width]);
+            let q = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            triangles.extend((0..4).map(|k| [q[k], q[(k + 1) % 4], top]));
+            let [a, b, c, d] = q.map(|v| v + below);
+            triangles.extend([[a, c, b], [a, d, c]]);
+        }
+        let sides = [
+            (node(i, 0), node(i + 1, 0)),
+            (node(n, i), node(n, i + 1)),
+            (node(i + 1, n), node(i, n)),
+            (node(0, i + 1), node(0, i)),
+        ];
+        triangles.extend(sides.iter().flat_map(|(p, q)| [[*q, *p, p + below], [*q, p + below, q + below]]));
+    }
+    Arc::new(MeshRegion::new(Mesh { vertices, triangles }, Repair::Refuse).expect("pyramids"))
+}
+
 #[test]
 fn any_number_of_threads_gives_the_same_mesh() {
     let space = region(5, 1.0, 0.9, 1.1);

@@ -20,7 +20,9 @@ const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "Ma
 /// the region's.
 pub(super) fn surface(region: &RegionKind, environment: &Environment, size: f64) -> Result<Mesh, DesignError> {
     if let RegionKind::Mesh(file) = region {
-        return triangles(file, environment.loader);
+        // A part from a CAD system has no triangles of its own.
+        let own = |why| environment.region.as_mesh().map(|m| m.mesh().clone()).ok_or(why);
+        return triangles(file, environment.loader).or_else(own);
     }
     let solid = Solid::new(environment.region.clone(), None, size);
     match extract::surface(&solid, size / 4.0, &Silent) {
