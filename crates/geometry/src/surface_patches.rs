@@ -20,8 +20,6 @@ use crate::union_find;
 
 /// The least turn of the normal across a feature edge, radians (40°): more than that between the sides of a coarsely approximated hole.
 const TURN: f64 = 0.698;
-/// A patch is at least as wide as this fraction of the size of elements; narrower ones are part of an adjacent one.
-const NARROW: f64 = 0.05;
 /// Patches of one group are at least as far apart as this multiple of the size.
 const APART: f64 = 2.5;
 
@@ -36,10 +34,11 @@ pub struct PatchGroup {
     pub creases: Arc<Creases>,
 }
 
-/// The patches of a closed mesh that elements of a size (mm) resolve, in groups. The groups of a mesh without feature edges are none.
-pub fn patch_groups(mesh: &Mesh, size: f64) -> Vec<PatchGroup> {
+/// The patches of a closed mesh for elements of a size (mm), in groups; patches narrower than `narrow` (mm) are part of an adjacent one.
+/// The groups of a mesh without feature edges are none.
+pub fn patch_groups(mesh: &Mesh, size: f64, narrow: f64) -> Vec<PatchGroup> {
     let edges = feature_edges(mesh);
-    let (patch, count) = patches(mesh, &edges, NARROW * size);
+    let (patch, count) = patches(mesh, &edges, narrow);
     if count < 2 {
         return Vec::new();
     }
@@ -305,7 +304,7 @@ mod tests {
 
     #[test]
     fn each_side_of_a_box_goes_on_as_its_plane() {
-        let groups = patch_groups(&cuboid([1.0, 2.0, 3.0]), 1.0);
+        let groups = patch_groups(&cuboid([1.0, 2.0, 3.0]), 1.0, 0.05);
         assert_eq!(groups.len(), 6, "sides closer than two and a half sizes are in groups of their own");
         for p in [[0.3, 0.4, 0.5], [1.5, -0.4, 0.2], [-2.0, 3.0, 4.5], [1.0, 2.0, 3.0]] {
             let mut found: Vec<f64> = groups
@@ -328,7 +327,7 @@ mod tests {
     #[test]
     fn far_sides_share_a_group_and_narrow_ones_are_joined() {
         // Ten times as long as apart: both ends are of one group.
-        assert_eq!(patch_groups(&cuboid([10.0, 1.0, 1.0]), 1.0).len(), 5);
+        assert_eq!(patch_groups(&cuboid([10.0, 1.0, 1.0]), 1.0, 0.05).len(), 5);
         // Sides a hundredth of a size wide are no patches of their own.
         let (patch, count) = {
             let mesh = cuboid([1.0, 1.0, 0.01]);
@@ -339,7 +338,7 @@ mod tests {
 
     #[test]
     fn a_patch_meets_what_it_enters_or_covers_and_nothing_that_it_touches() {
-        let groups = patch_groups(&cuboid([4.0, 4.0, 4.0]), 1.0);
+        let groups = patch_groups(&cuboid([4.0, 4.0, 4.0]), 1.0, 0.05);
         let met = |at: Vec3| {
             let tet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| add(p, at));
             groups.iter().filter(|g| g.meets(&tet)).count()

@@ -11,6 +11,8 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::TetMesh;
+use geometry::tetmesh::tet_locator::TetLocator;
+use rayon::prelude::*;
 
 mod bcc_grid;
 mod needs;
@@ -21,8 +23,11 @@ pub use region_fit::{Fit, Uncovered, fit};
 
 /// Maximum number of tetrahedra.
 const MOST: usize = 20_000_000;
-/// Where more than this fraction of the volume is left out, the region is cut as one surface, and the better mesh is kept.
+/// Where more than this fraction of the volume is left out, the region is cut in less exact ways too, and the mesh that covers most of it
+/// is kept.
 const LOSS: f64 = 1e-3;
+/// The width of the narrowest patches in the first of these, as a fraction of the size.
+const WIDE: f64 = 0.5;
 /// Least and greatest stretch of the lattice along an axis, so that both bounding planes are planes of it.
 const STRETCH: [f64; 2] = [0.67, 1.5];
 
@@ -49,18 +54,23 @@ pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3])
     let cube = 2f64.powf(1.0 / 6.0) * largest.min(extent);
     let grid = bcc_grid::Grid::new(&**region, bounds, fitted(region, bounds, cube), MOST)?;
     // Less exact ways are for too many surfaces, and for features too fine for their edges to be followed.
-    let ways: [&dyn Fn() -> Option<Cuts>; 3] =
-        [&|| Cuts::by_surfaces(region, cube), &|| Some(Cuts::as_one(region, true)), &|| {
-            Some(Cuts::as_one(region, false))
-        }];
-    let mut best = (TetMesh::default(), f64::INFINITY);
+    let ways: [&dyn Fn() -> Option<Cuts>; 4] = [
+        &|| Cuts::by_surfaces(region, cube, Patched::NARROW),
+        &|| Cuts::by_surfaces(region, cube, WIDE).filter(|c| !c.patched.is_empty()),
+        &|| Some(Cuts::as_one(region, true)),
+        &|| Some(Cuts::as_one(region, false)),
+    ];
+    let mut best = (TetMesh::default(), 0.0);
+    let mut least = usize::MAX;
     for cuts in ways.iter().filter_map(|way| way()) {
         let made = cuts.mesh(region, grid.clone(), size, cube)?;
-        if made.1 < best.1 {
-            best = made;
+        if made.1 <= LOSS * made.0.volume() && !made.0.tets.is_empty() {
+            return Ok(made);
         }
-        if best.1 <= LOSS * best.0.volume() {
-            break;
+        let locator = TetLocator::new(&made.0);
+        let missed = inside.par_iter().filter(|p| !locator.covers(**p)).count();
+        if missed < least {
+            (best, least) = (made, missed);
         }
     }
     if best.0.tets.is_empty() {
@@ -85,13 +95,13 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// Each surface of a region, of meshes each patch; `None` if there are more than a node can know.
-    fn by_surfaces(region: &Region, cube: f64) -> Option<Cuts> {
+    /// Each surface of a region, of meshes each patch at least as wide as this fraction of the size; `None` if there are more than a node can know.
+    fn by_surfaces(region: &Region, cube: f64, narrow: f64) -> Option<Cuts> {
         let mut surfaces = Vec::new();
         let trees = [region.clone().surfaces(0.0, &mut surfaces)];
         let own = surfaces.len();
         (own <= SURFACES).then(|| {
-            let patched = Patched::of(&mut surfaces, cube);
+            let patched = Patched::of(&mut surfaces, cube, narrow);
             Cuts { surfaces, own, patched, trees, finer: true }
         })
     }

@@ -38,16 +38,28 @@ impl Patched {
         self.groups[group - self.first].meets(corners)
     }
 
-    /// The meshes among surfaces, whose groups are added to these if there are not too many. `size` is that of tetrahedra (mm).
-    pub fn of(surfaces: &mut Vec<Surface>, size: f64) -> Vec<Patched> {
+    /// The width of the narrowest patches unless there are too many, as a fraction of the size of tetrahedra.
+    pub const NARROW: f64 = 0.05;
+
+    /// The meshes among surfaces, whose groups are added to these. `size` is that of tetrahedra (mm), and patches are at least as wide as
+    /// the fraction `narrow` of it; wider where there are more groups than a node can know.
+    pub fn of(surfaces: &mut Vec<Surface>, size: f64, narrow: f64) -> Vec<Patched> {
         let mut found = Vec::new();
         for mesh in 0..surfaces.len() {
             let Some(of) = surfaces[mesh].mesh.clone() else { continue };
-            let groups: Vec<Arc<PatchGroup>> = patch_groups((*of).as_ref(), size).into_iter().map(Arc::new).collect();
-            if groups.is_empty() || surfaces.len() + groups.len() > MOST {
+            let first = surfaces.len();
+            let mut least = narrow * size;
+            let groups = loop {
+                let groups = patch_groups((*of).as_ref(), size, least);
+                if first + groups.len() <= MOST {
+                    break groups;
+                }
+                least *= 2.0;
+            };
+            if groups.is_empty() {
                 continue;
             }
-            let first = surfaces.len();
+            let groups: Vec<Arc<PatchGroup>> = groups.into_iter().map(Arc::new).collect();
             let surface = |g: &Arc<PatchGroup>| Surface {
                 creases: g.creases.clone(),
                 ..Surface::distance(Arc::new(GroupField(g.clone())))

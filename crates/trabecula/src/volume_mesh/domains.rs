@@ -79,7 +79,7 @@ impl Domains {
         let filled: Vec<CsgSolid> = if solid.field.is_some() { solid.filled.clone() } else { Vec::new() };
         let lattice = region + filled.iter().map(|b| b.surfaces.len()).sum::<usize>();
         let own = surfaces.len();
-        let patched = edge.map(|edge| Patched::of(&mut surfaces, edge)).unwrap_or_default();
+        let patched = edge.map(|edge| Patched::of(&mut surfaces, edge, Patched::NARROW)).unwrap_or_default();
         Ok(Domains { names, surfaces, own, patched, trees, region, lattice, filled })
     }
 }

@@ -370,8 +370,8 @@ fn regions_of_many_features_lose_little() {
     // A block with 6 × 6 pyramids of 45 degrees, much finer than the size.
     let (made, fit) = mesh(&pyramids(6, 1.5), &Grade::Constant(4.0));
     sound("pyramids", &made);
-    println!("pyramids: {} of {} left out", fit.mended, made.volume());
-    assert!(fit.mended < 2e-3 * made.volume() && made.pieces().0 == 1, "{fit:?}");
+    println!("pyramids: {} missed, {} left out of {}", fit.missed, fit.mended, made.volume());
+    assert!(fit.missed < 0.03 * made.volume() && made.pieces().0 == 1, "{fit:?}");
 }
 
 /// A block of depth 6 whose top is n × n pyramids of half the height of their width.
