@@ -307,6 +307,12 @@ impl Aabb {
         (0..3).any(|a| self.min[a] > self.max[a])
     }
 
+    /// Whether `p` lies in it, not on its faces.
+    #[inline]
+    pub fn holds_inside(&self, p: Vec3) -> bool {
+        (0..3).all(|a| self.min[a] < p[a] && p[a] < self.max[a])
+    }
+
     /// Whether all six numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.min.iter().chain(&self.max).all(|v| v.is_finite())

@@ -1,6 +1,7 @@
 //! What changes of a triangle mesh edge by edge share: adjacency, the edges that stay, the triangles near a place.
 
-use crate::math::Vec3;
+use crate::math::{Aabb, Vec3};
+use crate::mesh::Mesh;
 use crate::surface_mesh::SurfaceMesh;
 
 pub mod half_edge_mesh;
@@ -9,27 +10,31 @@ pub mod refit_tree;
 
 use half_edge_mesh::{HalfEdgeMesh, NONE};
 
-/// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use, so that
-/// what is near in space is near in memory.
-pub fn in_order(surface: &SurfaceMesh) -> SurfaceMesh {
-    let mesh = &surface.mesh;
-    let b = mesh.bounds();
+/// Triangles of a mesh along a space-filling curve, so that what is near in space is near in memory.
+pub fn curve_order(mesh: &Mesh, triangles: impl IntoIterator<Item = u32> + Clone) -> Vec<u32> {
+    let corners = |t: u32| mesh.corners(t as usize);
+    let b = triangles.clone().into_iter().flat_map(corners).fold(Aabb::EMPTY, Aabb::with);
     let longest = b.size().iter().fold(0.0f64, |m, s| m.max(*s));
     let scale = if longest > 0.0 { 2_097_151.0 / longest } else { 0.0 };
-    let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len())
-        .map(|t| {
-            let [p, q, r] = mesh.corners(t);
-            let key = (0..3).fold(0, |key, k| {
-                let middle = (p[k] + q[k] + r[k]) / 3.0 - b.min[k];
-                key | spread((middle * scale) as u64) << k
-            });
-            (key, t as u32)
-        })
-        .collect();
+    let key = |t: u32| {
+        let [p, q, r] = corners(t);
+        let key = (0..3).fold(0, |key, k| {
+            let middle = (p[k] + q[k] + r[k]) / 3.0 - b.min[k];
+            key | spread((middle * scale) as u64) << k
+        });
+        (key, t)
+    };
+    let mut keys: Vec<(u64, u32)> = triangles.into_iter().map(key).collect();
     keys.sort_unstable();
+    keys.into_iter().map(|(_, t)| t).collect()
+}
+
+/// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use.
+pub fn in_order(surface: &SurfaceMesh) -> SurfaceMesh {
+    let mesh = &surface.mesh;
     let mut names = vec![NONE; mesh.vertices.len()];
     let mut out = SurfaceMesh::default();
-    for (_, t) in keys {
+    for t in curve_order(mesh, 0..mesh.triangles.len() as u32) {
         let triangle = mesh.triangles[t as usize].map(|v| {
             let name = &mut names[v as usize];
             if *name == NONE {

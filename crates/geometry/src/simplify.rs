@@ -10,29 +10,42 @@
 //!   a bound of the distance in both directions);
 //! - the new triangles meet no others, decided exactly for positions rounded to single precision.
 //!
-//! All positions are rounded to single precision first, so that a file of either precision holds what was tested. The
-//! work is done in one order, whatever the number of threads.
+//! All positions are rounded to single precision first, so that a file of either precision holds what was tested.
+//!
+//! A large mesh is cut into blocks of space (`blocks`) that are simplified apart from each other, each strictly within itself,
+//! so that memory is bounded beyond the mesh itself and all processors have work. What the faces of the blocks hold back is
+//! taken up by later passes, whose blocks lie elsewhere and, with fewer triangles left, are larger. Where a number of triangles
+//! is asked for, all of the mesh is one block. The result is the same for any number of threads.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
 
 use crate::fault::{Fault, counted, number};
-use crate::math::Vec3;
 use crate::measure;
 use crate::mesh::Mesh;
-use crate::progress::{Progress, Stopped};
-use crate::remesh::half_edge_mesh::HalfEdgeMesh;
-use crate::remesh::{gathered, in_order};
+use crate::progress::{Progress, Stage, Stopped};
+use crate::remesh::half_edge_mesh::NONE;
 use crate::surface_mesh::SurfaceMesh;
 
+mod blocks;
 mod bucket_queue;
 mod collapse;
 mod deviation;
 mod error_quadric;
+mod piece;
 
-use collapse::Simplification;
+use blocks::Blocks;
+use collapse::{Simplification, single};
+use piece::{Done, Known, Passing, Piece};
 
 /// Candidates between two reports of progress.
 const STRIDE: u64 = 4096;
+
+/// The shift of each pass's blocks, in edges, and the shares of the work between which it is done.
+const PASSES: [(f64, [f64; 2]); 4] = [(0.0, [0.0, 0.8]), (0.5, [0.8, 0.9]), (0.25, [0.9, 0.95]), (0.7, [0.95, 1.0])];
 
 /// How far a mesh is to be simplified. With both, whichever is reached first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,32 +101,113 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
             ),
         )));
     }
-    let ordered = in_order(surface);
-    let exact = &ordered.mesh.vertices;
-    let positions: Vec<Vec3> = exact.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
-    let rounded = Mesh { vertices: positions, triangles: ordered.mesh.triangles.clone() };
-    let half_edges = sound(&rounded).map_err(Stopped::Refused)?;
-    let mut work = Simplification::new(half_edges, rounded.vertices, exact, &ordered.cut, tolerance);
+    if before.0 as u64 * 3 >= u64::from(u32::MAX) {
+        return Err(Stopped::Refused(Fault::new("", "a mesh has more than 1.4e9 triangles, too many to be simplified")));
+    }
+    let mut state = Passing { surface: Cow::Borrowed(surface), known: None };
+    for (pass, (shift, [from, to])) in PASSES.into_iter().enumerate() {
+        let all = state.surface.mesh.triangles.len();
+        let blocks = match target {
+            0 => Blocks::new(&state.surface.mesh, shift, if pass == 0 { margin(mesh) } else { 0.0 }),
+            _ => Blocks::one(all),
+        };
+        let last = blocks.count() == 1;
+        let stage = Stage { whole: progress, from, to: if last { 1.0 } else { to } };
+        let done = run(&state, &blocks, tolerance, target, &stage)?;
+        state = joined(&state.surface.mesh, &done);
+        if last {
+            break;
+        }
+    }
+    let made = state.surface.into_owned();
+    let displacements = state.known.iter().flat_map(|k| &k.displacements);
+    let deviation = displacements.fold(0.0, |m, d| f64::max(m, d.longest()));
+    let report = report(size(&made.mesh), deviation);
+    Ok((made, report))
+}
+
+/// The width of what must be known around a block to tell its sharp edges: a few edges, mm.
+fn margin(mesh: &Mesh) -> f64 {
+    const EDGES: f64 = 4.0;
+    EDGES * (mesh.area() / mesh.triangles.len().max(1) as f64).sqrt() * 1.52
+}
+
+/// Simplifies all blocks.
+fn run(
+    state: &Passing,
+    blocks: &Blocks,
+    tolerance: f64,
+    target: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Done>, Stopped> {
+    let vertices = state.surface.mesh.vertices.len();
+    let all = state.surface.mesh.triangles.len();
     // Three candidates a vertex, and six more for each one that goes.
-    let likely = 9 * before.0 as u64 / 2;
-    let mut tried = 0u64;
-    while work.count > target && work.step().is_some() {
-        tried += 1;
-        if tried.is_multiple_of(STRIDE) {
-            let (done, total) = if target > 0 {
-                ((before.0 - work.count) as u64, (before.0 - target) as u64)
-            } else {
-                (tried, likely.max(tried))
-            };
-            if !progress.step(done, total) {
+    let likely = 9 * all as u64 / 2;
+    let total = Mutex::new(0u64);
+    let step = |tried: u64, of: Option<(usize, usize)>| {
+        // Under the lock, so that progress rises.
+        let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
+        *total += tried;
+        match of {
+            Some((done, all)) => progress.step(done as u64, all as u64),
+            None => progress.step((*total).min(likely), likely),
+        }
+    };
+    // Tables of names, one a thread.
+    let tables: Mutex<Vec<Vec<u32>>> = Mutex::new(Vec::new());
+    let simplified = |b: usize| -> Result<Done, Stopped> {
+        let table = tables.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut names = table.unwrap_or_else(|| vec![NONE; vertices]);
+        let piece = Piece::new(&state.surface, blocks, b, &mut names);
+        tables.lock().unwrap_or_else(PoisonError::into_inner).push(names);
+        let half_edges = match state.known {
+            None => piece.sound(&blocks.around(b)),
+            Some(_) => piece.linked(),
+        };
+        let half_edges = half_edges.ok_or_else(|| Stopped::Refused(unsound(&state.surface.mesh)))?;
+        let mut work = Simplification::new(piece.start(state, half_edges), tolerance);
+        let mut tried = 0u64;
+        while work.count > target && work.step().is_some() {
+            tried += 1;
+            let reached = (target > 0).then(|| (all - work.count, all - target));
+            if tried.is_multiple_of(STRIDE) && !step(STRIDE, reached) {
                 return Err(Stopped::Interrupted);
             }
         }
+        Ok(piece.finish(&work, blocks, b))
+    };
+    let occupied: Vec<usize> = (0..blocks.count()).filter(|b| !blocks.members(*b).is_empty()).collect();
+    occupied.into_par_iter().map(simplified).collect()
+}
+
+/// The surface that blocks make up, whose vertices were those of `before`.
+fn joined(before: &Mesh, done: &[Done]) -> Passing<'static> {
+    let mut names = vec![NONE; before.vertices.len()];
+    let mut surface = SurfaceMesh::default();
+    let mut known = Known::default();
+    for block in done {
+        for triangle in &block.triangles {
+            surface.mesh.triangles.push(triangle.map(|v| {
+                let name = &mut names[v as usize];
+                if *name == NONE {
+                    *name = surface.mesh.vertices.len() as u32;
+                    surface.mesh.vertices.push(single(before.vertices[v as usize]));
+                }
+                *name
+            }));
+        }
+        surface.cut.extend_from_slice(&block.cut);
+        known.kept.extend_from_slice(&block.kept);
+        known.displacements.extend_from_slice(&block.displacements);
     }
-    let deviation = work.deviation();
-    let made = gathered(&work.half_edges, &work.positions, &ordered.cut);
-    let report = report(size(&made.mesh), deviation);
-    Ok((made, report))
+    known.kept_moved = vec![0.0; surface.mesh.vertices.len()];
+    for (v, position, kept_moved) in done.iter().flat_map(|block| &block.moved) {
+        let name = names[*v as usize] as usize;
+        surface.mesh.vertices[name] = *position;
+        known.kept_moved[name] = *kept_moved;
+    }
+    Passing { surface: Cow::Owned(surface), known: Some(known) }
 }
 
 /// The tolerance and the number of triangles of a goal.
@@ -135,19 +229,20 @@ fn checked(goal: &Goal) -> Result<(f64, usize), Fault> {
     Ok((tolerance, target))
 }
 
-/// The half-edge structure of a valid mesh; otherwise its defects.
-fn sound(mesh: &Mesh) -> Result<HalfEdgeMesh, Fault> {
+/// What keeps a mesh from being simplified.
+fn unsound(mesh: &Mesh) -> Fault {
     let refuse = |what: String| {
-        Err(Fault::new(
+        Fault::new(
             "",
             format!(
                 "a mesh must be closed, manifold and free of self-intersection, after rounding to single precision; this one has {what}"
             ),
-        ))
+        )
     };
-    if mesh.triangles.len() as u64 * 3 >= u64::from(u32::MAX) {
-        return refuse("more than 1.4e9 triangles, too many".into());
-    }
+    let mesh = &Mesh {
+        vertices: mesh.vertices.iter().map(|p| single(*p)).collect(),
+        triangles: mesh.triangles.clone(),
+    };
     let mut used = vec![false; mesh.vertices.len()];
     for &v in mesh.triangles.iter().flatten() {
         used[v as usize] = true;
@@ -158,25 +253,21 @@ fn sound(mesh: &Mesh) -> Result<HalfEdgeMesh, Fault> {
     if positions.len() < n {
         return refuse(format!("{} at the position of another vertex", counted(n - positions.len(), "duplicate")));
     }
-    let half_edges = HalfEdgeMesh::new(mesh.triangles.clone(), mesh.vertices.len());
+    let d = measure::defects(mesh);
     let pinched = measure::non_manifold_vertices(mesh);
-    let (Some(half_edges), 0) = (half_edges, pinched) else {
-        let d = measure::defects(mesh);
+    if d.open_edges + d.crowded_edges + d.flipped_edges + pinched > 0 {
         return refuse(format!(
             "{} with one triangle, {} with more than two, {} with two of the same direction, {pinched} non-manifold vertices",
             counted(d.open_edges, "edge"),
             d.crowded_edges,
             d.flipped_edges,
         ));
-    };
+    }
     const SHOWN: usize = 1000;
     let crossings = measure::self_intersections(mesh, SHOWN);
-    let flat = measure::defects(mesh).degenerate_triangles;
-    if crossings > 0 || flat > 0 {
-        let or_more = if crossings == SHOWN { " or more" } else { "" };
-        return refuse(format!(
-            "{crossings}{or_more} intersecting pairs of triangles and {flat} triangles of zero area"
-        ));
-    }
-    Ok(half_edges)
+    let or_more = if crossings == SHOWN { " or more" } else { "" };
+    refuse(format!(
+        "{crossings}{or_more} intersecting pairs of triangles and {} triangles of zero area",
+        d.degenerate_triangles
+    ))
 }

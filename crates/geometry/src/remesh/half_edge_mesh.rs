@@ -1,4 +1,4 @@
-//! The half-edge structure of a closed mesh, and the collapse of an edge in it.
+//! The half-edge structure of a manifold mesh, and the collapse of an edge in it.
 //!
 //! Half-edge 3t + k runs from corner k of triangle t to the next one.
 
@@ -17,20 +17,25 @@ pub fn prev(h: u32) -> u32 {
     if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }
 
-/// Triangles of a closed, oriented, manifold mesh, linked across their edges. A collapsed triangle has the corners
-/// [`NONE`].
+/// Triangles of an oriented, manifold mesh, linked across their edges. A collapsed triangle has the corners [`NONE`].
 pub struct HalfEdgeMesh {
     /// Corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// The other half-edge of each edge.
+    /// The other half-edge of each edge, or [`NONE`] at the boundary of an open mesh.
     twin: Vec<u32>,
     /// A half-edge that leaves each vertex, or [`NONE`].
     out: Vec<u32>,
 }
 
 impl HalfEdgeMesh {
-    /// HalfEdgeMesh the triangles of `n` vertices; `None` if an edge has not exactly two triangles of opposite direction.
+    /// Links the triangles of `n` vertices; `None` if an edge has not exactly two triangles of opposite direction.
     pub fn new(triangles: Vec<[u32; 3]>, n: usize) -> Option<HalfEdgeMesh> {
+        HalfEdgeMesh::open(triangles, n).filter(|mesh| !mesh.twin.contains(&NONE))
+    }
+
+    /// Links the triangles of `n` vertices, of a mesh that may have boundaries; `None` if an edge has more than two triangles,
+    /// or two of the same direction.
+    pub fn open(triangles: Vec<[u32; 3]>, n: usize) -> Option<HalfEdgeMesh> {
         let origin = |h: usize| triangles[h / 3][h % 3];
         // Half-edges by their origin; a twin is found among those that leave its end.
         let mut start = vec![0u32; n + 1];
@@ -53,12 +58,21 @@ impl HalfEdgeMesh {
             let (a, b) = (origin(h), origin(next(h as u32) as usize));
             let from = start[b as usize] as usize..start[b as usize + 1] as usize;
             let mut back = leaving[from].iter().filter(|g| origin(next(**g) as usize) == a);
-            twin[h] = *back.next()?;
+            twin[h] = back.next().copied().unwrap_or(NONE);
             if a == b || back.next().is_some() {
                 return None;
             }
         }
-        let whole = (0..sides).all(|h| twin[twin[h] as usize] == h as u32);
+        // Two half-edges of the same direction: at a boundary they have no twin to tell them apart.
+        let repeated = |h: usize| {
+            let (a, b) = (origin(h), origin(next(h as u32) as usize));
+            let from = start[a as usize] as usize..start[a as usize + 1] as usize;
+            leaving[from].iter().filter(|g| origin(next(**g) as usize) == b).count() > 1
+        };
+        let whole = (0..sides).all(|h| match twin[h] {
+            NONE => !repeated(h),
+            g => twin[g as usize] == h as u32,
+        });
         let out = (0..n).map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE)).collect();
         whole.then_some(HalfEdgeMesh { triangles, twin, out })
     }
@@ -75,7 +89,7 @@ impl HalfEdgeMesh {
         self.from(next(h))
     }
 
-    /// The half-edge of the same edge in the adjacent triangle.
+    /// The half-edge of the same edge in the adjacent triangle; [`NONE`] at a boundary.
     #[inline]
     pub fn twin(&self, h: u32) -> u32 {
         self.twin[h as usize]
@@ -87,13 +101,13 @@ impl HalfEdgeMesh {
         self.from(h) != NONE
     }
 
-    /// The next half-edge counter-clockwise that leaves the same vertex.
+    /// The next half-edge counter-clockwise that leaves the same vertex; [`NONE`] at a boundary.
     #[inline]
     pub fn turned(&self, h: u32) -> u32 {
         self.twin(prev(h))
     }
 
-    /// The half-edges that leave `v`, counter-clockwise.
+    /// The half-edges that leave `v`, counter-clockwise; at a boundary as far as it.
     pub fn leaving(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
         let first = self.out[v as usize];
         let mut now = first;
@@ -108,6 +122,11 @@ impl HalfEdgeMesh {
             }
             Some(h)
         })
+    }
+
+    /// Whether the triangles about `v` go all round it.
+    pub fn is_inner(&self, v: u32) -> bool {
+        self.leaving(v).last().is_some_and(|h| self.turned(h) != NONE)
     }
 
     /// Removes the edge `h` and its two triangles: its ends become the vertex that `h` leaves.

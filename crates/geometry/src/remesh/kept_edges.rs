@@ -11,7 +11,7 @@ const SPECK: usize = 4;
 /// For each half-edge, whether its edge is kept.
 ///
 /// An edge is sharp if its two triangles turn by more than 30 degrees, and so do their surroundings, the triangles with
-/// their other neighbours: the normal of a sliver alone says little.
+/// their other neighbours: the normal of a sliver alone says little. No edge on the boundary of an open mesh is kept.
 pub fn kept(half_edges: &HalfEdgeMesh, positions: &[Vec3], cut: &[bool]) -> Vec<bool> {
     let normal = |t: u32| {
         let [a, b, c] = half_edges.triangles[t as usize].map(|v| positions[v as usize]);
@@ -19,13 +19,16 @@ pub fn kept(half_edges: &HalfEdgeMesh, positions: &[Vec3], cut: &[bool]) -> Vec<
     };
     let turns = |a: Vec3, b: Vec3| dot(a, b) < SHARP * norm(a) * norm(b);
     let about = |h: u32| {
-        let sides = [next(h), prev(h)].map(|g| normal(half_edges.twin(g) / 3));
-        add(normal(h / 3), add(sides[0], sides[1]))
+        let beyond = |g: u32| match half_edges.twin(g) {
+            NONE => [0.0; 3],
+            twin => normal(twin / 3),
+        };
+        add(normal(h / 3), add(beyond(next(h)), beyond(prev(h))))
     };
     let mut kept = vec![false; 3 * half_edges.triangles.len()];
     for h in 0..kept.len() as u32 {
         let g = half_edges.twin(h);
-        if h > g {
+        if h > g || g == NONE {
             continue;
         }
         let (s, t) = (h / 3, g / 3);
@@ -44,7 +47,8 @@ fn drop_specks(half_edges: &HalfEdgeMesh, cut: &[bool], kept: &mut [bool]) {
     let kept_from =
         |kept: &[bool], v: u32| -> Vec<u32> { half_edges.leaving(v).filter(|h| kept[*h as usize]).collect() };
     for h in 0..kept.len() as u32 {
-        if !kept[h as usize] || kept_from(kept, half_edges.from(h)).len() != 1 {
+        let start = half_edges.from(h);
+        if !kept[h as usize] || kept_from(kept, start).len() != 1 || !half_edges.is_inner(start) {
             continue;
         }
         let mut run = vec![h];
@@ -52,6 +56,7 @@ fn drop_specks(half_edges: &HalfEdgeMesh, cut: &[bool], kept: &mut [bool]) {
         let free = loop {
             let on = kept_from(kept, half_edges.to(end));
             match on.len() {
+                _ if !half_edges.is_inner(half_edges.to(end)) => break false,
                 1 => break true,
                 2 if run.len() < SPECK => {
                     let back = half_edges.twin(end);

@@ -3,7 +3,7 @@
 use super::bucket_queue::{Candidate, Queue};
 use super::deviation::{Displacements, Patch};
 use super::error_quadric::Quadric;
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
 use crate::remesh::kept_edges;
 use crate::remesh::refit_tree::{Bounds, Prism, Query, RefitTree};
@@ -20,20 +20,32 @@ const HOLD: f64 = 10.0;
 /// Among collapses that cost nothing, short edges come first.
 const SHORT: f64 = 1e-8;
 
-/// A mesh in the course of being simplified.
-pub struct Simplification {
+/// What a simplification starts from.
+pub struct Start {
     /// Positions: single-precision numbers, so that the file holds what was tested.
     pub positions: Vec<Vec3>,
     /// Adjacency.
     pub half_edges: HalfEdgeMesh,
+    /// For each half-edge, whether its edge is kept.
+    pub kept: Vec<bool>,
+    /// How far the surface has moved so far, by triangle.
+    pub displacements: Vec<Displacements>,
+    /// How far kept edges have moved so far, by vertex, mm.
+    pub kept_moved: Vec<f32>,
+    /// The vertices that may move; they have triangles all round them, which lie in `bounds`.
+    pub free: Vec<bool>,
+    /// Where they may move to: strictly within.
+    pub bounds: Aabb,
+}
+
+/// A mesh in the course of being simplified.
+pub struct Simplification {
+    /// The mesh as it is now.
+    pub mesh: Start,
     /// Triangles left.
     pub count: usize,
     tolerance: f64,
-    kept: Vec<bool>,
     kept_at: Vec<u8>,
-    displacements: Vec<Displacements>,
-    /// How far kept edges have moved, by vertex, mm.
-    kept_moved: Vec<f32>,
     quadrics: Vec<Quadric>,
     versions: Vec<u32>,
     queue: Queue,
@@ -59,53 +71,20 @@ struct Plan {
 }
 
 impl Simplification {
-    /// Starts from linked triangles; `exact` has the positions before they were rounded to `positions`.
-    pub fn new(
-        half_edges: HalfEdgeMesh,
-        positions: Vec<Vec3>,
-        exact: &[Vec3],
-        cut: &[bool],
-        tolerance: f64,
-    ) -> Simplification {
-        let n = positions.len();
-        let count = half_edges.triangles.len();
-        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize]);
-        let moved = |v: u32| sub(positions[v as usize], exact[v as usize]);
-        let rounded = |t: &[u32; 3]| t.iter().fold(Displacements::NONE, |d, v| d.with(moved(*v)));
-        let displacements = half_edges.triangles.iter().map(rounded).collect();
-        let mut quadrics = vec![Quadric::default(); n];
-        let kept = kept_edges::kept(&half_edges, &positions, cut);
-        for (t, names) in half_edges.triangles.iter().enumerate() {
-            let p = corners(names);
-            let own = Quadric::triangle(p);
-            let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
-            for k in 0..3 {
-                let v = names[k] as usize;
-                quadrics[v] = quadrics[v].plus(&own);
-                if kept[3 * t + k] {
-                    let side = sub(p[(k + 1) % 3], p[k]);
-                    let wall = Quadric::plane(unit(cross(side, normal)), p[k], HOLD * dot(side, side));
-                    for w in [v, names[(k + 1) % 3] as usize] {
-                        quadrics[w] = quadrics[w].plus(&wall);
-                    }
-                }
-            }
-        }
-        let tree = RefitTree::new(0, &[], |_| Bounds::of(&[]));
-        let kept_at = kept_edges::count(&half_edges, &kept, n);
+    /// A simplification that moves no point of the surface by more than `tolerance` (mm) in all.
+    pub fn new(start: Start, tolerance: f64) -> Simplification {
+        let n = start.positions.len();
+        let count = start.half_edges.triangles.len();
+        let kept_at = kept_edges::count(&start.half_edges, &start.kept, n);
         let mut work = Simplification {
-            positions,
-            half_edges,
+            quadrics: quadrics(&start),
+            mesh: start,
             count,
             tolerance,
-            kept,
             kept_at,
-            displacements,
-            kept_moved: vec![0.0; n],
-            quadrics,
             versions: vec![0; n],
             queue: Queue::new(),
-            tree,
+            tree: RefitTree::new(0, &[], |_| Bounds::of(&[])),
             indexed: 0,
             mark: vec![0; n.max(count)],
             marked: 0,
@@ -118,7 +97,7 @@ impl Simplification {
         };
         work.rebuild_tree();
         for h in 0..3 * count as u32 {
-            if work.half_edges.from(h) < work.half_edges.to(h) {
+            if work.mesh.half_edges.from(h) < work.mesh.half_edges.to(h) {
                 work.push(h);
             }
         }
@@ -127,26 +106,20 @@ impl Simplification {
 
     /// Rebuilds the tree: its boxes have grown and hold collapsed triangles.
     fn rebuild_tree(&mut self) {
-        let triangles = &self.half_edges.triangles;
+        let triangles = &self.mesh.half_edges.triangles;
         let live = (0..triangles.len() as u32).filter(|t| triangles[*t as usize][0] != NONE);
         let live: Vec<u32> = live.collect();
-        let positions = &self.positions;
+        let positions = &self.mesh.positions;
         self.tree =
             RefitTree::new(triangles.len(), &live, |t| Bounds::of(&triangles[t].map(|v| positions[v as usize])));
         self.indexed = live.len();
-    }
-
-    /// The most that a point of the surface may have moved, mm.
-    pub fn deviation(&self) -> f64 {
-        let live = (0..self.displacements.len()).filter(|t| self.half_edges.is_live(3 * *t as u32));
-        live.fold(0.0, |m, t| f64::max(m, self.displacements[t].longest()))
     }
 
     /// Takes the cheapest candidate and collapses its edge if every condition holds. `None` when no candidate is left.
     pub fn step(&mut self) -> Option<bool> {
         let c = self.queue.pop()?;
         let h = c.edge;
-        if !self.half_edges.is_live(h) || self.stamp(h) != c.stamp {
+        if !self.mesh.half_edges.is_live(h) || self.stamp(h) != c.stamp {
             return Some(false);
         }
         let Some(plan) = self.plan(h) else {
@@ -156,16 +129,16 @@ impl Simplification {
     }
 
     fn position(&self, v: u32) -> Vec3 {
-        self.positions[v as usize]
+        self.mesh.positions[v as usize]
     }
 
     fn stamp(&self, h: u32) -> u32 {
-        self.versions[self.half_edges.from(h) as usize].wrapping_add(self.versions[self.half_edges.to(h) as usize])
+        self.versions[self.mesh.half_edges.from(h) as usize].wrapping_add(self.versions[self.mesh.half_edges.to(h) as usize])
     }
 
     fn push(&mut self, h: u32) {
         if let Some(plan) = self.plan(h) {
-            let edge = sub(self.position(self.half_edges.to(h)), self.position(self.half_edges.from(h)));
+            let edge = sub(self.position(self.mesh.half_edges.to(h)), self.position(self.mesh.half_edges.from(h)));
             let long = dot(edge, edge);
             let stamp = self.stamp(h);
             let cost = plan.cost + SHORT * long * long;
@@ -175,9 +148,12 @@ impl Simplification {
 
     /// The positions that the kept edges at its ends allow the edge, and its cost by the quadrics; `None` where it must stay.
     fn plan(&self, h: u32) -> Option<Plan> {
-        let (u, v) = (self.half_edges.from(h), self.half_edges.to(h));
+        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
+        if [u, v].iter().any(|w| !self.mesh.free[*w as usize]) {
+            return None;
+        }
         let ends = [u, v].map(|w| self.kept_at[w as usize]);
-        let along = self.kept[h as usize];
+        let along = self.mesh.kept[h as usize];
         let fixed = match ends {
             [0, 0] => None,
             [_, 0] => Some(self.position(u)),
@@ -198,18 +174,18 @@ impl Simplification {
     }
 
     fn joint(&self, h: u32) -> Quadric {
-        self.quadrics[self.half_edges.from(h) as usize].plus(&self.quadrics[self.half_edges.to(h) as usize])
+        self.quadrics[self.mesh.half_edges.from(h) as usize].plus(&self.quadrics[self.mesh.half_edges.to(h) as usize])
     }
 
     /// The end of the edge that costs less.
     fn better_end(&self, h: u32) -> Vec3 {
         let q = self.joint(h);
-        let (p, r) = (self.position(self.half_edges.from(h)), self.position(self.half_edges.to(h)));
+        let (p, r) = (self.position(self.mesh.half_edges.from(h)), self.position(self.mesh.half_edges.to(h)));
         if q.at(p) <= q.at(r) { p } else { r }
     }
 
     fn middle(&self, h: u32) -> Vec3 {
-        let (p, q) = (self.position(self.half_edges.from(h)), self.position(self.half_edges.to(h)));
+        let (p, q) = (self.position(self.mesh.half_edges.from(h)), self.position(self.mesh.half_edges.to(h)));
         scale(add(p, q), 0.5)
     }
 
@@ -219,7 +195,10 @@ impl Simplification {
             return false;
         }
         let first = plan.fixed.unwrap_or_else(|| self.balanced(h));
-        self.patch.w = first.map(|x| f64::from(x as f32) + 0.0);
+        self.patch.w = single(first);
+        if !self.mesh.bounds.holds_inside(self.patch.w) {
+            return false;
+        }
         let Some(line) = self.kept_edge_moved(h) else {
             return false;
         };
@@ -238,9 +217,9 @@ impl Simplification {
 
     /// Gathers the patch about the edge; false if the collapse would not leave a closed manifold.
     fn gather(&mut self, h: u32) -> bool {
-        let g = self.half_edges.twin(h);
+        let g = self.mesh.half_edges.twin(h);
         // Two kept edges do not become one.
-        let kept = |e: u32| self.kept[e as usize];
+        let kept = |e: u32| self.mesh.kept[e as usize];
         if [h, g].iter().any(|e| kept(next(*e)) && kept(prev(*e))) {
             return false;
         }
@@ -252,28 +231,28 @@ impl Simplification {
         patch.old.clear();
         for (start, end) in [(h, g), (g, h)] {
             // About the vertex that `start` leaves, from the corner left of it on.
-            let mut e = self.half_edges.turned(start);
+            let mut e = self.mesh.half_edges.turned(start);
             let stop = next(end);
             while e != stop {
-                let r = self.half_edges.to(e);
+                let r = self.mesh.half_edges.to(e);
                 if self.mark[r as usize] == self.marked || boundary.len() == CROWD {
                     return false;
                 }
                 self.mark[r as usize] = self.marked;
                 boundary.push(r);
                 edges.push(next(e));
-                patch.boundary.push(self.positions[r as usize]);
-                patch.old.push(self.displacements[(e / 3) as usize]);
-                e = self.half_edges.turned(e);
+                patch.boundary.push(self.mesh.positions[r as usize]);
+                patch.old.push(self.mesh.displacements[(e / 3) as usize]);
+                e = self.mesh.half_edges.turned(e);
             }
             if start == h {
                 patch.turn = boundary.len();
             }
         }
-        patch.old.push(self.displacements[(h / 3) as usize]);
-        patch.old.push(self.displacements[(g / 3) as usize]);
-        patch.u = self.positions[self.half_edges.from(h) as usize];
-        patch.v = self.positions[self.half_edges.from(g) as usize];
+        patch.old.push(self.mesh.displacements[(h / 3) as usize]);
+        patch.old.push(self.mesh.displacements[(g / 3) as usize]);
+        patch.u = self.mesh.positions[self.mesh.half_edges.from(h) as usize];
+        patch.v = self.mesh.positions[self.mesh.half_edges.from(g) as usize];
         boundary.len() >= 3
     }
 
@@ -308,23 +287,23 @@ impl Simplification {
 
     /// How far the run of kept edges through u and v has then moved in all; `None` if too far.
     fn kept_edge_moved(&self, h: u32) -> Option<f32> {
-        let (u, v) = (self.half_edges.from(h), self.half_edges.to(h));
-        if !self.kept[h as usize] {
-            return Some(self.kept_moved[u as usize].max(self.kept_moved[v as usize]));
+        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
+        if !self.mesh.kept[h as usize] {
+            return Some(self.mesh.kept_moved[u as usize].max(self.mesh.kept_moved[v as usize]));
         }
         let w = self.patch.w;
         let mut most = 0.0f64;
         for (a, b) in [(u, v), (v, u)] {
             let p = self.position(a);
-            let beyond = |e: &u32| self.kept[*e as usize] && self.half_edges.to(*e) != b;
+            let beyond = |e: &u32| self.mesh.kept[*e as usize] && self.mesh.half_edges.to(*e) != b;
             let mut off = f64::INFINITY;
-            for e in self.half_edges.leaving(a).filter(beyond) {
-                off = off.min(from_segment(p, w, self.position(self.half_edges.to(e))));
+            for e in self.mesh.half_edges.leaving(a).filter(beyond) {
+                off = off.min(from_segment(p, w, self.position(self.mesh.half_edges.to(e))));
             }
             most = most.max(if p == w { 0.0 } else { off });
         }
         most = most.max(from_segment(w, self.position(u), self.position(v)));
-        let all = f64::from(self.kept_moved[u as usize].max(self.kept_moved[v as usize])) + most;
+        let all = f64::from(self.mesh.kept_moved[u as usize].max(self.mesh.kept_moved[v as usize])) + most;
         (all <= self.tolerance).then_some(all as f32)
     }
 
@@ -361,8 +340,8 @@ impl Simplification {
         let mut bend = f64::INFINITY;
         for i in 0..m {
             let e = self.boundary_edges[i];
-            if !self.kept[e as usize] {
-                let outer = unit(self.normal(self.half_edges.twin(e) / 3));
+            if !self.mesh.kept[e as usize] {
+                let outer = unit(self.normal(self.mesh.half_edges.twin(e) / 3));
                 bend = bend.min(dot(self.normals[i], outer));
             }
             if !self.is_kept_spoke(i) {
@@ -374,7 +353,7 @@ impl Simplification {
     }
 
     fn normal(&self, t: u32) -> Vec3 {
-        let [a, b, c] = self.half_edges.triangles[t as usize].map(|v| self.positions[v as usize]);
+        let [a, b, c] = self.mesh.half_edges.triangles[t as usize].map(|v| self.mesh.positions[v as usize]);
         cross(sub(b, a), sub(c, a))
     }
 
@@ -382,8 +361,8 @@ impl Simplification {
     fn is_kept_spoke(&self, i: usize) -> bool {
         let spoke = prev(self.boundary_edges[i]);
         // At the two corners opposite the edge, two edges of the patch become one.
-        let other = if i == 0 || i == self.patch.turn { prev(self.half_edges.twin(spoke)) } else { spoke };
-        self.kept[spoke as usize] || self.kept[other as usize]
+        let other = if i == 0 || i == self.patch.turn { prev(self.mesh.half_edges.twin(spoke)) } else { spoke };
+        self.mesh.kept[spoke as usize] || self.mesh.kept[other as usize]
     }
 
     /// The cosine of the sharpest turn about the edges of the patch that are not kept.
@@ -392,8 +371,8 @@ impl Simplification {
         for e in &self.boundary_edges {
             let t = e - e % 3;
             for g in [t, t + 1, t + 2] {
-                if !self.kept[g as usize] {
-                    let other = self.half_edges.twin(g) / 3;
+                if !self.mesh.kept[g as usize] {
+                    let other = self.mesh.half_edges.twin(g) / 3;
                     bend = bend.min(dot(unit(self.normal(t / 3)), unit(self.normal(other))));
                 }
             }
@@ -405,7 +384,7 @@ impl Simplification {
     fn is_clear(&mut self, h: u32) -> bool {
         let p = &self.patch;
         let m = p.boundary.len();
-        let u = self.half_edges.from(h);
+        let u = self.mesh.half_edges.from(h);
         self.prisms.clear();
         for i in 0..m {
             let j = if i + 1 == m { 0 } else { i + 1 };
@@ -414,41 +393,41 @@ impl Simplification {
         let mut all = Bounds::of(&p.boundary);
         all.grow(&Bounds::of(&[p.w]));
         self.marked += 1;
-        for e in self.boundary_edges.iter().chain(&[h, self.half_edges.twin(h)]) {
+        for e in self.boundary_edges.iter().chain(&[h, self.mesh.half_edges.twin(h)]) {
             self.mark[(e / 3) as usize] = self.marked;
         }
         let stays = |t: u32| self.mark[t as usize] != self.marked;
-        let mesh = (&self.half_edges.triangles[..], &self.positions[..]);
+        let mesh = (&self.mesh.half_edges.triangles[..], &self.mesh.positions[..]);
         !self.tree.meets(&self.prisms, &all, mesh, stays, &mut self.query)
     }
 
     /// Collapses the edge.
     fn collapse(&mut self, h: u32, line: f32) {
-        let g = self.half_edges.twin(h);
-        let (u, v) = (self.half_edges.from(h), self.half_edges.from(g));
-        let wings = [self.half_edges.from(prev(h)), self.half_edges.from(prev(g))];
+        let g = self.mesh.half_edges.twin(h);
+        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.from(g));
+        let wings = [self.mesh.half_edges.from(prev(h)), self.mesh.half_edges.from(prev(g))];
         // Of each of the two collapsed triangles two edges become one, which is kept if one of them was.
         for e in [h, g] {
-            let (a, b) = (self.half_edges.twin(next(e)), self.half_edges.twin(prev(e)));
-            let kept = self.kept[a as usize] || self.kept[b as usize];
-            self.kept[a as usize] = kept;
-            self.kept[b as usize] = kept;
+            let (a, b) = (self.mesh.half_edges.twin(next(e)), self.mesh.half_edges.twin(prev(e)));
+            let kept = self.mesh.kept[a as usize] || self.mesh.kept[b as usize];
+            self.mesh.kept[a as usize] = kept;
+            self.mesh.kept[b as usize] = kept;
         }
-        self.half_edges.collapse(h);
+        self.mesh.half_edges.collapse(h);
         self.count -= 2;
 
-        self.positions[u as usize] = self.patch.w;
-        self.kept_moved[u as usize] = line;
+        self.mesh.positions[u as usize] = self.patch.w;
+        self.mesh.kept_moved[u as usize] = line;
         self.quadrics[u as usize] = self.quadrics[u as usize].plus(&self.quadrics[v as usize]);
         let version = self.versions[u as usize].max(self.versions[v as usize]);
         self.versions[u as usize] = version + 1;
         for w in [u, wings[0], wings[1]] {
-            let kept = self.half_edges.leaving(w).filter(|e| self.kept[*e as usize]);
+            let kept = self.mesh.half_edges.leaving(w).filter(|e| self.mesh.kept[*e as usize]);
             self.kept_at[w as usize] = kept.count().min(255) as u8;
         }
         for i in 0..self.boundary.len() {
             let t = (self.boundary_edges[i] / 3) as usize;
-            self.displacements[t] = self.patch.new[i];
+            self.mesh.displacements[t] = self.patch.new[i];
             self.tree.grow(t, &self.prisms[i].bounds);
         }
         if 4 * self.count < 3 * self.indexed {
@@ -459,6 +438,34 @@ impl Simplification {
             self.push(prev(self.boundary_edges[i]));
         }
     }
+}
+
+/// A position in single precision.
+pub fn single(p: Vec3) -> Vec3 {
+    // Plus zero: −0 is 0.
+    p.map(|x| f64::from(x as f32) + 0.0)
+}
+
+/// The quadric of each vertex: the planes of its triangles, and those that hold its kept edges.
+fn quadrics(start: &Start) -> Vec<Quadric> {
+    let mut quadrics = vec![Quadric::default(); start.positions.len()];
+    for (t, names) in start.half_edges.triangles.iter().enumerate() {
+        let p = names.map(|v| start.positions[v as usize]);
+        let own = Quadric::triangle(p);
+        let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
+        for k in 0..3 {
+            let v = names[k] as usize;
+            quadrics[v] = quadrics[v].plus(&own);
+            if start.kept[3 * t + k] {
+                let side = sub(p[(k + 1) % 3], p[k]);
+                let wall = Quadric::plane(unit(cross(side, normal)), p[k], HOLD * dot(side, side));
+                for w in [v, names[(k + 1) % 3] as usize] {
+                    quadrics[w] = quadrics[w].plus(&wall);
+                }
+            }
+        }
+    }
+    quadrics
 }
 
 /// The distance of `p` from the segment a b.
