@@ -97,6 +97,14 @@ def test_the_command_draws_at_a_size_in_print(mesh, tmp_path):
         in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.svg", *wrong, status=1)
     in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.png", "--size", "900mm", "--dpi", 600, status=1)
     assert not (tmp_path / "b.svg").exists() and not (tmp_path / "b.png").exists()
+    # Lines have no pixels to run out of.
+    in_process("render", tmp_path / "box.stl", "-o", tmp_path / "wide.svg", "--size", "1800x900mm")
+    assert paths((tmp_path / "wide.svg").read_text())[1:3] == ("1800mm", "900mm")
+    for dpi in (1e300, 1e-3):
+        with pytest.raises(ValueError, match="a drawing is 0.1 to 1e5 mm wide"):
+            mesh.svg(dpi=dpi)
+    with pytest.raises(ValueError, match='section is "4"'):
+        mesh.view(section=4)
     with pytest.raises(ValueError, match=r"an \.svg is a line drawing"):
         mesh.render(tmp_path / "c.svg", color=np.zeros(mesh.counts[0]))
     seen = mesh.view("thickness", section="z=4")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .thickness import Thickness
     from .transition import Transitions
     from .viewer import View, view
-    from .volumes import VolumeMesh, VolumeSet, VoxelElements
+    from .volumes import ShellMesh, VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
@@ -46,6 +46,7 @@ __all__ = [
     "Layers",
     "Mesh",
     "Quadors",
+    "ShellMesh",
     "Slice",
     "Solid",
     "TetMesh",
@@ -98,6 +99,7 @@ _HOMES = {
     "Thickness": "thickness",
     "Transitions": "transition",
     "VolumeMesh": "volumes",
+    "ShellMesh": "volumes",
     "VoxelElements": "volumes",
     "VolumeSet": "volumes",
     "Voxels": "voxels",

@@ -34,7 +34,7 @@ def section_plane(text: str, eye: tuple[float, float, float]) -> tuple[tuple[flo
     seen.
     Raises ValueError for anything else.
     """
-    found = re.fullmatch(r"\s*([xyz])\s*(<=|>=|=|<|>)\s*(\S+)\s*", text)
+    found = re.fullmatch(r"\s*([xyz])\s*(<=|>=|=|<|>)\s*(\S+)\s*", text) if isinstance(text, str) else None
     try:
         place = float(found[3]) if found else math.nan
     except ValueError:

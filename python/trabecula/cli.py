@@ -355,6 +355,7 @@ COMMANDS = {
         "examples:\n  trabecula volume part.toml -o part.inp --wall 3 --order 2\n"
         "  trabecula volume part.toml -o part.inp --edge 0.5 --order 2 --E 114000 --nu 0.34 --hold X0 --load X1=0,-1000,0\n"
         "  trabecula volume part.toml -o voxels.inp --voxels 0.2\n"
+        "  trabecula volume part.toml -o shell.inp --of shell --per-cell 24 --order 2\n"
         "  trabecula volume exchanger.toml -o fluids.msh --of all\n"
         "  trabecula volume cell.toml -o rve.inp --periodic --per-cell 32 --E 114000 --nu 0.34",
         *(DESIGN, output(VOLUME_WRITES, f"the mesh to write ({dotted(VOLUME_WRITES)})")),
@@ -364,12 +365,13 @@ COMMANDS = {
             option("--wall", type=SAMPLES, metavar="N", help="edges through the thinnest wall (default: 2)"),
             option("--voxels", type=LENGTH, metavar="MM", help="hexahedra of a grid instead, with their exact solid fractions"),
         ],
-        option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic tetrahedra"),
+        option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic elements"),
         option(
             "--of",
-            choices=("solid", "pore", "lower", "upper", "all"),
+            choices=("solid", "pore", "lower", "upper", "all", "shell"),
             default="solid",
-            help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes",
+            help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes; or shell: triangles on\n"
+            "the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu)",
         ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),

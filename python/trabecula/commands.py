@@ -11,7 +11,7 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import Refused
 from .files import check_place, read_text, whole_file
-from .formats import DESIGNS, PART_READS, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
+from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .measuring import draw, measure, transitions
 from .mesh import region_of_file
@@ -126,12 +126,14 @@ def volume(args) -> None:
     """``trabecula volume``."""
     check_place(args.output)
     keep_file(args.design, args.output)
-    check_voxels(args)
+    check_elements(args)
     solid = build(args.design, tell=not args.json)
     start = time.perf_counter()
     with Progress("meshing", args.progress) as progress:
         if args.voxels is not None:
             made = solid.voxel_elements(args.voxels, args.least or 0.01, args.threads, progress)
+        elif args.of == "shell":
+            made = solid.shell_mesh(args.edge, args.per_cell, args.order, args.threads, progress)
         else:
             size = args.edge, args.per_cell, args.wall
             made = solid.volume_mesh(*size, args.order, args.of, args.periodic, args.threads, progress)
@@ -143,22 +145,28 @@ def volume(args) -> None:
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
     if args.json:
         return put_json(figures | {"warnings": warned()})
-    what, quality = "tetrahedra", ""
-    if args.voxels is None:
+    what, quality = "hexahedra", ""
+    if args.of == "shell":
+        what, quality = "triangles", f", thickness {figures['thinnest']:.4g} to {figures['thickest']:.4g} mm"
+    elif args.voxels is None:
+        what = "tetrahedra"
         quality = f", dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees"
-    else:
-        what = "hexahedra"
     say(
         f"{args.output}: {figures['elements']} {what}, {figures['nodes']} nodes, volume {figure(made.volume)} mm³{quality}; "
         f"sets {', '.join(figures['sets'])}; {figures['seconds']:.2f} s"
     )
 
 
-def check_voxels(args) -> None:
+def check_elements(args) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
     if args.voxels is None:
         if args.least is not None:
             raise Refused("--least belongs to --voxels; add it")
+        if args.of == "shell":
+            for name in (name for name, given in {"--wall": args.wall, "--periodic": args.periodic}.items() if given):
+                raise Refused(f"{name} is for tetrahedra; leave it out, or --of shell")
+            if kind_of(args.output) not in SHELL_WRITES:
+                raise Refused(f"{args.output}: the name of shells must end in {dotted(SHELL_WRITES)}")
         return
     given = {"--order": args.order != 1, "--of": args.of != "solid", "--periodic": args.periodic}
     for name in (name for name, is_given in given.items() if is_given):

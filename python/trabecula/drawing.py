@@ -11,6 +11,9 @@ from .mesh import Mesh
 from .shown import OF_MESH, look
 from .terminal import Progress, say, settle
 
+#: Most pixels of a picture along each side.
+MOST_PIXELS = 16384
+
 __all__ = ["render"]
 
 
@@ -61,8 +64,12 @@ def resolution(args) -> tuple[tuple[int, int], float | None]:
         return (int(wide), int(high)), args.dpi
     dpi = args.dpi or 300.0
     across, down = (max(1, round(v / 25.4 * dpi)) for v in (wide, high))
-    if max(across, down) > 16384:
-        raise Refused(f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels; at most 16384 are possible each")
+    if max(across, down) > MOST_PIXELS and kind_of(args.output) == "svg":
+        # Lines have no pixels: these only give the shape of the drawing.
+        finer = MOST_PIXELS / max(wide, high)
+        return (max(1, round(wide * finer)), max(1, round(high * finer))), dpi
+    if max(across, down) > MOST_PIXELS:
+        raise Refused(f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels; at most {MOST_PIXELS} are possible each")
     return (across, down), dpi
 
 

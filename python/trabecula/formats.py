@@ -14,6 +14,7 @@ __all__ = [
         "MESH_WRITES",
         "PART_READS",
         "RESULT_READS",
+        "SHELL_WRITES",
         "TET_READS",
         "TET_WRITES",
         "STDIN",
@@ -70,7 +71,8 @@ LAYER_WRITES = tuple(LAYERS)
 #: The formats of volume meshes: suffix, what it is.
 VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, next to the folder constant/polyMesh"}
 VOLUME_WRITES = tuple(VOLUMES)
-#: The formats of voxels as finite elements.
+#: The formats of shells, and those of voxels as finite elements.
+SHELL_WRITES = tuple(suffix for suffix, _ in _core.shell_formats())
 VOXEL_ELEMENT_WRITES = (*dict(_core.voxel_element_formats()), "xdmf")
 #: Those that are read back.
 VOLUME_READS = ("inp", "msh", "vtu", "bdf", "mesh")

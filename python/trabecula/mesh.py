@@ -497,6 +497,8 @@ class Mesh(Picture, Transformed):
         if dpi is None:
             return self._core.svg(*pixels, *angles, plane, [float(n) for n in pixels], "px")
         wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+        if not 0.1 <= wide <= 1e5:
+            raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
         return self._core.svg(*pixels, *angles, plane, [wide, round(wide * pixels[1] / pixels[0], 2)], "mm")
 
     def _camera(self, size: tuple[int, int], azimuth: float, elevation: float, section: str | None) -> tuple:

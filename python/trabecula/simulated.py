@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable
 from functools import cached_property
 
 from . import _core
+from .errors import DesignWarning
 from .given import number, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .volumes import OF, TET_BYTES, VOXEL_BYTES, VolumeMesh, VoxelElements, warn_flaws
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -41,6 +43,9 @@ class Simulated:
     wavelength: float
     bounds: list[list[float]]
     _thinnest: dict[str, float]
+
+    def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
+        raise NotImplementedError
 
     def volume_mesh(
         self,
@@ -109,6 +114,33 @@ class Simulated:
         count = math.prod(math.ceil((b - a) / size) for a, b in zip(low, high, strict=True))
         fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
         return VoxelElements(_core.VoxelElements.make(self._core, size, share, thread_count(threads), progress))
+
+    def shell_mesh(
+        self,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        order: int = 1,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> ShellMesh:
+        """Shells of a sheet, whether of one lattice or of a blend of sheets: triangles on its mid-surface, whose nodes have the
+        wall's thickness. For thin walls, of which solid elements would have to be as small.
+
+        Edges are about ``edge`` (mm) long, or the smallest wavelength over ``per_cell`` (default: 16). ``order`` 2 gives
+        quadratic triangles, the nodes of edges on the mid-surface; edges on the border that is no plane normal to an axis stay
+        straight, ``report().straight`` is their number. Volume is right where a wall is thin: ∫ t dA differs from that of a
+        wall of thickness t by its share t² K / 12, K the Gaussian curvature.
+
+        The same for any number of ``threads``. Warns of a wall that is thicker than two edges. Raises ValueError for what is no
+        sheet, for a skin or keep zones, and for a wall without thickness.
+        """
+        if order not in (1, 2):
+            raise ValueError(f"order is {order}; it must be 1 (linear triangles) or 2 (quadratic ones)")
+        size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
+        made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
+        if found := made._core.warning:
+            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+        return made
 
     def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
         """The edge (mm) of a request for a volume mesh."""

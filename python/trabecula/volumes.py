@@ -15,7 +15,7 @@ from typing import NamedTuple
 from . import _core
 from .errors import DesignWarning
 from .files import extension, whole_file
-from .formats import VOLUME_WRITES, VOXEL_ELEMENT_WRITES
+from .formats import SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import number, positive
 from .mesh import Mesh
 from .texts import counted
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .reports import VolumeReport, VoxelElementsReport
+    from .reports import ShellReport, VolumeReport, VoxelElementsReport
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["VolumeMesh", "VolumeSet", "VoxelElements"]
+__all__ = ["ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
@@ -57,8 +57,9 @@ class VolumeSet(NamedTuple):
 class FiniteElements:
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
-    _core: _core.VolumeMesh | _core.VoxelElements
-    _figures: VolumeReport | VoxelElementsReport
+    _of_sets = "faces"
+    _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells
+    _figures: VolumeReport | VoxelElementsReport | ShellReport
 
     def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
@@ -73,7 +74,7 @@ class FiniteElements:
         if name not in self._figures.sets:
             raise ValueError(f"{what}: the mesh has no set {name}; it has {', '.join(self._figures.sets)}")
         if not self._figures.sets[name].faces:
-            raise ValueError(f"{what}: the set {name} has no faces on the boundary")
+            raise ValueError(f"{what}: the set {name} has no {self._of_sets} on the boundary")
         return name
 
     def _write(
@@ -119,7 +120,7 @@ class FiniteElements:
                 f"the field {name} has the shape {found.shape}; it must have a row for each of {counts[0]} nodes or "
                 f"{counts[1]} elements"
             )
-        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "domain", "fraction"):
+        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "domain", "fraction", "thickness"):
             raise ValueError(f"a field cannot be named {name!r}; use another name")
         return found
 
@@ -323,6 +324,78 @@ class VoxelElements(FiniteElements):
         are those of ``VolumeMesh.write``.
         """
         self._write(path, extension(path, VOXEL_ELEMENT_WRITES), (E, nu), (hold, load), fields)
+
+
+class ShellMesh(FiniteElements):
+    """Triangles on the mid-surface of a sheet, with the wall's thickness at each node. Made by ``Solid.shell_mesh``."""
+
+    _of_sets = "edges"
+
+    def __init__(self, core: _core.Shells):
+        self._core = core
+
+    def __repr__(self) -> str:
+        figures = self._figures
+        return f"<trabecula.ShellMesh of {figures.elements} triangles, {figures.nodes} nodes>"
+
+    @cached_property
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes (n, 3), mm: corners first, then those of edges."""
+        return self._core.nodes
+
+    @cached_property
+    def elements(self) -> NDArray[np.uint32]:
+        """Nodes of each triangle (m, 3) or (m, 6), counter-clockwise seen from the upper side of the sheet: corners 0 1 2, then
+        the edges 01 12 20.
+        """
+        return self._core.elements
+
+    @cached_property
+    def thickness(self) -> NDArray[np.float64]:
+        """The wall's thickness (n,) at each node, mm: the length of the mid-surface's normal between the two faces."""
+        return self._core.thickness
+
+    @cached_property
+    def sets(self) -> Mapping[str, VolumeSet]:
+        """The named sets that are not empty: X0 X1 Y0 Y1 Z0 Z1, the edges on the region's bounding planes; BORDER, all edges of
+        one triangle only; and those of the design, all triangles within their region. Faces (n, 2) are edges: a triangle, and
+        the corner from which the edge goes to the next one.
+        """
+        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
+
+    @cached_property
+    def _figures(self) -> ShellReport:
+        return self._core.report()
+
+    def report(self) -> ShellReport:
+        """The figures: numbers of triangles and nodes, area, volume, thickness, angles, sets."""
+        return copy.deepcopy(self._figures)
+
+    @property
+    def volume(self) -> float:
+        """Volume, mm³: the thickness integrated over the area."""
+        return self._figures.volume
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Writes .inp (Abaqus, CalculiX: S3 or S6), .bdf (Nastran: CTRIA3 or CTRIA6) or .vtu (VTK), with the thickness at nodes
+        and sets.
+
+        With ``hold`` and ``load``, as of ``VolumeMesh.write``, an .inp runs as it is: the nodes of the sets ``hold`` neither
+        move nor turn, and each resultant is that of a uniform traction on the wall's faces at the border. ``fields`` are those
+        of ``VolumeMesh.write``, for .vtu.
+        """
+        self._write(path, extension(path, SHELL_WRITES), (E, nu), (hold, load), fields)
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return {}
 
 
 def _resultant(name: str, value: Sequence[float]) -> list[float]:

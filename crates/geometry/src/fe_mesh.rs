@@ -7,10 +7,12 @@ use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
 
 mod hex_mesh;
 mod poly_faces;
+mod shell_mesh;
 mod surface_load;
 
 pub use hex_mesh::{HEX_FACES, HexMesh};
 pub use poly_faces::{Patch, PolyFaces};
+pub use shell_mesh::ShellMesh;
 
 /// A mesh for finite elements.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -19,6 +19,7 @@ mod quadors;
 mod region;
 mod report;
 mod run;
+mod shells;
 mod solid;
 mod tets;
 mod volume;
@@ -72,6 +73,8 @@ mod _core {
     #[pymodule_export]
     use crate::volume::VolumeMesh;
     #[pymodule_export]
+    use crate::shells::Shells;
+    #[pymodule_export]
     use crate::voxel_elements::VoxelElements;
     #[pymodule_export]
     use crate::voxels::Voxels;
@@ -118,6 +121,12 @@ mod _core {
     #[pyfunction]
     fn volume_formats() -> Vec<(&'static str, &'static str)> {
         crate::volume::formats()
+    }
+
+    /// The formats of shells: suffix, what it is.
+    #[pyfunction]
+    fn shell_formats() -> Vec<(&'static str, &'static str)> {
+        crate::shells::formats()
     }
 
     /// The formats of voxels as finite elements: suffix, what it is.

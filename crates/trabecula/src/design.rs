@@ -48,6 +48,7 @@ use crate::kind::{At, Kind};
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::report::{DesignReport, StepReport, TransitionReport};
+use crate::shell_mesh;
 use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
@@ -396,6 +397,18 @@ impl Built {
     ) -> Result<volume_mesh::Made, Stopped> {
         let named = volume_mesh::Named { bodies: &self.bodies, sets: &self.sets };
         volume_mesh::volume_mesh(&self.solid, &named, options, progress)
+    }
+
+    /// The shells of its mid-surface, with the design's own sets.
+    ///
+    /// # Errors
+    /// As `shell_mesh::shell_mesh`.
+    pub fn shell_mesh(
+        &self,
+        options: &shell_mesh::Options,
+        progress: &dyn Progress,
+    ) -> Result<shell_mesh::Made, Stopped> {
+        shell_mesh::shell_mesh(&self.solid, &self.sets, options, progress)
     }
 
     /// Its voxels as finite elements: edge of a voxel (mm), and the least solid fraction of one; with sets of the grid's sides and of the

@@ -55,6 +55,7 @@ pub mod map;
 pub mod mesher;
 pub mod region;
 pub mod report;
+pub mod shell_mesh;
 pub mod skin;
 pub mod solid;
 pub mod surface_maker;

@@ -31,7 +31,7 @@ pub use tets_report::{
     Creases, DihedralReport, FitReport, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport, WallSpread,
     ZoneJoin, ZoneReport,
 };
-pub use volume_report::{DomainReport, SetReport, VolumeReport, VoxelElementsReport};
+pub use volume_report::{DomainReport, SetReport, ShellReport, VolumeReport, VoxelElementsReport};
 
 /// A number, or its least and greatest value over the region where it varies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -76,6 +76,7 @@ struct Reports {
     permeability: PermeabilityReport,
     volume: VolumeReport,
     voxel_elements: VoxelElementsReport,
+    shells: ShellReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

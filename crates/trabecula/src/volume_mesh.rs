@@ -24,6 +24,7 @@ mod named_sets;
 
 use body_centred::Cubes;
 use domains::Domains;
+pub(crate) use cyclic_nodes::PLANES;
 pub use domains::Of;
 pub use named_sets::is_own_name;
 

@@ -24,7 +24,7 @@ const LAYERS: &[&[&str]] = &[
     &["blend"],
     &["solid"],
     &["extract", "layers", "volume_mesh", "voxel_fractions"],
-    &["analysis"],
+    &["analysis", "shell_mesh"],
     &["report"],
     &["effective"],
     &["design"],

@@ -13,10 +13,12 @@ mod gmsh41;
 mod medit;
 mod nastran;
 mod openfoam;
+mod shells;
 mod voxel_elements;
 mod vtk_cells;
 
 pub use openfoam::{POLY_FILES, PolyFile};
+pub use shells::{SHELL_FORMATS, ShellFormat};
 pub use voxel_elements::{HEX_FORMATS, HexFormat};
 
 /// What is written besides the mesh.

@@ -7,7 +7,7 @@ use crate::math::{Aabb, Vec3, add, scale};
 use crate::mesh::Mesh;
 
 /// Triangles of a block: as many as keep its working memory in the tens of megabytes.
-pub const BLOCK: usize = 1 << 17;
+pub const BLOCK: usize = 1 << 18;
 /// Triangles that are looked at to choose the size of blocks.
 const SAMPLE: usize = 1 << 18;
 /// Most blocks along an axis.

@@ -5,8 +5,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::shell_mesh;
 use crate::volume_mesh::Made;
 use geometry::fe_mesh::{FeSet, HexMesh};
+use geometry::measure::quality;
+use geometry::mesh::Mesh;
 
 /// The figures of a volume mesh.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -80,6 +83,56 @@ pub struct VoxelElementsReport {
     pub dropped: f64,
     /// The named sets.
     pub sets: BTreeMap<String, SetReport>,
+}
+
+/// The figures of a mesh of shells.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ShellReport {
+    /// Number of triangles.
+    pub elements: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// 1 for linear triangles, 2 for quadratic ones.
+    pub order: usize,
+    /// Grid spacing, mm: edges are about as long.
+    pub edge: f64,
+    /// Area of the mid-surface, mm², between the corners of triangles.
+    pub area: f64,
+    /// Volume, mm³: the thickness integrated over the area.
+    pub volume: f64,
+    /// Smallest thickness at a node, mm.
+    pub thinnest: f64,
+    /// Greatest thickness at a node, mm.
+    pub thickest: f64,
+    /// Smallest angle of a triangle between its corners, degrees.
+    pub min_angle: f64,
+    /// Number of edges of quadratic triangles that stayed straight, on the border where it is no plane normal to an axis.
+    pub straight: usize,
+    /// The named sets; faces are edges on the border.
+    pub sets: BTreeMap<String, SetReport>,
+}
+
+impl ShellReport {
+    /// Of a mesh made at a grid spacing `edge` (mm).
+    pub fn new(made: &shell_mesh::Made, edge: f64) -> ShellReport {
+        let mesh = &made.mesh;
+        let (area, volume) = mesh.size();
+        let range = |least: fn(f64, f64) -> f64| mesh.thickness.iter().copied().reduce(least).unwrap_or(0.0);
+        let corners = Mesh { vertices: mesh.nodes.clone(), triangles: mesh.triangles.clone() };
+        ShellReport {
+            elements: mesh.triangles.len(),
+            nodes: mesh.nodes.len(),
+            order: if mesh.middles.is_empty() { 1 } else { 2 },
+            edge,
+            area,
+            volume,
+            thinnest: range(f64::min),
+            thickest: range(f64::max),
+            min_angle: quality(&corners).map_or(0.0, |q| q.smallest_angle),
+            straight: made.straight,
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
 }
 
 impl From<&HexMesh> for VoxelElementsReport {

@@ -13,7 +13,7 @@ use geometry::math::Vec3;
 /// Greatest difference of a surface between opposite planes, as a fraction of its change along a cube.
 const OFF: f64 = 1e-6;
 /// Names of the bounding planes.
-pub(super) const PLANES: [[&str; 2]; 3] = [["X0", "X1"], ["Y0", "Y1"], ["Z0", "Z1"]];
+pub const PLANES: [[&str; 2]; 3] = [["X0", "X1"], ["Y0", "Y1"], ["Z0", "Z1"]];
 
 /// The next image of each node, along cycles; itself without images.
 ///

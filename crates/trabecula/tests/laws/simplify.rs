@@ -170,6 +170,28 @@ fn a_cylinder_keeps_its_rims() {
 }
 
 #[test]
+fn what_is_simplified_in_blocks_keeps_every_guarantee() {
+    // More triangles than a block has: faces, edges and a lattice that blocks cut across.
+    let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.4)), [1.0; 3], [10.0, 20.0, 30.0]);
+    let fine = surface(&solid(cube(2.0), Some(field)), 1.0 / 60.0, &Silent).expect("surface");
+    assert!(fine.mesh.triangles.len() > 300_000);
+    let (made, report, _) = held("gyroid", &fine, within(0.004));
+    println!("gyroid in blocks: {:?}", report.triangles);
+    assert!(report.triangles[1] * 3 < report.triangles[0], "{:?}", report.triangles);
+    for (i, cut) in made.cut.iter().enumerate() {
+        let corners = made.mesh.corners(i);
+        let flat = (0..3).any(|k| [0.0, 2.0].iter().any(|x| corners.iter().all(|p| p[k] == *x)));
+        assert_eq!(flat, *cut, "{corners:?}");
+    }
+    // The faces of blocks leave no trace: a cube's come down to its own twelve triangles.
+    let fine = of(cube(1.0), 1.0 / 210.0);
+    assert!(fine.mesh.triangles.len() > 500_000);
+    let (made, _) = simplify(&fine, &within(0.01), &Silent).expect("cube");
+    check("cube", &made);
+    assert_eq!(made.mesh.triangles.len(), 12);
+}
+
+#[test]
 fn a_number_of_triangles_is_met() {
     let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.3)), [1.0; 3], [0.0; 3]);
     let fine = surface(&solid(cube(1.0), Some(field)), 1.0 / 24.0, &Silent).expect("surface");

@@ -57,14 +57,14 @@ pub(super) fn nodes(title: &str, nodes: &[Vec3], out: &mut dyn Write) -> io::Res
     })
 }
 
-/// Sets of nodes, elements and faces; `numbers` are the solver's of an element's faces.
+/// Sets of nodes, elements and faces; `numbers` are the solver's of an element's faces, none where it has no names for them.
 pub(super) fn sets(sets: &[FeSet], numbers: &[u8], out: &mut dyn Write) -> io::Result<()> {
     for set in sets {
         writeln!(out, "*NSET, NSET={}", set.name)?;
         rows(out, &set.nodes, 16, ", ")?;
         writeln!(out, "*ELSET, ELSET={}", set.name)?;
         rows(out, &set.elements, 16, ", ")?;
-        if !set.faces.is_empty() {
+        if !set.faces.is_empty() && !numbers.is_empty() {
             writeln!(out, "*SURFACE, NAME={}, TYPE=ELEMENT", set.name)?;
             lines(out, set.faces.len(), |i, text| {
                 let (t, k) = set.faces[i];
@@ -79,7 +79,7 @@ pub(super) fn sets(sets: &[FeSet], numbers: &[u8], out: &mut dyn Write) -> io::R
 }
 
 /// Appends a number in at most twenty characters: CalculiX leaves out what is beyond, an exponent too.
-fn decimal(text: &mut String, x: f64) {
+pub(super) fn decimal(text: &mut String, x: f64) {
     let start = text.len();
     // Writing to a string cannot fail.
     let _ = write!(text, "{x:?}");
@@ -104,15 +104,21 @@ fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     material(mesh, text, out)?;
     let names: Vec<&str> = mesh.domains.iter().map(String::as_str).collect();
     let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
-    step(text, &names, &forces, out)
+    step(text, (&names, 3), &forces, out)
 }
 
 /// The forces at nodes of a load on a set.
 pub(super) type Forces<'a> = dyn Fn(&str, Vec3) -> Option<Vec<(u32, Vec3)>> + 'a;
 
-/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the `domains`.
-pub(super) fn step(text: &FeText, domains: &[&str], of: &Forces, out: &mut dyn Write) -> io::Result<()> {
-    text.held.iter().try_for_each(|name| writeln!(out, "*BOUNDARY\n{name}, 1, 3"))?;
+/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the domains, whose
+/// nodes have so many degrees of freedom.
+pub(super) fn step(
+    text: &FeText,
+    (domains, freedoms): (&[&str], usize),
+    of: &Forces,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    text.held.iter().try_for_each(|name| writeln!(out, "*BOUNDARY\n{name}, 1, {freedoms}"))?;
     writeln!(out, "*STEP\n*STATIC")?;
     // A node of several sets has one line for each direction: what a second one means differs between programs.
     let mut forces = std::collections::BTreeMap::<u32, Vec3>::new();

@@ -6,14 +6,12 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::{FeText, lines};
-use crate::fe_mesh::{FeMesh, MIDDLES};
+use crate::fe_mesh::{FeMesh, FeSet, MIDDLES};
+use crate::math::Vec3;
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "$ {}\n$ mm, N, MPa\nBEGIN BULK", text.title)?;
-    lines(out, mesh.nodes.len(), |i, text| {
-        let [x, y, z] = mesh.nodes[i].map(field);
-        let _ = writeln!(text, "GRID*   {:>16}{:>16}{x:>16}{y:>16}\n*       {z:>16}", i + 1, "");
-    })?;
+    nodes(&mesh.nodes, out)?;
     lines(out, mesh.tets.len(), |i, text| {
         let middles = mesh.middles.get(i);
         let nodes = mesh.tets[i].into_iter().chain(middles.into_iter().flat_map(|m| MIDDLES.map(|k| m[k])));
@@ -26,12 +24,30 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         }
         text.push('\n');
     })?;
-    let [e, nu] = text.elastic;
-    writeln!(out, "MAT1*   {:>16}{:>16}{:>16}{:>16}\n*       ", 1, field(e), "", field(nu))?;
+    material(text.elastic, out)?;
     for (d, name) in mesh.domains.iter().enumerate() {
         writeln!(out, "$ domain {name}\nPSOLID  {:>8}{:>8}", d + 1, 1)?;
     }
-    for (s, set) in mesh.sets.iter().enumerate() {
+    sets(&mesh.sets, out)?;
+    writeln!(out, "ENDDATA")
+}
+
+/// Nodes, in large fields.
+pub(super) fn nodes(nodes: &[Vec3], out: &mut dyn Write) -> io::Result<()> {
+    lines(out, nodes.len(), |i, text| {
+        let [x, y, z] = nodes[i].map(field);
+        let _ = writeln!(text, "GRID*   {:>16}{:>16}{x:>16}{y:>16}\n*       {z:>16}", i + 1, "");
+    })
+}
+
+/// The material, by Young's modulus and Poisson's ratio.
+pub(super) fn material([e, nu]: [f64; 2], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "MAT1*   {:>16}{:>16}{:>16}{:>16}\n*       ", 1, field(e), "", field(nu))
+}
+
+/// Sets of nodes.
+pub(super) fn sets(sets: &[FeSet], out: &mut dyn Write) -> io::Result<()> {
+    for (s, set) in sets.iter().enumerate() {
         writeln!(out, "$ nodes of {}", set.name)?;
         let count = (set.nodes.len() + 1).div_ceil(8);
         lines(out, count, |i, text| {
@@ -45,7 +61,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
             text.push_str(if i + 1 < count { "+\n" } else { "\n" });
         })?;
     }
-    writeln!(out, "ENDDATA")
+    Ok(())
 }
 
 /// A number in at most sixteen characters, with a point.

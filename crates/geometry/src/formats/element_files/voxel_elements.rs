@@ -58,7 +58,7 @@ fn write_inp(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
         writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL={name}")?;
     }
     let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
-    abaqus::step(text, &["SOLID"], &forces, out)
+    abaqus::step(text, (&["SOLID"], 3), &forces, out)
 }
 
 fn write_msh(mesh: &HexMesh, _: &FeText, out: &mut dyn Write) -> io::Result<()> {
