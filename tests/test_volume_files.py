@@ -10,7 +10,9 @@ import sys
 import numpy as np
 import pytest
 import trabecula as lt
+from conftest import in_process
 from finite_elements import area_of, faces_of, solid
+from trabecula.local_fields import fields_at
 
 
 def slab(**more):
@@ -424,3 +426,40 @@ def test_a_file_of_tetrahedra_is_measured(tmp_path):
         "SOLID": report.elements,
         **{name: of.elements for name, of in report.sets.items()},
     }
+
+
+def test_fields_say_what_the_design_does_at_nodes(tmp_path):
+    """A cell twice as long along y, turned by 30 degrees about z, of a fraction that rises with z."""
+    design = tmp_path / "part.toml"
+    design.write_text(
+        'schema = 1\nunits = "mm"\nregion.box.size = [8, 8, 8]\n[lattice.core]\ncell = "gyroid"\npart = "sheet"\n'
+        "map.affine = { wavelength = [4, 8, 4], rotate = [0, 0, 30] }\n"
+        "level.fraction.linear = { along = [0, 0, 1], stops = [[-4, 0.2], [4, 0.4]] }\n"
+    )
+    out = tmp_path / "part.vtu"
+    in_process("volume", design, "-o", out, "--per-cell", "12", "--fields", "fraction,share,orientation,wavelength")
+    read = pytest.importorskip("meshio").read(out)
+    data, z = read.point_data, read.points[:, 2]
+    np.testing.assert_allclose(data["solid_fraction"], 0.3 + z / 40, rtol=1e-12)
+    assert (data["share_core"] == 1).all()
+    np.testing.assert_allclose(data["wavelength"], np.broadcast_to([4, 8, 4], (len(z), 3)), rtol=1e-12)
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    for name, axis in {"axis_1": [c, s, 0], "axis_2": [-s, c, 0], "axis_3": [0, 0, 1]}.items():
+        np.testing.assert_allclose(data[name], np.broadcast_to(axis, (len(z), 3)), atol=1e-12)
+    in_process("volume", design, "-o", tmp_path / "c.vtu", "--per-cell", "12", "--fields", "colour", status=1)
+    in_process("volume", design, "-o", tmp_path / "c.inp", "--per-cell", "12", "--fields", "fraction", status=1)
+    assert not (tmp_path / "c.inp").exists() and not (tmp_path / "c.vtu").exists()
+
+
+def test_fields_of_a_blend_follow_its_shares():
+    core = {
+        name: lt.Lattice(cell=lt.cell.gyroid(), part="sheet", map=lt.map.affine(wavelength=w), level=lt.level.fraction(f))
+        for name, w, f in (("a", 4, 0.2), ("b", 6, 0.4))
+    }
+    blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-6: 0, 6: 1}))
+    made = lt.Design(region=lt.region.box(size=[16, 4, 4]), lattice=core, blend=blend).build()
+    points = np.array([[-7.0, 0, 0], [-1, 0, 0], [1, 0, 0], [7, 0, 0]])
+    share = made.shares(points)["b"]
+    found = fields_at(made, ["fraction", "wavelength"], points)
+    np.testing.assert_allclose(found["solid_fraction"], 0.2 + 0.2 * share, rtol=1e-12)
+    np.testing.assert_allclose(found["wavelength"][:, 0], [4, 4, 6, 6], rtol=1e-12)

@@ -376,6 +376,13 @@ COMMANDS = {
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
         option("--sets", type=names, metavar="NAMES", help="sets that must not be empty, by commas"),
+        option(
+            "--fields",
+            type=names,
+            metavar="NAMES",
+            help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), orientation (unit\n"
+            "vectors along the cell's axes), wavelength",
+        ),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(
             "--load",

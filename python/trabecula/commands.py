@@ -13,6 +13,7 @@ from .errors import Refused
 from .files import check_place, read_text, whole_file
 from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
+from .local_fields import fields_at
 from .measuring import draw, measure, transitions
 from .mesh import region_of_file
 from .meshing import mesh, simplify
@@ -128,6 +129,10 @@ def volume(args) -> None:
     keep_file(args.design, args.output)
     check_elements(args)
     solid = build(args.design, tell=not args.json)
+    try:
+        fields_at(solid, args.fields or (), solid.bounds)
+    except ValueError as error:
+        raise Refused(f"--fields: {error}") from None
     start = time.perf_counter()
     with Progress("meshing", args.progress) as progress:
         if args.voxels is not None:
@@ -140,8 +145,9 @@ def volume(args) -> None:
     missing = [name for name in args.sets or () if name not in made.report().sets]
     if missing:
         raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
+    fields = fields_at(solid, args.fields or (), made.nodes)
     settle()
-    made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()))
+    made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()), fields)
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
     if args.json:
         return put_json(figures | {"warnings": warned()})
@@ -159,6 +165,8 @@ def volume(args) -> None:
 
 def check_elements(args) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
+    if args.fields and kind_of(args.output) not in ("vtu", "xdmf"):
+        raise Refused(f"--fields is for .vtu and .xdmf, not {args.output}")
     if args.voxels is None:
         if args.least is not None:
             raise Refused("--least belongs to --voxels; add it")

@@ -43,6 +43,7 @@ __all__ = [
     "RegionReport",
     "RepairReport",
     "SetReport",
+    "ShellReport",
     "SimplifyReport",
     "SingularLineReport",
     "SmoothReport",
@@ -809,6 +810,38 @@ class SetReport(Report):
     """Number of faces."""
     nodes: int
     """Number of nodes."""
+
+
+class ShellReport(Report):
+    """The figures of a mesh of shells."""
+
+    _parts = {
+        "sets": "SetReport",
+    }
+    _by_name = frozenset(["sets"])
+
+    area: float
+    """Area of the mid-surface, mm², between the corners of triangles."""
+    edge: float
+    """Grid spacing, mm: edges are about as long."""
+    elements: int
+    """Number of triangles."""
+    min_angle: float
+    """Smallest angle of a triangle between its corners, degrees."""
+    nodes: int
+    """Number of nodes."""
+    order: int
+    """1 for linear triangles, 2 for quadratic ones."""
+    sets: dict[str, SetReport]
+    """The named sets; faces are edges on the border."""
+    straight: int
+    """Number of edges of quadratic triangles that stayed straight, on the border where it is no plane normal to an axis."""
+    thickest: float
+    """Greatest thickness at a node, mm."""
+    thinnest: float
+    """Smallest thickness at a node, mm."""
+    volume: float
+    """Volume, mm³: the thickness integrated over the area."""
 
 
 class SimplifyReport(Report):

@@ -51,6 +51,26 @@ class Seen(Picture):
         """
         return self._core.map_asked(self._solved(lattice), _points(points))
 
+    def cell_at(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
+        """The cell of a lattice at points (n, 3) in mm.
+
+        ``fraction`` (n,): its solid fraction; ``axes`` (n, 3, 3): the unit vectors along which cells follow each other on their
+        axes 1, 2 and 3, each a row; ``wavelength`` (n, 3): the period along each, mm. With the map u(x), they are directions and
+        lengths of the columns of (du/dx)^-1. ``lattice`` names the lattice; by default the first. A ValueError where there is
+        none of that name.
+        """
+        import numpy as np
+
+        names = list(self.report().lattices)
+        name = lattice if lattice is not None or not names else names[0]
+        found = None if name is None else self._core.cell_at(name, _points(points))
+        if found is None:
+            raise ValueError(f"there is no lattice named {name}; there are {', '.join(names)}" if names else "the design has no lattice")
+        fraction, gradients = found
+        columns = np.linalg.inv(gradients).transpose(0, 2, 1)
+        wavelength = np.linalg.norm(columns, axis=2)
+        return {"fraction": fraction, "axes": columns / wavelength[:, :, None], "wavelength": wavelength}
+
     def shares(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """The share of each lattice of a blend at points (n, 3) in mm, 0 to 1, together 1; an array (n,) by each name.
 

@@ -102,7 +102,10 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
         )));
     }
     if before.0 as u64 * 3 >= u64::from(u32::MAX) {
-        return Err(Stopped::Refused(Fault::new("", "a mesh has more than 1.4e9 triangles, too many to be simplified")));
+        return Err(Stopped::Refused(Fault::new(
+            "",
+            "a mesh has more than 1.4e9 triangles, too many to be simplified",
+        )));
     }
     let mut state = Passing { surface: Cow::Borrowed(surface), known: None };
     for (pass, (shift, [from, to])) in PASSES.into_iter().enumerate() {
@@ -239,10 +242,8 @@ fn unsound(mesh: &Mesh) -> Fault {
             ),
         )
     };
-    let mesh = &Mesh {
-        vertices: mesh.vertices.iter().map(|p| single(*p)).collect(),
-        triangles: mesh.triangles.clone(),
-    };
+    let mesh =
+        &Mesh { vertices: mesh.vertices.iter().map(|p| single(*p)).collect(), triangles: mesh.triangles.clone() };
     let mut used = vec![false; mesh.vertices.len()];
     for &v in mesh.triangles.iter().flatten() {
         used[v as usize] = true;

@@ -67,13 +67,13 @@ mod _core {
     #[pymodule_export]
     use crate::region::Region;
     #[pymodule_export]
+    use crate::shells::Shells;
+    #[pymodule_export]
     use crate::solid::Solid;
     #[pymodule_export]
     use crate::tets::TetMesh;
     #[pymodule_export]
     use crate::volume::VolumeMesh;
-    #[pymodule_export]
-    use crate::shells::Shells;
     #[pymodule_export]
     use crate::voxel_elements::VoxelElements;
     #[pymodule_export]

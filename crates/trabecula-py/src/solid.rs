@@ -258,6 +258,27 @@ impl Solid {
         flat.into_pyarray(py).reshape([found.len(), 3, 3])
     }
 
+    /// The cell of a lattice at points (n, 3): its solid fraction (n,), and the gradients of its three phases (n, 3, 3), turns per mm;
+    /// None without that lattice.
+    fn cell_at<'py>(
+        &self,
+        py: Python<'py>,
+        lattice: &str,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>)>> {
+        let Some((_, found)) = self.built.lattices.iter().find(|(n, _)| n == lattice) else { return Ok(None) };
+        let points = arrays::points(&points)?;
+        let n = points.len();
+        let (fractions, gradients) = run(py, None, None, |_| {
+            let (mut fractions, mut phases, mut gradients) = (vec![0.0; n], vec![[0.0; 3]; n], vec![[[0.0; 3]; 3]; n]);
+            found.fractions(&points, &mut fractions);
+            found.map.phases_and_jacobians(&points, &mut phases, &mut gradients);
+            (fractions, gradients)
+        })?;
+        let flat: Vec<f64> = gradients.into_iter().flatten().flatten().collect();
+        Ok(Some((fractions.into_pyarray(py), flat.into_pyarray(py).reshape([n, 3, 3])?)))
+    }
+
     /// The names of the lattices of a blend and their shares (n, names) at points (n, 3); None without a blend.
     fn shares<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Option<NamedColumns<'py>>> {
         let points = arrays::points(&points)?;

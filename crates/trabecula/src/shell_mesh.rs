@@ -23,6 +23,8 @@ use crate::region::Region;
 use crate::solid::Solid;
 use crate::volume_mesh::PLANES;
 
+mod border_slivers;
+
 /// Most that a node in the middle of an edge moves off it, as a share of its length.
 const BULGE: f64 = 0.2;
 /// A share of the mesh's size within which a node lies on a bounding plane.
@@ -62,10 +64,14 @@ pub fn shell_mesh(
 ) -> Result<Made, Stopped> {
     let refuse = |message: &str| Err(Stopped::Refused(Fault::new("of", message)));
     let Some(faces) = solid.field.as_ref().and_then(|f| f.faces()) else {
-        return refuse("shells are made of sheets, whether of one lattice or of a blend of sheets; mesh this design as a solid");
+        return refuse(
+            "shells are made of sheets, whether of one lattice or of a blend of sheets; mesh this design as a solid",
+        );
     };
     if !solid.filled.is_empty() {
-        return refuse("shells are made of a sheet alone; leave out skin and keep zones, or mesh this design as a solid");
+        return refuse(
+            "shells are made of a sheet alone; leave out skin and keep zones, or mesh this design as a solid",
+        );
     }
     let lipschitz = faces[0].lipschitz().max(faces[1].lipschitz());
     let middle = Arc::new(MidSurface { faces, lipschitz });
@@ -73,10 +79,12 @@ pub fn shell_mesh(
     let stage = |from, to| Stage { whole: progress, from, to };
     let whole = surface(&half, options.edge, &stage(0.0, 0.4))?;
     let (better, _) = smooth(&whole, &stage(0.4, 0.9))?;
-    let SurfaceMesh { mesh: open, .. } = better.uncapped();
+    let SurfaceMesh { mesh: mut open, .. } = better.uncapped();
     if open.triangles.is_empty() {
         return refuse("the region holds none of the sheet's mid-surface");
     }
+    let bounds = solid.region.bounds();
+    border_slivers::merge(&mut open, &bounds, options.edge);
     let border = border(&open.triangles);
     let mut mesh = ShellMesh { nodes: open.vertices, triangles: open.triangles, ..ShellMesh::default() };
     let mut inner = vec![true; mesh.nodes.len()];
@@ -85,11 +93,10 @@ pub fn shell_mesh(
     mesh.nodes.par_iter_mut().zip(&inner).filter(|(_, inner)| **inner).for_each(|(p, _)| {
         *p = middle.nearest(*p, most, |g| g).unwrap_or(*p);
     });
-    let bounds = solid.region.bounds();
     let straight = if options.quadratic { add_middles(&mut mesh, &border, &middle, &bounds) } else { 0 };
     let reach = 0.5 * solid.wavelength;
     mesh.thickness = mesh.nodes.par_iter().map(|p| middle.thickness(*p, reach)).collect();
-    if let Some(n) = mesh.thickness.iter().position(|t| t.is_nan() || *t <= 0.0) {
+    if let Some(n) = mesh.thickness.iter().position(|t| *t <= NEAR * solid.wavelength) {
         let at = mesh.nodes[n].map(|x| number((1e3 * x).round() / 1e3)).join(", ");
         return refuse(&format!("the wall has no thickness at ({at}) mm; keep its level above 0 in the whole region"));
     }
@@ -248,7 +255,7 @@ impl MidSurface {
         Some(p)
     }
 
-    /// The length (mm) of the normal at `p` between both faces, each at most `reach` away; NaN where there is none.
+    /// The length (mm) of the normal at `p` between both faces, each taken to be at most `reach` away.
     fn thickness(&self, p: Vec3, reach: f64) -> f64 {
         let (mut value, mut gradient) = ([0.0], [[0.0; 3]]);
         self.gradients(&[p], &mut value, &mut gradient);
@@ -262,7 +269,7 @@ impl MidSurface {
     }
 }
 
-/// How far (mm) it is from `p` in the direction `way` to where a function that is negative at `p` becomes positive: Newton's method
+/// How far (mm) it is from `p` in the direction `way` to where a function that is negative at `p` becomes positive, at most `reach`: Newton's method
 /// between bounds, after the first of even steps at which it is.
 fn way_out(face: &dyn Implicit, p: Vec3, way: Vec3, reach: f64) -> f64 {
     let at = |s: f64| {
@@ -275,13 +282,17 @@ fn way_out(face: &dyn Implicit, p: Vec3, way: Vec3, reach: f64) -> f64 {
     while at(high).0 <= 0.0 {
         high += march;
         if high > reach {
-            return f64::NAN;
+            return reach;
         }
     }
     let (mut low, mut s) = (high - march, high);
     for _ in 0..2 * STEPS {
         let (value, slope) = at(s);
-        if value <= 0.0 { low = s } else { high = s }
+        if value <= 0.0 {
+            low = s
+        } else {
+            high = s
+        }
         let next = s - value / slope;
         if (next - s).abs() <= 1e-13 * reach {
             return next;

@@ -23,8 +23,8 @@ mod mid_nodes;
 mod named_sets;
 
 use body_centred::Cubes;
-use domains::Domains;
 pub(crate) use cyclic_nodes::PLANES;
+use domains::Domains;
 pub use domains::Of;
 pub use named_sets::is_own_name;
 

@@ -58,14 +58,8 @@ impl Blocks {
             let edge = longest / along;
             let lower = bounds.min.map(|x| x - shift * edge);
             let counts = bounds.size().map(|s| ((s + shift * edge) / edge) as usize + 1);
-            let blocks = Blocks {
-                lower,
-                edge,
-                close: CLOSE * (edge + largest),
-                counts,
-                start: Vec::new(),
-                members: Vec::new(),
-            };
+            let blocks =
+                Blocks { lower, edge, close: CLOSE * (edge + largest), counts, start: Vec::new(), members: Vec::new() };
             let mut held = vec![0usize; blocks.count()];
             centers.iter().for_each(|c| held[blocks.home(*c)] += step);
             if along > MOST || held.iter().all(|n| *n <= BLOCK) {

@@ -133,7 +133,8 @@ impl Simplification {
     }
 
     fn stamp(&self, h: u32) -> u32 {
-        self.versions[self.mesh.half_edges.from(h) as usize].wrapping_add(self.versions[self.mesh.half_edges.to(h) as usize])
+        self.versions[self.mesh.half_edges.from(h) as usize]
+            .wrapping_add(self.versions[self.mesh.half_edges.to(h) as usize])
     }
 
     fn push(&mut self, h: u32) {

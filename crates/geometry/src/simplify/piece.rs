@@ -97,9 +97,8 @@ impl Piece {
             (0..3).all(|a| b.min[a] <= around.max[a] && around.min[a] <= b.max[a])
         };
         let position = |v: u32| self.mesh.vertices[v as usize];
-        let open = |h: u32| {
-            half_edges.twin(h) == NONE && touches(&[position(half_edges.from(h)), position(half_edges.to(h))])
-        };
+        let open =
+            |h: u32| half_edges.twin(h) == NONE && touches(&[position(half_edges.from(h)), position(half_edges.to(h))]);
         if (0..3 * self.mesh.triangles.len() as u32).any(open) {
             return None;
         }

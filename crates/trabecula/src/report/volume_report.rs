@@ -106,7 +106,7 @@ pub struct ShellReport {
     pub thickest: f64,
     /// Smallest angle of a triangle between its corners, degrees.
     pub min_angle: f64,
-    /// Number of edges of quadratic triangles that stayed straight, on the border where it is no plane normal to an axis.
+    /// Number of edges of quadratic triangles that stayed straight: on the border where it is no bounding plane.
     pub straight: usize,
     /// The named sets; faces are edges on the border.
     pub sets: BTreeMap<String, SetReport>,

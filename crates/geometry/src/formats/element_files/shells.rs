@@ -11,11 +11,8 @@ use crate::formats::vtu::Cells;
 pub type ShellFormat = (&'static str, &'static str, fn(&ShellMesh, &FeText, &mut dyn Write) -> io::Result<()>);
 
 /// The formats of shells.
-pub const SHELL_FORMATS: [ShellFormat; 3] = [
-    ("inp", "Abaqus, CalculiX", write_inp),
-    ("bdf", "Nastran", write_bdf),
-    ("vtu", "VTK, ParaView", write_vtu),
-];
+pub const SHELL_FORMATS: [ShellFormat; 3] =
+    [("inp", "Abaqus, CalculiX", write_inp), ("bdf", "Nastran", write_bdf), ("vtu", "VTK, ParaView", write_vtu)];
 
 fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     abaqus::nodes(&text.title, &mesh.nodes, out)?;
