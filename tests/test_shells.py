@@ -77,7 +77,7 @@ def test_the_middles_of_edges_lie_on_the_surface():
     field = solid.field(mesh.nodes[np.linalg.norm(mesh.nodes, axis=1) < 4])
     assert len(field) > 1000 and np.ptp(field) < 1e-9
     # The border of a ball is no plane: its edges are straight.
-    assert mesh.report().straight == len(mesh.sets["BORDER"].faces) > 0
+    assert mesh.report().straight >= len(mesh.sets["BORDER"].faces) > 0
 
 
 def test_sets_of_the_design_are_triangles_within_their_region():

@@ -117,7 +117,7 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
         let last = blocks.count() == 1;
         let stage = Stage { whole: progress, from, to: if last { 1.0 } else { to } };
         let done = run(&state, &blocks, tolerance, target, &stage)?;
-        state = joined(&state.surface.mesh, &done);
+        state = joined(&state.surface.mesh, done);
         if last {
             break;
         }
@@ -185,10 +185,11 @@ fn run(
 }
 
 /// The surface that blocks make up, whose vertices were those of `before`.
-fn joined(before: &Mesh, done: &[Done]) -> Passing<'static> {
+fn joined(before: &Mesh, done: Vec<Done>) -> Passing<'static> {
     let mut names = vec![NONE; before.vertices.len()];
     let mut surface = SurfaceMesh::default();
     let mut known = Known::default();
+    let mut all_moved = Vec::new();
     for block in done {
         for triangle in &block.triangles {
             surface.mesh.triangles.push(triangle.map(|v| {
@@ -203,9 +204,10 @@ fn joined(before: &Mesh, done: &[Done]) -> Passing<'static> {
         surface.cut.extend_from_slice(&block.cut);
         known.kept.extend_from_slice(&block.kept);
         known.displacements.extend_from_slice(&block.displacements);
+        all_moved.push(block.moved);
     }
     known.kept_moved = vec![0.0; surface.mesh.vertices.len()];
-    for (v, position, kept_moved) in done.iter().flat_map(|block| &block.moved) {
+    for (v, position, kept_moved) in all_moved.iter().flatten() {
         let name = names[*v as usize] as usize;
         surface.mesh.vertices[name] = *position;
         known.kept_moved[name] = *kept_moved;

@@ -2,7 +2,7 @@
 //!
 //! The two faces of a sheet are u − t and −u − t for one function u and the level t, so half their difference is u, whose zero
 //! set in the region is the mid-surface, of one lattice or of a blend. It is extracted as the surface of the space on its one side,
-//! without that space's cuts; triangles are improved; and nodes that are not on the border are moved onto it along its gradient. The
+//! without that space's cuts; triangles are improved; and nodes are moved onto it, those of the border within bounding planes. The
 //! thickness is the length of the normal between the two faces.
 
 use std::collections::BTreeMap;
@@ -89,9 +89,11 @@ pub fn shell_mesh(
     let mut mesh = ShellMesh { nodes: open.vertices, triangles: open.triangles, ..ShellMesh::default() };
     let mut inner = vec![true; mesh.nodes.len()];
     border.iter().flat_map(|e| mesh.edge(*e).take(2)).for_each(|n| inner[n as usize] = false);
-    let most = 0.5 * options.edge;
-    mesh.nodes.par_iter_mut().zip(&inner).filter(|(_, inner)| **inner).for_each(|(p, _)| {
-        *p = middle.nearest(*p, most, |g| g).unwrap_or(*p);
+    mesh.nodes.par_iter_mut().zip(&inner).for_each(|(p, inner)| {
+        let common = planes(*p, &bounds);
+        if *inner || common != 0 {
+            *p = middle.nearest(*p, 0.5 * options.edge, |g| if *inner { g } else { held(g, common) }).unwrap_or(*p);
+        }
     });
     let straight = if options.quadratic { add_middles(&mut mesh, &border, &middle, &bounds) } else { 0 };
     let reach = 0.5 * solid.wavelength;
@@ -125,6 +127,11 @@ fn planes(p: Vec3, bounds: &Aabb) -> u8 {
     (0..6).fold(0, |bits, k| bits | u8::from(on(k / 2, k % 2)) << k)
 }
 
+/// What of a vector is in bounding planes, given as bits.
+fn held(g: Vec3, planes: u8) -> Vec3 {
+    [0, 1, 2].map(|a| if planes >> (2 * a) & 3 != 0 { 0.0 } else { g[a] })
+}
+
 /// Adds the nodes in the middle of edges, on the mid-surface where it is near; counts those on straight edges of the border.
 fn add_middles(mesh: &mut ShellMesh, border: &[(u32, u8)], middle: &MidSurface, bounds: &Aabb) -> usize {
     let mut names: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -148,9 +155,7 @@ fn add_middles(mesh: &mut ShellMesh, border: &[(u32, u8)], middle: &MidSurface, 
         if *outer && common == 0 {
             return (mean, true);
         }
-        // In the bounding planes of both ends.
-        let held = |g: Vec3| [0, 1, 2].map(|a| if common >> (2 * a) & 3 != 0 { 0.0 } else { g[a] });
-        match middle.nearest(mean, most, |g| if *outer { held(g) } else { g }) {
+        match middle.nearest(mean, most, |g| if *outer { held(g, common) } else { g }) {
             Some(p) => (p, false),
             None => (mean, true),
         }

@@ -2,17 +2,17 @@
 
 use std::collections::BTreeSet;
 
-use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, sub};
 use geometry::mesh::Mesh;
 
 use super::{border, planes};
 
 /// Edges at the border that are shorter than this share of the grid spacing are merged.
 const SHORT: f64 = 0.2;
-/// Cosine of the most that a triangle turns.
+/// Cosine of the most that a triangle may be turned from the mean of those about the edge.
 const TURN: f64 = 0.7;
 
-/// Merges the ends of short edges at the border, where the mesh stays a manifold, no triangle turns by more than 45 degrees, and the border
+/// Merges the ends of short edges at the border, where the mesh stays a manifold, no triangle lies across the others, and the border
 /// stays on its bounding planes and keeps its corners on two of them.
 pub(super) fn merge(mesh: &mut Mesh, bounds: &Aabb, edge: f64) {
     let mut about: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); mesh.vertices.len()];
@@ -94,18 +94,17 @@ impl Work<'_> {
         if common != if is_outer { 1 } else { 2 } {
             return false;
         }
+        // Slivers have no normal to speak of: all are held against the mean one.
+        let normal = |corners: [u32; 3], moved: bool| {
+            let [p, q, r] = corners.map(|v| self.at(if moved && v == from { to } else { v }));
+            cross(sub(q, p), sub(r, p))
+        };
+        let both = self.about[from as usize].union(&self.about[to as usize]);
+        let mean = both.fold([0.0; 3], |sum, t| add(sum, normal(self.mesh.triangles[*t as usize], false)));
         self.about[from as usize].iter().all(|t| {
             let corners = self.mesh.triangles[*t as usize];
-            if corners.contains(&to) {
-                return true;
-            }
-            let normal = |at: &dyn Fn(u32) -> Vec3| {
-                let [p, q, r] = corners.map(at);
-                cross(sub(q, p), sub(r, p))
-            };
-            let before = normal(&|v| self.at(v));
-            let after = normal(&|v| self.at(if v == from { to } else { v }));
-            dot(before, after) > TURN * norm(before) * norm(after)
+            let after = normal(corners, true);
+            corners.contains(&to) || dot(mean, after) > TURN * norm(mean) * norm(after)
         })
     }
 

@@ -172,7 +172,7 @@ fn a_cylinder_keeps_its_rims() {
 #[test]
 fn what_is_simplified_in_blocks_keeps_every_guarantee() {
     // More triangles than a block has: faces, edges and a lattice that blocks cut across.
-    let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.4)), [1.0; 3], [10.0, 20.0, 30.0]);
+    let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.4)), [1.0; 3], [0.0; 3]);
     let fine = surface(&solid(cube(2.0), Some(field)), 1.0 / 60.0, &Silent).expect("surface");
     assert!(fine.mesh.triangles.len() > 300_000);
     let (made, report, _) = held("gyroid", &fine, within(0.004));
