@@ -46,7 +46,7 @@ pub fn spaces(
         Some(at) => Err(at),
         None => Ok(wanted.iter().map(|s| view.patch(*s as usize, middle)).collect::<Vec<_>>()),
     };
-    each_tile(&grid, progress, map, |patches| {
+    each_tile(&grid, grid.all(), progress, map, |patches| {
         let patches = patches.map_err(|at| Stopped::Refused(no_wall(at)))?;
         all.iter_mut().zip(patches).try_for_each(|(out, patch)| out.add(patch))
     })?;

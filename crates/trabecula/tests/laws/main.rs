@@ -19,6 +19,7 @@ mod periods;
 mod phase;
 mod pore;
 mod principal_lengths;
+mod ranges;
 mod simplify;
 mod skin;
 mod smooth;

@@ -1,0 +1,109 @@
+//! The surface of a range of tiles, as another process or another run of this one makes it: its triangles, and what joins it to the
+//! rest.
+
+use std::ops::Range;
+use std::sync::Mutex;
+
+use geometry::fault::Fault;
+use geometry::formats::stl;
+use geometry::math::Vec3;
+use geometry::progress::{Progress, Stopped};
+
+use super::range_partial::RangeSweep;
+use super::sampling_grid::Grid;
+use super::tile::View;
+use super::tile_components::TileComponents;
+use super::tile_queue::{borrow, each_tile, give_back};
+use crate::solid::Solid;
+
+/// A solid on its grid, whose tiles are taken range by range. Tiles are numbered, x fastest.
+pub struct TileRanges {
+    grid: Grid,
+    /// The apex of the cones by which volumes are summed.
+    middle: Vec3,
+}
+
+/// What is made of a range of tiles.
+pub struct RangeMade {
+    /// The tiles.
+    pub tiles: Range<usize>,
+    /// Their triangles, records of a binary STL: the bytes at their place in the file of the whole, before anything is dropped.
+    pub records: Vec<u8>,
+    /// Their components, for [`JoinedRanges`](super::JoinedRanges).
+    pub partial: Vec<u8>,
+}
+
+impl TileRanges {
+    /// The tiles of a solid at grid spacing `edge` (mm).
+    ///
+    /// # Errors
+    /// A spacing at which there is no grid.
+    pub fn new(solid: &Solid, edge: f64) -> Result<TileRanges, Fault> {
+        Ok(TileRanges { grid: Grid::new(solid, edge)?, middle: solid.region.bounds().center() })
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> usize {
+        self.grid.all().len()
+    }
+
+    /// The surface in some tiles, in ranges that end at multiples of `size` and at the last tile. Memory is bounded by the tiles in
+    /// flight and one range. Same bytes for any number of threads.
+    ///
+    /// # Errors
+    /// An interruption; more components than can be numbered; what `take` says.
+    pub fn each(
+        &self,
+        tiles: Range<usize>,
+        size: usize,
+        progress: &dyn Progress,
+        mut take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
+    ) -> Result<(), Stopped> {
+        let tiles = tiles.start.min(self.tiles())..tiles.end.min(self.tiles());
+        let spare = Mutex::new(Vec::<Vec<u8>>::new());
+        let map = |view: View| {
+            let mut records = borrow(&spare);
+            let positions = view.positions();
+            let components = TileComponents::each_triangle(&view, 0, self.middle, |t, _| {
+                stl::push_record(&mut records, t.map(|v| positions[v as usize].map(|x| x as f32)));
+            });
+            (components, records)
+        };
+        let mut open = Open::at(tiles.start, tiles.end, size.max(1));
+        each_tile(&self.grid, tiles.clone(), progress, map, |(components, mut records)| {
+            let tile = self.grid.number(components.tile);
+            while tile >= open.tiles.end {
+                let next = Open::at(open.tiles.end, tiles.end, size.max(1));
+                take(std::mem::replace(&mut open, next).close(&self.grid))?;
+            }
+            open.records.extend_from_slice(&records);
+            records.clear();
+            give_back(&spare, records);
+            open.sweep.add(&self.grid, components).map_err(Stopped::Refused)
+        })?;
+        while !open.tiles.is_empty() {
+            let next = Open::at(open.tiles.end, tiles.end, size.max(1));
+            take(std::mem::replace(&mut open, next).close(&self.grid))?;
+        }
+        Ok(())
+    }
+}
+
+/// A range whose tiles come in.
+struct Open {
+    tiles: Range<usize>,
+    records: Vec<u8>,
+    sweep: RangeSweep,
+}
+
+impl Open {
+    /// The range that begins at a tile.
+    fn at(start: usize, end: usize, size: usize) -> Open {
+        let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
+        Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), tiles }
+    }
+
+    fn close(self, grid: &Grid) -> RangeMade {
+        RangeMade { tiles: self.tiles, records: self.records, partial: self.sweep.finish(grid).pack() }
+    }
+}
