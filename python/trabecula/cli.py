@@ -241,6 +241,16 @@ LIGHTER = (
     option("--tolerance", type=LENGTH, metavar="MM", help="fewer triangles, the surface moved by at most this, mm"),
     option("--triangles", type=TRIANGLES, metavar="N", help="fewer triangles, down to this number"),
 )
+#: Surfaces that outgrow one process or one run.
+APART = (
+    option(
+        "--resume",
+        action="store_true",
+        help="keep what is done in the folder OUT.parts, with checksums; after any end the same command goes on from there",
+    ),
+    option("--cluster", metavar="ADDRESS", help="by a Dask cluster at this address, or local:N; needs the extra scale"),
+    option("--new", action="store_true", help="begin anew: the folder of an earlier run is not taken up"),
+)
 TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the transitions of a blend to OUT.svg", "OUT.svg")
 
 #: For each command: one line, examples and more, options; of a list of options one at most may be given.
@@ -296,6 +306,7 @@ COMMANDS = {
             ),
         ),
         *(THREADS, PROGRESS),
+        *APART,
         option(
             "--islands",
             choices=ISLANDS,

@@ -109,6 +109,7 @@ def mesh_implicit(args) -> None:
 
 def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) -> None:
     """Refuses options that do not go with a file without triangles; ``islands`` are what --islands may be."""
+    names = [*names, "resume", "cluster", "new"]
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
     given += [] if args.islands in islands else [f"--islands {args.islands}"]
     if given:
@@ -137,6 +138,9 @@ def mesh_parts(args) -> None:
         "--chord": args.chord,
         "--tolerance": args.tolerance,
         "--triangles": args.triangles,
+        "--resume": args.resume,
+        "--cluster": args.cluster,
+        "--new": args.new,
     }
     if alone := [name for name, value in others.items() if value]:
         raise Refused(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
@@ -178,7 +182,16 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     asked = {} if args.chord is None else {"chord": args.chord}
     is_open = args.open or solid.open_ends
     whole = lighter or args.smooth or is_open
-    if not whole and (kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))):
+    if apart_of(args) is not None:
+        if whole:
+            raise Refused(
+                "--resume and --cluster make a surface in ranges of tiles, as it is: leave out " + given_of(args, is_open)
+            )
+        if kind_of(args.output) != "stl":
+            raise Refused(f"{args.output}: --resume and --cluster write .stl only; name one, or leave them out")
+    if not whole and (
+        apart_of(args) is not None or kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))
+    ):
         given = {"edge": None, "per_cell": None, "chord": None} | options
 
         def accept(found) -> None:
@@ -189,7 +202,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
                 )
             settle()
 
-        return solid._save(args.output, **given, accept=accept).to_dict() | asked
+        return solid._save(args.output, **given, accept=accept, apart=apart_of(args)).to_dict() | asked
     if not lighter and not asked:
         solid.check_room(args.output, **resolution(args))
     surface = solid.mesh(**options)
@@ -217,6 +230,17 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
         say("open at the region's boundary: volume and fraction are the closed part's")
     surface.write(args.output)
     return made
+
+
+def apart_of(args) -> dict | None:
+    """How a surface is to be made in ranges of tiles, if it is."""
+    return {"cluster": args.cluster, "new": args.new} if args.resume or args.cluster or args.new else None
+
+
+def given_of(args, is_open: bool) -> str:
+    """The options by which a surface is held in memory as a whole."""
+    names = {"--tolerance": args.tolerance, "--triangles": args.triangles, "--smooth": args.smooth, "--open": args.open}
+    return ", ".join(name for name, value in names.items() if value) or ("open ends of the design" if is_open else "")
 
 
 def simplify(args) -> None:

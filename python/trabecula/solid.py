@@ -479,6 +479,9 @@ class Solid(Seen, Simulated):
         progress: Progress | None = None,
         islands: Islands = "drop-small",
         chord: float | None = None,
+        resume: bool = False,
+        cluster: str | None = None,
+        new: bool = False,
     ) -> SurfaceReport:
         """Streams the surface to a mesh file (.stl, .3mf, .ply or .obj) without holding it in memory, and gives its figures.
 
@@ -487,8 +490,13 @@ class Solid(Seen, Simulated):
 
         An .stl is written at once; for the others vertices and triangles go to temporary files beside it, which are gone at
         the end, whatever that is.
+
+        With ``resume`` an .stl is made in ranges of tiles, which stand in the folder ``path``.parts with checksums as soon as they
+        are made. After any end the same call goes on from there, unless a ``new`` run is wanted; at the end the folder is gone.
+        With ``cluster`` the ranges are made by the workers of a Dask cluster, an address or "local:N" (extra ``scale``).
         """
-        return self._save(path, edge, per_cell, threads, progress, islands, chord)
+        apart = {"cluster": cluster, "new": new} if resume or cluster or new else None
+        return self._save(path, edge, per_cell, threads, progress, islands, chord, apart=apart)
 
     def save_step(self, path: str | os.PathLike[str]) -> StepReport:
         """Writes the exact surface of beams alone to a STEP file (.step or .stp; AP214, mm) for CAD systems, and gives its
@@ -544,11 +552,14 @@ class Solid(Seen, Simulated):
         islands: Islands,
         chord: float | None,
         accept: Callable[[SurfaceReport], Any] = lambda made: None,
+        apart: dict[str, Any] | None = None,
     ) -> SurfaceReport:
-        """As ``save``; what ``accept`` or a warning raises leaves no file behind."""
+        """As ``save``; what ``accept`` or a warning raises leaves no file behind. ``apart`` says how it is made in ranges."""
         check_islands(islands)
         kind = extension(path, MESH_WRITES)
         check_place(path)
+        if apart is not None:
+            return self._save_in_ranges(path, edge, per_cell, threads, progress, islands, chord, accept, apart)
         chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None and kind != "stl":
             made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
@@ -570,10 +581,45 @@ class Solid(Seen, Simulated):
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
             summary, words = self._core.stream((temporary, kind, TITLE), spacing, thread_count(threads), progress, islands)
-            self._warn_coarse(summary.volume + left_out(summary.islands), spacing, pieces=summary.islands.found + 1)
-            warn_islands(summary.islands, words)
-            accept(summary)
+            self._accept(summary, words, spacing, accept)
         return summary
+
+    def _accept(self, made: SurfaceReport, words: str, spacing: float, accept: Callable[[SurfaceReport], Any]) -> None:
+        """Warns of what may be wrong with a surface before its file gets its name."""
+        self._warn_coarse(made.volume + left_out(made.islands), spacing, pieces=made.islands.found + 1)
+        warn_islands(made.islands, words)
+        accept(made)
+
+    def _save_in_ranges(
+        self,
+        path: str | os.PathLike[str],
+        edge: float | None,
+        per_cell: float | None,
+        threads: int | None,
+        progress: Progress | None,
+        islands: Islands,
+        chord: float | None,
+        accept: Callable[[SurfaceReport], Any],
+        apart: dict[str, Any],
+    ) -> SurfaceReport:
+        from . import ranges
+
+        name = os.fsdecode(path)
+        if extension(path, MESH_WRITES) != "stl" or special(name):
+            raise ValueError(f"{name}: a surface is made in ranges as .stl only, to a file; leave resume and cluster out")
+        if self._chord_of(chord, edge, per_cell, islands) is not None:
+            raise ValueError(
+                "beams alone are meshed by their own patches, not on a grid whose tiles can be made apart; leave resume and cluster "
+                "out, or give an edge"
+            )
+        spacing = self.spacing(edge, per_cell)
+        self._warn_coarser(edge, per_cell)
+        self._warn_thin(spacing)
+
+        def told(made: SurfaceReport, words: str) -> None:
+            self._accept(made, words, spacing, accept)
+
+        return ranges.save(self, name, spacing, islands, threads, progress, accept=told, **apart)
 
     def voxels(
         self,

@@ -75,7 +75,7 @@ type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>,
 type Measured<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>);
 
 /// What is to become of the connected components other than the largest.
-fn islands_word(word: &str) -> PyResult<Islands> {
+pub fn islands_word(word: &str) -> PyResult<Islands> {
     Islands::named(word).ok_or_else(|| {
         PyValueError::new_err(format!(r#"islands is "{word}"; it must be "keep", "drop-small", "drop" or "error""#))
     })

@@ -44,7 +44,7 @@ use tile_components::{TileComponents, TileSweep};
 use tile_figures::{FigureSums, TileFigures};
 use tile_queue::{borrow, each_tile, give_back};
 pub use tile_ranges::{RangeMade, TileRanges};
-pub use voxelize::voxels;
+pub use voxelize::{VoxelGrid, voxels};
 
 /// Meshes a solid on a grid whose spacing is the resolution.
 pub struct GridSurface<'a>(pub &'a Solid);

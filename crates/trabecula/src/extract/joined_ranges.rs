@@ -7,9 +7,11 @@ use geometry::progress::Stopped;
 use geometry::union_find::unite;
 use rustc_hash::FxHashMap;
 
+use super::packed::damaged;
 use super::range_partial::{Partial, RowLines};
 use super::tile_components::LINES;
-use crate::surface_maker::{ComponentGraph, NONE, Options, Summary, not_empty};
+use super::tile_figures::FigureSums;
+use crate::surface_maker::{ComponentGraph, Measured, NONE, Options, Summary, not_empty};
 
 /// Joins ranges of tiles as they come, in order. It holds the border vertices of two layers of tiles and a few numbers for each
 /// component of each tile.
@@ -17,6 +19,8 @@ use crate::surface_maker::{ComponentGraph, NONE, Options, Summary, not_empty};
 pub struct JoinedRanges {
     graph: ComponentGraph,
     triangles: u64,
+    /// What is measured besides, if it is of all ranges.
+    sums: Option<FigureSums>,
     here: FxHashMap<u128, u32>,
     below: FxHashMap<u128, u32>,
     layer: u64,
@@ -43,6 +47,14 @@ impl JoinedRanges {
     pub fn add(&mut self, partial: &[u8]) -> Result<(), Fault> {
         let range = Partial::unpack(partial)?;
         let base = self.graph.add(&range.totals, 0)?;
+        self.sums = match (self.sums.take(), range.figures) {
+            (Some(mut sums), Some(next)) => {
+                sums.join(next);
+                Some(sums)
+            }
+            (None, first) if base == 0 => first,
+            _ => None,
+        };
         self.triangles += range.totals.iter().map(|t| t.triangles).sum::<u64>();
         let ComponentGraph { totals, surface, solid } = &mut self.graph;
         for (a, b) in range.surface {
@@ -103,5 +115,16 @@ impl JoinedRanges {
         let triangles = self.triangles;
         let found = self.graph.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         Ok(WholeSurface { kept: found.kept(), summary: found.summary(), triangles })
+    }
+
+    /// The figures of the whole surface, once all ranges are added.
+    ///
+    /// # Errors
+    /// As `finish`; ranges whose figures were not taken.
+    pub fn measured(self, options: &Options) -> Result<Measured, Stopped> {
+        not_empty(self.triangles, options.resolution)?;
+        let found = self.graph.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
+        let sums = self.sums.ok_or_else(|| Stopped::Refused(damaged()))?;
+        Ok(sums.finish(found))
     }
 }

@@ -12,6 +12,7 @@ use std::ops::Range;
 use super::packed::{Packer, Unpacker, damaged};
 use super::sampling_grid::{Grid, TILE};
 use super::tile_components::{LINES, TileComponents};
+use super::tile_figures::FigureSums;
 use crate::surface_maker::{ComponentGraph, NONE, Totals};
 
 /// The first bytes; the last one is the number of the layout.
@@ -26,7 +27,7 @@ pub(super) struct RowLines {
 }
 
 /// The components of the tiles in a range.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Partial {
     /// For each component of each tile, in order.
     pub totals: Vec<Totals>,
@@ -40,6 +41,8 @@ pub(super) struct Partial {
     pub enters: Option<RowLines>,
     /// The last row, if it has surface: lines that were met, and the component at which they entered the solid, if they are inside.
     pub leaves: Option<RowLines>,
+    /// What is measured besides, if it is.
+    pub figures: Option<FigureSums>,
 }
 
 /// Joins the components of a range of tiles as they come, in order. See `TileSweep`, which knows all tiles before.
@@ -140,7 +143,7 @@ impl RangeSweep {
     }
 
     /// What is known of the range.
-    pub fn finish(mut self, grid: &Grid) -> Partial {
+    pub fn finish(mut self, grid: &Grid, figures: Option<FigureSums>) -> Partial {
         self.put_below(grid);
         (self.below, self.at[1]) = (std::mem::take(&mut self.here), self.at[0]);
         self.put_below(grid);
@@ -155,6 +158,7 @@ impl RangeSweep {
             layers: self.layers,
             enters: self.enters,
             leaves,
+            figures,
         }
     }
 }
@@ -220,6 +224,10 @@ impl Partial {
                 out.whole(if *component == NONE { 0 } else { u128::from(*component) + 1 });
             }
         }
+        out.count(usize::from(self.figures.is_some()));
+        if let Some(figures) = &self.figures {
+            figures.pack(&mut out);
+        }
         out.0
     }
 
@@ -268,9 +276,13 @@ impl Partial {
             Ok(Some(RowLines { row, lines }))
         };
         let (enters, leaves) = (row()?, row()?);
+        let figures = match from.whole()? {
+            0 => None,
+            _ => Some(FigureSums::unpack(&mut from, count)?),
+        };
         if !from.0.is_empty() {
             return Err(damaged());
         }
-        Ok(Partial { totals, surface, solid, layers, enters, leaves })
+        Ok(Partial { totals, surface, solid, layers, enters, leaves, figures })
     }
 }

@@ -13,6 +13,7 @@ use super::range_partial::RangeSweep;
 use super::sampling_grid::Grid;
 use super::tile::View;
 use super::tile_components::TileComponents;
+use super::tile_figures::{FigureSums, TileFigures};
 use super::tile_queue::{borrow, each_tile, give_back};
 use crate::solid::Solid;
 
@@ -52,14 +53,13 @@ impl TileRanges {
     ///
     /// # Errors
     /// An interruption; more components than can be numbered; what `take` says.
-    pub fn each(
+    pub fn surface(
         &self,
         tiles: Range<usize>,
         size: usize,
         progress: &dyn Progress,
-        mut take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
+        take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        let tiles = tiles.start.min(self.tiles())..tiles.end.min(self.tiles());
         let spare = Mutex::new(Vec::<Vec<u8>>::new());
         let map = |view: View| {
             let mut records = borrow(&spare);
@@ -69,20 +69,67 @@ impl TileRanges {
             });
             (components, records)
         };
-        let mut open = Open::at(tiles.start, tiles.end, size.max(1));
-        each_tile(&self.grid, tiles.clone(), progress, map, |(components, mut records)| {
-            let tile = self.grid.number(components.tile);
-            while tile >= open.tiles.end {
-                let next = Open::at(open.tiles.end, tiles.end, size.max(1));
-                take(std::mem::replace(&mut open, next).close(&self.grid))?;
-            }
+        let add = |open: &mut Open, (components, mut records): (TileComponents, Vec<u8>)| {
             open.records.extend_from_slice(&records);
             records.clear();
             give_back(&spare, records);
+            components
+        };
+        self.each([tiles.start, tiles.end, size], None, progress, (map, |c| c.0.tile, add), take)
+    }
+
+    /// What is measured of the surface in some tiles, as `surface` takes them; there are no triangles.
+    ///
+    /// # Errors
+    /// As `surface`.
+    pub fn figures(
+        &self,
+        tiles: Range<usize>,
+        size: usize,
+        progress: &dyn Progress,
+        take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
+    ) -> Result<(), Stopped> {
+        let map = |view: View| TileFigures::of(&view, self.middle);
+        let add = |open: &mut Open, tile: TileFigures| match &mut open.figures {
+            Some(sums) => sums.add(tile),
+            None => tile.components,
+        };
+        let none = Some(FigureSums::default());
+        self.each([tiles.start, tiles.end, size], none, progress, (map, |t| t.components.tile, add), take)
+    }
+
+    /// Takes tiles from a first to before a last one in ranges of a size, of which nothing is measured or `none` yet: by a function of a tile, which tile a result is of, and how it
+    /// is added to the range that is open.
+    fn each<T: Send>(
+        &self,
+        [start, end, size]: [usize; 3],
+        none: Option<FigureSums>,
+        progress: &dyn Progress,
+        (map, tile_of, add): (
+            impl Fn(View) -> T + Sync,
+            impl Fn(&T) -> [usize; 3] + Send,
+            impl Fn(&mut Open, T) -> TileComponents + Send,
+        ),
+        mut take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
+    ) -> Result<(), Stopped> {
+        let (end, size) = (end.min(self.tiles()), size.max(1));
+        let start = start.min(end);
+        let begin = |start| {
+            let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
+            Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), figures: none.clone(), tiles }
+        };
+        let mut open = begin(start);
+        each_tile(&self.grid, start..end, progress, map, |made| {
+            let tile = self.grid.number(tile_of(&made));
+            while tile >= open.tiles.end {
+                let next = begin(open.tiles.end);
+                take(std::mem::replace(&mut open, next).close(&self.grid))?;
+            }
+            let components = add(&mut open, made);
             open.sweep.add(&self.grid, components).map_err(Stopped::Refused)
         })?;
         while !open.tiles.is_empty() {
-            let next = Open::at(open.tiles.end, tiles.end, size.max(1));
+            let next = begin(open.tiles.end);
             take(std::mem::replace(&mut open, next).close(&self.grid))?;
         }
         Ok(())
@@ -94,16 +141,11 @@ struct Open {
     tiles: Range<usize>,
     records: Vec<u8>,
     sweep: RangeSweep,
+    figures: Option<FigureSums>,
 }
 
 impl Open {
-    /// The range that begins at a tile.
-    fn at(start: usize, end: usize, size: usize) -> Open {
-        let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
-        Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), tiles }
-    }
-
     fn close(self, grid: &Grid) -> RangeMade {
-        RangeMade { tiles: self.tiles, records: self.records, partial: self.sweep.finish(grid).pack() }
+        RangeMade { tiles: self.tiles, records: self.records, partial: self.sweep.finish(grid, self.figures).pack() }
     }
 }
