@@ -1,9 +1,10 @@
-"""A large part by threads, by workers and in a run that can be taken up again: seconds, peak memory of each process, equal bytes.
+"""A large part by threads, by workers and in a run that can be taken up again: seconds, peak memory of processes, equal bytes.
 
-  python bench/large.py --trabecula .venv/bin/trabecula --voxels 1e9 [--of mesh measure voxels] [--workers 2] [--folder /big/disk] [--rounds 1]
+  python bench/large.py --trabecula .venv/bin/trabecula --voxels 1e9 [--of mesh measure voxels] [--workers 2]
+    [--folder /big/disk] [--rounds 1]
 
-A gyroid network in a box of 40 mm on a grid of about so many cells. A file is written, hashed and removed before the next one. Two
-threads come before and after each other way, so that what else the machine does shows. What 1e11 voxels take is told from the rates.
+A gyroid network in a box of 40 mm on a grid of about so many cells. A file is written, hashed and removed before the next one.
+Threads come first and last, so that what else the machine does shows. What 1e11 voxels take is told from the last rate.
 """
 
 import argparse

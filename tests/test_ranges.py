@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import hashlib
 import io
 import json
 import os
@@ -128,6 +129,55 @@ def test_the_command_says_the_same(tmp_path: Path, whole):
     assert not (tmp_path / "b.stl.parts").exists()
 
 
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("name", ["gyroid_sheet_30", "primitive_cavities", "mesh_bracket"])
+def test_figures_in_ranges_are_those_of_one_run(name: str, size: int):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solid = lt.load(CORPUS / f"{name}.toml").build()
+    low, high = solid.bounds
+    edge = max(b - a for a, b in zip(low, high, strict=True)) / 130
+    made, quality, islands = ranges.measure(solid, edge, 100.0, size=size)
+    whole = solid._core.measure(edge, 100.0)
+    assert (made.to_dict(), quality.to_dict(), islands.to_dict()) == tuple(part.to_dict() for part in whole)
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("kind", ["npy", "vti"])
+def test_voxels_in_ranges_are_those_of_one_run(tmp_path: Path, kind: str, size: int):
+    solid, a, b = built(), tmp_path / f"a.{kind}", tmp_path / f"b.{kind}"
+    whole = solid.voxels(step=0.11)
+    whole.write(a)
+    made = ranges.save_voxels(solid, str(b), kind, 0.11, size=size)
+    assert made == {"shape": list(whole.shape), "step": 0.11, "origin": whole.origin, "volume": whole.volume}
+    assert a.read_bytes() == b.read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == [a.name, b.name]
+
+
+def test_figures_and_voxels_go_on_where_they_were(tmp_path: Path):
+    design, out = tmp_path / "network.toml", tmp_path / "part.npy"
+    design.write_text(NETWORK)
+    solid = lt.load(design).build()
+    figures = {"beside": str(design), "size": 1}
+    voxels = {"size": 3}
+    for work, more in ((ranges.measure, (solid, 0.1, 100.0)), (ranges.save_voxels, (solid, str(out), "npy", 0.1))):
+        settings = figures if work is ranges.measure else voxels
+        whole = work(*more, **settings)
+        content = out.read_bytes() if out.exists() else b""
+
+        def stop(done: int, total: int) -> None:
+            if done == 4:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            work(*more, **settings, progress=stop)
+        begun = []
+        again = work(*more, **settings, progress=lambda n, total, begun=begun: begun.append(n))
+        assert begun[0] == 5 and repr(again) == repr(whole)
+        assert (out.read_bytes() if out.exists() else b"") == content
+    assert sorted(p.name for p in tmp_path.iterdir()) == [design.name, out.name]
+
+
 # --- stopped, killed, damaged ----------------------------------------------------------------------------------------
 
 KILLED = """
@@ -212,7 +262,7 @@ def test_what_is_damaged_is_made_again(tmp_path: Path, whole, of: str, where: fl
     content[at] ^= 0x10
     (folder / of).write_bytes(content)
     if of == "lines" and where < 0.1:  # what the run is of
-        with pytest.raises(Refused, match="part.stl.parts .*begin anew with --new"):
+        with pytest.raises(Refused, match=r"part\.stl\.parts .*begin anew with --new"):
             again(path)
         assert again(path, new=True) == whole[1]
         return
@@ -294,6 +344,46 @@ def test_a_full_disk_keeps_what_is_done(tmp_path: Path, whole, monkeypatch):
     assert begun[0] == 5 and path.read_bytes() == whole[0]
 
 
+# --- shards ----------------------------------------------------------------------------------------------------------
+
+
+def joined(folder: Path) -> bytes:
+    """The records of all shards, in order, held against the manifest."""
+    made = json.loads((folder / "manifest.json").read_text())
+    files = [folder / shard["file"] for shard in made["shards"]]
+    assert sorted(p.name for p in folder.iterdir()) == sorted([p.name for p in files] + ["manifest.json"]) and len(files) > 4
+    for path, shard in zip(files, made["shards"], strict=True):
+        content = path.read_bytes()
+        assert (hashlib.sha256(content).hexdigest(), len(content)) == (shard["sha256"], shard["bytes"])
+        assert int.from_bytes(content[80:84], "little") == shard["triangles"] == (len(content) - 84) // 50
+    return b"".join(path.read_bytes()[84:] for path in files)
+
+
+def test_shards_are_the_file_in_pieces(tmp_path: Path, whole):
+    assert again(tmp_path / "part", shards=4_000_000) == whole[1]
+    assert joined(tmp_path / "part") == whole[0][84:]
+    left_alone(tmp_path / "part")
+
+
+@pytest.mark.parametrize("at", [0, 3])
+def test_killed_while_shards_are_written_it_goes_on(tmp_path: Path, whole, monkeypatch, at: int):
+    staged, written = Unfinished._staged, 0
+
+    def torn(self, line):
+        nonlocal written
+        written += 1
+        if written > at:
+            raise KeyboardInterrupt
+        staged(self, line)
+
+    monkeypatch.setattr(Unfinished, "_staged", torn)
+    with pytest.raises(KeyboardInterrupt):
+        again(tmp_path / "part", shards=4_000_000)
+    monkeypatch.setattr(Unfinished, "_staged", staged)
+    assert again(tmp_path / "part", shards=4_000_000) == whole[1]
+    assert joined(tmp_path / "part") == whole[0][84:]
+
+
 # --- clusters --------------------------------------------------------------------------------------------------------
 
 
@@ -316,6 +406,14 @@ def test_a_cluster_gives_the_same_file(tmp_path: Path, whole, cluster, size: int
     assert again(path, size, cluster=cluster.scheduler_address) == whole[1]
     assert path.read_bytes() == whole[0]
     left_alone(path)
+
+
+def test_a_cluster_measures_and_samples_the_same(tmp_path: Path, cluster):
+    solid, a, b = built(), tmp_path / "a.vti", tmp_path / "b.vti"
+    assert solid.measure(edge=0.1, cluster=cluster.scheduler_address).to_dict() == solid.measure(edge=0.1).to_dict()
+    solid.voxels(step=0.1).write(a)
+    solid.save_voxels(b, step=0.1, cluster=cluster.scheduler_address)
+    assert a.read_bytes() == b.read_bytes()
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -404,9 +502,9 @@ def test_a_cluster_that_loses_all_workers_is_told_of(tmp_path: Path, monkeypatch
     [
         ("tet_ball", "part.stl", ("--edge", "1"), "a lattice over tetrahedra is meshed tetrahedron by tetrahedron"),
         ("ell_auto", "part.stl", (), "beams alone are meshed by their own patches"),
-        ("gyroid_half", "part.3mf", (), "--resume and --cluster write .stl only"),
+        ("gyroid_half", "part.3mf", (), "--resume, --cluster and --shards write .stl only"),
         ("gyroid_half", "part.stl", ("--smooth",), "as it is: leave out --smooth"),
-        ("gyroid_half", "part.stl", ("--parts", "wall,lower"), "--resume does not go with --parts"),
+        ("gyroid_half", "part.stl", ("--parts", "wall,lower"), "--resume, --cluster and --shards do not go with --parts"),
     ],
 )
 def test_what_is_not_made_in_ranges_is_refused_by_name(tmp_path: Path, name: str, output: str, more: tuple, message: str):

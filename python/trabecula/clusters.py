@@ -1,6 +1,6 @@
 """Work by a Dask cluster: one machine, many, or those of a queue. In the extra "scale".
 
-Workers run functions of this package, which they have installed in the same version, on plain data: nothing of a design is code.
+Workers run functions of this package, which they have installed in the same version, on plain data: no design is code.
 """
 
 from __future__ import annotations
@@ -100,11 +100,11 @@ def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, 
 
 
 def in_order(client: Any, work: Callable, inputs: dict[str, Any], tasks: Iterable[tuple]) -> Iterator[Any]:
-    """``work(inputs, *task)`` of each task, in the order of the tasks, which are begun ``WAITING`` a thread ahead: results wait at
-    the workers that made them, and come here one at a time. A task whose worker dies is given to another.
+    """``work(inputs, *task)`` of each task, in the order of the tasks, which are begun ``WAITING`` a thread ahead: results wait
+    at the workers that made them, and come here one at a time. A task whose worker dies is given to another.
 
-    ``inputs``, plain data, goes once to each worker. Raises what ``work`` raises, and ValueError for a cluster that has lost its
-    workers for longer than ``PATIENCE``.
+    ``inputs``, plain data, goes once to each worker. Raises what ``work`` raises, and ValueError for a cluster that has lost
+    its workers for longer than ``PATIENCE``.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of large inputs: they are sent once

@@ -1,4 +1,4 @@
-"""Work of many hours in a folder beside its output: what is done stands there with checksums, and the same command goes on from it."""
+"""Work of many hours in a folder beside its output: what is done stands there with checksums, and the same command goes on."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Range:
 
 
 class Unfinished:
-    """The folder of an output: its bytes so far (``data``, after ``first`` bytes of a header), the partial results (``partials``), and
-    a line of JSON for each range, after one that says what it is of (``lines``), each after its CRC-32.
+    """The folder of an output: its bytes so far (``data``, after ``first`` bytes of a header), partial results (``partials``),
+    and a line of JSON for each range, after one that says what it is of (``lines``), each after its CRC-32.
 
     Ranges are added in order. A line is written after its bytes; what has no line is not there, and what does not have the
     checksum of its line is made again.
@@ -98,8 +98,8 @@ class Unfinished:
         changed = differences(old, self.head)
         if changed:
             raise Refused(
-                f"{self.folder} holds a part of another run: changed since are {', '.join(changed[:6])}; take that back, or begin "
-                "anew with --new"
+                f"{self.folder} holds a part of another run: changed since are {', '.join(changed[:6])}; take that back, or "
+                "begin anew with --new"
             )
 
     def place(self, number: int) -> int:
@@ -166,8 +166,9 @@ class Unfinished:
         self._note(line)
         self.stage.append(line)
 
-    def keep(self, kept: list[tuple[int, int]], size: int, header: bytes) -> None:
-        """Takes all records of ``size`` bytes but the ``kept`` ranges of their numbers out of ``data``, in place, and writes its header.
+    def keep(self, kept: list[tuple[int, int]], size: int, header: bytes, tail: bytes = b"") -> None:
+        """Takes all records of ``size`` bytes but the ``kept`` ranges of their numbers out of ``data``, in place, and writes
+        what comes before and after them.
 
         Killed at any point, it goes on from there: what is moved stands in a file of its own while it is.
         """
@@ -200,9 +201,51 @@ class Unfinished:
             self._staged({"move": n, "sha256": _sha256(chunk)})
             self._put(place, chunk)
         self._data.truncate(to)
-        self._data.seek(0)
-        self._data.write(header)
+        for at, content in ((0, header), (to, tail)):
+            self._data.seek(at)
+            self._data.write(content)
         self._data.flush()
+        self._staged({"done": True})
+
+    def split(
+        self, kept: list[tuple[int, int]], size: int, header: Callable[[int], bytes], most: int, told: dict[str, Any]
+    ) -> None:
+        """Writes the ``kept`` ranges of records of ``size`` bytes to files of about ``most`` bytes, each of whole ranges and
+        with the ``header`` of its number of records, and ``manifest.json`` with what is ``told`` and the name, records, bytes and
+        SHA-256 of each, all in the folder ``shards``.
+
+        From the last one to the first: what is written is cut off ``data``, so that the disk holds it once. Killed at any
+        point, it goes on from there.
+        """
+        if self.stage and "done" in self.stage[-1]:
+            return
+        os.makedirs(self.name("shards"), exist_ok=True)
+        bounds, at = [0], 0
+        for r in self.ranges:
+            at += r.bytes
+            if at - bounds[-1] >= most:
+                bounds.append(at)
+        bounds += [at] if at > bounds[-1] else []
+        for n in range(len(bounds) - 2 - len(self.stage), -1, -1):
+            first, last = bounds[n] // size, bounds[n + 1] // size
+            own = [(max(a, first), min(b, last)) for a, b in kept if a < last and b > first]
+            count = sum(b - a for a, b in own)
+            name = f"{n:05d}.stl"
+            digest = hashlib.sha256(header(count))
+            with open(os.path.join(self.name("shards"), name), "wb") as file:
+                file.write(header(count))
+                for a, b in own:
+                    for chunk in _chunks(self._data, self.first + a * size, (b - a) * size):
+                        digest.update(chunk)
+                        file.write(chunk)
+                file.flush()
+                os.fsync(file.fileno())
+            length = len(header(count)) + count * size
+            self._staged({"file": name, "triangles": count, "bytes": length, "sha256": digest.hexdigest()})
+            self._data.truncate(self.first + bounds[n])
+        manifest = told | {"shards": self.stage[::-1]}
+        with open(os.path.join(self.name("shards"), "manifest.json"), "w", encoding="utf-8", newline="\n") as file:
+            file.write(json.dumps(manifest, indent=2) + "\n")
         self._staged({"done": True})
 
     def _put(self, place: int, chunk: bytes) -> None:
@@ -212,8 +255,10 @@ class Unfinished:
         os.fsync(self._data.fileno())
 
     def finish(self) -> None:
-        """Gives ``data`` the name of the output, and takes the folder away."""
-        if os.path.getsize(self.name("data")):  # else it has its name already
+        """Gives ``data``, or the folder of its shards, the name of the output, and takes the folder away."""
+        if os.path.isdir(self.name("shards")):
+            os.replace(self.name("shards"), self.output)
+        elif os.path.getsize(self.name("data")) and not os.path.isdir(self.output):  # else it has its name already
             replace_file(self.name("data"), os.path.realpath(self.output))
         os.remove(self.name("lines"))  # without it there is nothing to go on from
         shutil.rmtree(self.folder)
@@ -236,15 +281,21 @@ def _sha256(data: bytes) -> str:
 
 def _digest(file: Any, place: int, length: int) -> str:
     """The SHA-256 of a part of a file; of less if it ends before."""
-    file.seek(place)
     digest = hashlib.sha256()
+    for chunk in _chunks(file, place, length):
+        digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _chunks(file: Any, place: int, length: int) -> Iterator[bytes]:
+    """A part of a file, piece by piece; less if it ends before."""
+    file.seek(place)
     while length > 0:
         chunk = file.read(min(length, CHUNK))
         if not chunk:
-            break
-        digest.update(chunk)
+            return
+        yield chunk
         length -= len(chunk)
-    return digest.hexdigest()
 
 
 def _alone(file: Any, folder: str) -> None:

@@ -65,7 +65,7 @@ mod _core {
     #[pymodule_export]
     use crate::quadors::{Quadors, Slice};
     #[pymodule_export]
-    use crate::ranges::{Joined, TileRanges};
+    use crate::ranges::{Joined, TileRanges, VoxelRanges};
     #[pymodule_export]
     use crate::region::Region;
     #[pymodule_export]

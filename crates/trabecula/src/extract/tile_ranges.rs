@@ -107,14 +107,14 @@ impl TileRanges {
         progress: &dyn Progress,
         (map, tile_of, add): (
             impl Fn(View) -> T + Sync,
-            impl Fn(&T) -> [usize; 3] + Send,
-            impl Fn(&mut Open, T) -> TileComponents + Send,
+            impl Fn(&T) -> [usize; 3] + Sync,
+            impl Fn(&mut Open, T) -> TileComponents + Sync,
         ),
         mut take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
         let (end, size) = (end.min(self.tiles()), size.max(1));
         let start = start.min(end);
-        let begin = |start| {
+        let begin = |start: usize| {
             let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
             Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), figures: none.clone(), tiles }
         };

@@ -81,6 +81,22 @@ proptest! {
     }
 }
 
+/// What is measured range by range is what one run measures: the percentile of angles and the points in voids too.
+#[test]
+fn figures_of_ranges_join_to_those_of_one_run() {
+    let shells = lattice("primitive", Part::Upper, 0.4, [1.0, 1.1, 0.9], [5.0, 15.0, 25.0]);
+    let solid = solid(ball([0.0; 3], 1.7), Some(shells));
+    let options = Options::new(0.02);
+    let one = GridSurface(&solid).measure(&options, &Silent).expect("figures");
+    let tiles = TileRanges::new(&solid, 0.02).expect("a grid");
+    for size in [1, 4, 9, 1000] {
+        let mut join = JoinedRanges::default();
+        let take = |range: RangeMade| join.add(&range.partial).map_err(Stopped::Refused);
+        tiles.figures(0..usize::MAX, size, &Silent, take).expect("ranges");
+        assert_eq!(join.measured(&options).expect("joined"), one);
+    }
+}
+
 /// Loose blobs all over four by four by four tiles, of which some reach through several: dropped, kept, and in ranges that end
 /// within rows, rows that end within layers, and one range.
 #[test]
