@@ -38,12 +38,15 @@ def connected(cluster: str) -> Iterator[Any]:
         dask = package("distributed")
     except ImportError:
         raise ValueError("--cluster needs the extra scale: pip install 'trabecula[scale]'") from None
-    with _client(dask, cluster) as client:
-        versions = set(client.run(version).values())
-        if versions - {_core.__version__}:
-            other = ", ".join(sorted(versions - {_core.__version__}))
-            raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
-        yield client
+    with warnings.catch_warnings():
+        # Of Dask, on ports, slow disks and large inputs: none is about the part.
+        warnings.filterwarnings("ignore", category=UserWarning, module="distributed|dask")
+        with _client(dask, cluster) as client:
+            versions = set(client.run(version).values())
+            if versions - {_core.__version__}:
+                other = ", ".join(sorted(versions - {_core.__version__}))
+                raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+            yield client
 
 
 def _client(dask: Any, cluster: str) -> Any:
@@ -53,7 +56,9 @@ def _client(dask: Any, cluster: str) -> Any:
             raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
         # A worker that is killed is started again: its task is not to blame.
         with _settings({"distributed.scheduler.allowed-failures": 1000}):
-            return dask.Client(n_workers=int(count), threads_per_worker=1, dashboard_address=None, silence_logs=50)
+            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+            # Results do not go by way of the scheduler, which is in this process.
+            return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
     try:
         client = dask.Client(cluster, timeout=PATIENCE)
         client.wait_for_workers(1, timeout=PATIENCE)
@@ -106,9 +111,7 @@ def in_order(client: Any, work: Callable, inputs: dict[str, Any], tasks: Iterabl
     ``inputs``, plain data, goes once to each worker. Raises what ``work`` raises, and ValueError for a cluster that has lost
     its workers for longer than ``PATIENCE``.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of large inputs: they are sent once
-        given = client.submit(_same, inputs, pure=False)
+    given = client.submit(_same, inputs, pure=False)
     waiting, begun = iter(tasks), deque()
 
     def begin() -> None:

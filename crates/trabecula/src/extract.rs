@@ -82,7 +82,13 @@ impl SurfaceMaker for GridSurface<'_> {
         let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
         let mut out = Stitched::new(out);
-        each_tile(&grid, grid.all(), progress, |view: View| view.patch(0, middle), |patch| out.add(patch))?;
+        each_tile(
+            (&grid, &Mutex::default()),
+            grid.all(),
+            progress,
+            |view: View| view.patch(0, middle),
+            |patch| out.add(patch),
+        )?;
         out.finish(options)
     }
 
@@ -103,7 +109,7 @@ impl SurfaceMaker for GridSurface<'_> {
             (components, records)
         };
         let scaled = stream.progress();
-        each_tile(&grid, grid.all(), &scaled, map, |(components, mut records)| {
+        each_tile((&grid, &Mutex::default()), grid.all(), &scaled, map, |(components, mut records)| {
             triangles += (records.len() / stl::RECORD) as u64;
             surface_maker::check_count(triangles)?;
             sweep.add(components).map_err(Stopped::Refused)?;
@@ -123,7 +129,7 @@ impl SurfaceMaker for GridSurface<'_> {
         let middle = self.0.region.bounds().center();
         let (mut sweep, mut sums, mut triangles) = (TileSweep::default(), FigureSums::default(), 0);
         each_tile(
-            &grid,
+            (&grid, &Mutex::default()),
             grid.all(),
             progress,
             |view: View| TileFigures::of(&view, middle),

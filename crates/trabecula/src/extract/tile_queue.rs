@@ -41,10 +41,12 @@ struct Queue<T> {
 
 /// Extracts tiles, maps each by `map` on its thread and passes the results to `take` in order; those without surface are left out.
 ///
+/// Buffers of threads are taken from `spare`, and left there for the next call.
+///
 /// Every thread extracts the next tile, then consumes what is ready unless another thread does. A thread that is too far
 /// ahead ends and is started again when a tile has been consumed: none ever blocks, so there is no deadlock.
 pub(super) fn each_tile<T: Send>(
-    grid: &Grid,
+    (grid, spare): (&Grid, &Mutex<Vec<Scratch>>),
     tiles: Range<usize>,
     progress: &dyn Progress,
     map: impl Fn(View) -> T + Sync,
@@ -57,7 +59,7 @@ pub(super) fn each_tile<T: Send>(
         progress,
         tiles,
         ahead: AHEAD * threads,
-        scratch: Mutex::default(),
+        spare,
         map,
         take: Mutex::new(take),
         queue: Mutex::new(Queue {
@@ -80,7 +82,7 @@ struct Work<'a, T, C, K> {
     progress: &'a dyn Progress,
     tiles: Range<usize>,
     ahead: usize,
-    scratch: Mutex<Vec<Scratch>>,
+    spare: &'a Mutex<Vec<Scratch>>,
     map: C,
     take: Mutex<K>,
     queue: Mutex<Queue<T>>,
@@ -98,13 +100,13 @@ where
     }
 
     fn run<'s>(&'s self, scope: &Scope<'s>) {
-        let mut scratch = borrow(&self.scratch);
+        let mut scratch = borrow(self.spare);
         while let Some(i) = self.claim() {
             let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(&self.map);
             self.queue().ready.insert(i, found);
             self.take_ready(scope);
         }
-        give_back(&self.scratch, scratch);
+        give_back(self.spare, scratch);
     }
 
     /// The next tile to extract, unless there is none or too many wait.

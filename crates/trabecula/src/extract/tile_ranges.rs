@@ -11,7 +11,7 @@ use geometry::progress::{Progress, Stopped};
 
 use super::range_partial::RangeSweep;
 use super::sampling_grid::Grid;
-use super::tile::View;
+use super::tile::{Scratch, View};
 use super::tile_components::TileComponents;
 use super::tile_figures::{FigureSums, TileFigures};
 use super::tile_queue::{borrow, each_tile, give_back};
@@ -22,6 +22,9 @@ pub struct TileRanges {
     grid: Grid,
     /// The apex of the cones by which volumes are summed.
     middle: Vec3,
+    /// Buffers of threads, and of tiles' triangles: a range of few tiles is made in the memory of the one before.
+    scratch: Mutex<Vec<Scratch>>,
+    spare: Mutex<Vec<Vec<u8>>>,
 }
 
 /// What is made of a range of tiles.
@@ -40,7 +43,8 @@ impl TileRanges {
     /// # Errors
     /// A spacing at which there is no grid.
     pub fn new(solid: &Solid, edge: f64) -> Result<TileRanges, Fault> {
-        Ok(TileRanges { grid: Grid::new(solid, edge)?, middle: solid.region.bounds().center() })
+        let (scratch, spare) = Default::default();
+        Ok(TileRanges { grid: Grid::new(solid, edge)?, middle: solid.region.bounds().center(), scratch, spare })
     }
 
     /// Number of tiles.
@@ -60,9 +64,8 @@ impl TileRanges {
         progress: &dyn Progress,
         take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        let spare = Mutex::new(Vec::<Vec<u8>>::new());
         let map = |view: View| {
-            let mut records = borrow(&spare);
+            let mut records = borrow(&self.spare);
             let positions = view.positions();
             let components = TileComponents::each_triangle(&view, 0, self.middle, |t, _| {
                 stl::push_record(&mut records, t.map(|v| positions[v as usize].map(|x| x as f32)));
@@ -72,7 +75,7 @@ impl TileRanges {
         let add = |open: &mut Open, (components, mut records): (TileComponents, Vec<u8>)| {
             open.records.extend_from_slice(&records);
             records.clear();
-            give_back(&spare, records);
+            give_back(&self.spare, records);
             components
         };
         self.each([tiles.start, tiles.end, size], None, progress, (map, |c| c.0.tile, add), take)
@@ -119,7 +122,7 @@ impl TileRanges {
             Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), figures: none.clone(), tiles }
         };
         let mut open = begin(start);
-        each_tile(&self.grid, start..end, progress, map, |made| {
+        each_tile((&self.grid, &self.scratch), start..end, progress, map, |made| {
             let tile = self.grid.number(tile_of(&made));
             while tile >= open.tiles.end {
                 let next = begin(open.tiles.end);
