@@ -153,7 +153,7 @@ campaign: $(VENV)/.test-tools
 	TRABECULA_CASES=$$(($(CASES) / 10)) cargo test --profile checked --locked -p trabecula --test laws -- skin:: islands::
 	TRABECULA_CASES=$$(($(CASES) / 50)) cargo test --profile checked --locked -p trabecula --test laws -- \
 	  crease:: simplify:: tets:: thickness:: tiling::
-	TRABECULA_CAMPAIGN=1 $(PYTEST) tests/test_parts.py tests/test_laws.py tests/test_corpus.py
+	TRABECULA_CAMPAIGN=1 $(PYTEST) tests/test_parts.py tests/test_laws.py tests/test_corpus.py tests/test_ranges.py
 
 python-test: $(VENV)/.test-tools
 	$(PYTEST) tests --ignore tests/test_docs.py

@@ -94,6 +94,7 @@ DPI = number("pixels an inch", lambda v: 1 <= v <= 10000, " from 1 to 10000")
 FRAMES = number("a whole number", lambda v: 2 <= v <= 720, " from 2 to 720", int)
 PORT = number("a port", lambda v: 0 <= v <= 65535, " from 0 to 65535", int)
 SECONDS = number("a time in s", lambda v: v > 0, " greater than 0")
+GIGABYTES = number("a size in GB", lambda v: 0.001 <= v <= 1e6, " from 0.001 to 1000000")
 #: A closed mesh has at least 4 triangles.
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
@@ -241,6 +242,16 @@ LIGHTER = (
     option("--tolerance", type=LENGTH, metavar="MM", help="fewer triangles, the surface moved by at most this, mm"),
     option("--triangles", type=TRIANGLES, metavar="N", help="fewer triangles, down to this number"),
 )
+#: Surfaces that outgrow one process or one run.
+APART = (
+    option(
+        "--resume",
+        action="store_true",
+        help="keep what is done in a folder beside the output, with checksums; after any end the same command goes on",
+    ),
+    option("--cluster", metavar="ADDRESS", help="by a Dask cluster at this address, or local:N; needs the extra scale"),
+    option("--new", action="store_true", help="begin anew: the folder of an earlier run is not taken up"),
+)
 TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the transitions of a blend to OUT.svg", "OUT.svg")
 
 #: For each command: one line, examples and more, options; of a list of options one at most may be given.
@@ -296,6 +307,14 @@ COMMANDS = {
             ),
         ),
         *(THREADS, PROGRESS),
+        *APART,
+        option(
+            "--shards",
+            type=GIGABYTES,
+            metavar="GB",
+            help="a folder with the name of OUT without .stl, of files of about this size and a manifest: as --resume, and of "
+            "any number of triangles",
+        ),
         option(
             "--islands",
             choices=ISLANDS,
@@ -399,7 +418,7 @@ COMMANDS = {
         "Write the solid as cubic voxels.",
         "The name of OUT decides the format: .npy (indexed [x, y, z], 1 is solid) or .vti (for ParaView).\n\n"
         "example:\n  trabecula voxels part.toml -o part.vti --step 0.2",
-        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step"), *(THREADS, PROGRESS, JSON, *NOTICES)),
+        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step"), *APART, *(THREADS, PROGRESS, JSON, *NOTICES)),
     ),
     "tets": (
         "Make or check the tetrahedral mesh that carries a lattice; print its quality; write it.",
@@ -508,6 +527,7 @@ COMMANDS = {
             "R",
         ),
         *(spacing(), THREADS, PROGRESS),
+        *APART,
         option("--thickness", action="store_true", help="also distributions of wall thickness and pore size"),
         option(
             "--step",

@@ -1,25 +1,34 @@
-"""Rows of a sweep by the workers of a Dask cluster: one machine, many, or those of a queue. In the extra "scale"."""
+"""Work by a Dask cluster: one machine, many, or those of a queue. In the extra "scale".
+
+Workers run functions of this package, which they have installed in the same version, on plain data: no design is code.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
 
 from . import _core
 from .rows import Job, row_of
 
-__all__ = ["rows_by_cluster"]
+__all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
 
-#: Seconds that a cluster has to answer.
+#: Seconds that a cluster has to answer, and to have a worker again when it has lost the last one.
 PATIENCE = 30
-#: Designs that wait at each thread of a worker: enough to keep it busy, few enough for the scheduler's memory.
+#: Tasks that wait at each thread of a worker: enough to keep it busy, few enough for the scheduler's memory.
 WAITING = 2
+#: How often a task is tried that ends with its worker.
+TRIES = 20
 
 
-def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Iterator[dict[str, Any]]:
-    """The rows of numbered points as they are done, by the workers at an address such as "tcp://head:8786", or by as many
-    processes here as "local:N" says. Files that the design reads are read by workers under the same names.
+@contextmanager
+def connected(cluster: str) -> Iterator[Any]:
+    """A client of the Dask cluster at an address such as "tcp://head:8786", or of as many processes here as "local:N" says.
 
     Raises ValueError for a cluster that does not answer, and one with workers of another version.
     """
@@ -29,22 +38,15 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
         dask = package("distributed")
     except ImportError:
         raise ValueError("--cluster needs the extra scale: pip install 'trabecula[scale]'") from None
-    with _client(dask, cluster) as client:
-        versions = set(client.run(_version).values())
-        if versions - {_core.__version__}:
-            other = ", ".join(sorted(versions - {_core.__version__}))
-            raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
-        data = client.scatter(job.to_dict() | {"threads": 1}, broadcast=True)
-        waiting = iter(tasks)
-        room = WAITING * max(sum(client.nthreads().values()), 1)
-
-        def submitted(count: int) -> list:
-            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
-
-        pending = dask.as_completed(submitted(room), with_results=True)
-        for _, row in pending:
-            pending.update(submitted(1))
-            yield row
+    with warnings.catch_warnings():
+        # Of Dask, on ports, slow disks and large inputs: none is about the part.
+        warnings.filterwarnings("ignore", category=UserWarning, module="distributed|dask")
+        with _client(dask, cluster) as client:
+            versions = set(client.run(version).values())
+            if versions - {_core.__version__}:
+                other = ", ".join(sorted(versions - {_core.__version__}))
+                raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+            yield client
 
 
 def _client(dask: Any, cluster: str) -> Any:
@@ -52,7 +54,11 @@ def _client(dask: Any, cluster: str) -> Any:
         count = cluster.removeprefix("local:")
         if not count.isdigit() or not 1 <= int(count) <= 4096:
             raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
-        return dask.Client(n_workers=int(count), threads_per_worker=1, dashboard_address=None, silence_logs=50)
+        # A worker that is killed is started again: its task is not to blame.
+        with _settings({"distributed.scheduler.allowed-failures": 1000}):
+            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+            # Results do not go by way of the scheduler, which is in this process.
+            return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
     try:
         client = dask.Client(cluster, timeout=PATIENCE)
         client.wait_for_workers(1, timeout=PATIENCE)
@@ -61,9 +67,97 @@ def _client(dask: Any, cluster: str) -> Any:
         raise ValueError(f"cluster {cluster} does not answer within {PATIENCE} s: {error}") from None
 
 
-def _version() -> str:
+def _settings(values: dict[str, Any]) -> Any:
+    from .bridges import package
+
+    return package("dask").config.set(values)
+
+
+def version() -> str:
+    """The version of this package, where it is called."""
     return _core.__version__
+
+
+def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Iterator[dict[str, Any]]:
+    """The rows of numbered points of a sweep as they are done. Files that the design reads are read by workers under the same
+    names.
+
+    Raises ValueError as ``connected``.
+    """
+    with connected(cluster) as client:
+        data = client.scatter(job.to_dict() | {"threads": 1}, broadcast=True)
+        waiting = iter(tasks)
+        room = WAITING * max(sum(client.nthreads().values()), 1)
+
+        def submitted(count: int) -> list:
+            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
+
+        from distributed import as_completed
+
+        pending = as_completed(submitted(room), with_results=True)
+        for _, row in pending:
+            pending.update(submitted(1))
+            yield row
 
 
 def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
     return row_of(Job.of(job), number, values)
+
+
+def in_order(client: Any, work: Callable, inputs: dict[str, Any], tasks: Iterable[tuple]) -> Iterator[Any]:
+    """``work(inputs, *task)`` of each task, in the order of the tasks, which are begun ``WAITING`` a thread ahead: results wait
+    at the workers that made them, and come here one at a time. A task whose worker dies is given to another.
+
+    ``inputs``, plain data, goes once to each worker. Raises what ``work`` raises, and ValueError for a cluster that has lost
+    its workers for longer than ``PATIENCE``.
+    """
+    given = client.submit(_same, inputs, pure=False)
+    waiting, begun = iter(tasks), deque()
+
+    def begin() -> None:
+        room = WAITING * max(sum(client.nthreads().values()), 1)
+        for task in islice(waiting, max(room - len(begun), 0)):
+            begun.append((task, client.submit(work, given, *task, pure=False)))
+
+    begin()
+    while begun:
+        task, future = begun.popleft()
+        for attempt in range(TRIES):
+            try:
+                made = _result(client, future)
+                break
+            except _lost() as error:
+                if attempt + 1 == TRIES:
+                    raise ValueError(f"a task of the cluster ended {TRIES} workers; are they out of memory? {error}") from None
+                given = client.submit(_same, inputs, pure=False)
+                future = client.submit(work, given, *task, pure=False)
+        begin()
+        yield made
+
+
+def _lost() -> tuple[type[BaseException], ...]:
+    """What is raised for tasks that ended with their workers."""
+    from concurrent.futures import CancelledError
+
+    from distributed import scheduler
+    from distributed.client import FutureCancelledError
+
+    return scheduler.KilledWorker, CancelledError, FutureCancelledError
+
+
+def _result(client: Any, future: Any) -> Any:
+    """The result of a task, waited for as long as there are workers, or may be again soon."""
+    last = time.monotonic()
+    while True:
+        try:
+            return future.result(timeout=5)
+        except TimeoutError:
+            with suppress(OSError, TimeoutError):
+                if client.nthreads():
+                    last = time.monotonic()
+            if time.monotonic() - last > PATIENCE:
+                raise ValueError(f"the cluster has had no workers for {PATIENCE} s") from None
+
+
+def _same(inputs: dict[str, Any]) -> dict[str, Any]:
+    return inputs

@@ -108,17 +108,22 @@ def voxels(args) -> None:
     solid = build(args.design)
     options = {"step" if k == "edge" else k: v for k, v in resolution(args).items()}
     with Progress("sampling", args.progress) as progress:
-        grid = solid.voxels(threads=args.threads, progress=progress, **options)
-    settle()
-    grid.write(args.output)
-    made = {"shape": list(grid.shape), "step": grid.step, "origin": grid.origin, "volume": grid.volume}
-    made["solid_fraction"] = made["volume"] / solid.region_volume(grid.step)
+        if args.resume or args.cluster or args.new:
+            apart = {"cluster": args.cluster, "new": args.new}
+            size = options.get("step"), options.get("per_cell")
+            made = solid._save_voxels(args.output, *size, args.threads, progress, apart, settle)
+        else:
+            grid = solid.voxels(threads=args.threads, progress=progress, **options)
+            settle()
+            grid.write(args.output)
+            made = {"shape": list(grid.shape), "step": grid.step, "origin": grid.origin, "volume": grid.volume}
+    made["solid_fraction"] = made["volume"] / solid.region_volume(made["step"])
     made["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
         return put_json(made | {"warnings": warned()})
-    shape = " × ".join(map(str, grid.shape))
+    shape = " × ".join(map(str, made["shape"]))
     say(
-        f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
+        f"{args.output}: {shape} voxels of {made['step']:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
         f"{made['solid_fraction']:.4f}, {made['seconds']:.2f} s"
     )
 

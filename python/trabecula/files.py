@@ -12,7 +12,7 @@ from . import _core, terminal
 from .errors import DesignError
 from .formats import dotted, kind_of
 
-__all__ = ["check_place", "extension", "read_text", "special", "whole_file", "write_svg"]
+__all__ = ["check_place", "extension", "read_text", "replace_file", "special", "whole_file", "write_svg"]
 
 #: Names of what is open already.
 OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
@@ -102,8 +102,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     try:
         yield temporary
-        _permissions(temporary, real)
-        os.replace(temporary, real)
+        replace_file(temporary, real)
         terminal.left.append(f"{shown} is written")
     except BaseException as error:
         try:
@@ -116,6 +115,12 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
             reason = error.strerror or str(error)
             raise OSError(f"{shown} cannot be written: {reason}") from error
         raise
+
+
+def replace_file(new: str, real: str) -> None:
+    """Gives a file the name, the owner and the permissions of another, or those of any new file."""
+    _permissions(new, real)
+    os.replace(new, real)
 
 
 def write_svg(path: str | os.PathLike[str], drawing: Callable[[], str]) -> None:

@@ -27,7 +27,13 @@ def measure(args) -> None:
         raise Refused("--transitions is for designs with a blend; this is a mesh")
     found = () if solid is None else transitions(solid, args.transitions, args.file)
     held, figures = None, None
+    apart = apart_of(args)
     if solid is None or args.region or args.thickness or closely(solid, args):
+        if apart is not None:
+            raise Refused(
+                "--resume and --cluster measure the surface of a design while it is made, on a grid; leave them out, or what "
+                "it is held in memory for: a mesh file, --region, --thickness, beams alone without an edge"
+            )
         held = surface(args) if solid is None else meshed(solid, args)
         if args.region:
             held = held.within(args.region)
@@ -35,7 +41,7 @@ def measure(args) -> None:
         figures |= {"self_intersections": held.self_intersections, "quality": held.quality, "defects": held.defects}
     else:
         with Progress("measuring", args.progress) as progress:
-            made, quality = solid._measured(args.edge, args.per_cell, args.threads, progress)
+            made, quality = solid._measured(args.edge, args.per_cell, args.threads, progress, apart)
         figures = made.to_dict() | {"self_intersections": 0, "quality": quality, "defects": []}
         # What the method excludes is not looked for.
         figures["by_construction"] = ["self_intersections", "defects"]
@@ -67,6 +73,15 @@ def measure(args) -> None:
     print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
     for transition in found:
         print(transition)
+
+
+def apart_of(args) -> dict | None:
+    """How the figures are to be taken in ranges, if they are."""
+    if not (args.resume or args.cluster or args.new):
+        return None
+    if args.file == STDIN and (args.resume or args.new):
+        raise Refused("--resume keeps what is done beside the design; name a file")
+    return {"cluster": args.cluster, "new": args.new, "beside": args.file if args.resume or args.new else None}
 
 
 def measure_tets(args) -> None:

@@ -44,7 +44,8 @@ def mesh(args) -> None:
     edge = solid.spacing(args.edge, args.per_cell)
     made["solid_fraction"] = made["volume"] / solid.region_volume(edge)
     made["edge"] = None if args.chord is not None else edge
-    made["bytes"] = os.path.getsize(args.output)
+    written = os.path.splitext(args.output)[0] if args.shards else args.output
+    made["bytes"] = sum(map(os.path.getsize, files_in(written)))
     made["seconds"] = round(time.perf_counter() - start, 3)
     others = made["islands"]
     if others and others["dropped"]:
@@ -57,7 +58,7 @@ def mesh(args) -> None:
         return put_json(made | {"warnings": warned()})
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
-        f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
+        f"{written}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
         f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
         f"{made['seconds']:.2f} s"
     )
@@ -109,6 +110,7 @@ def mesh_implicit(args) -> None:
 
 def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) -> None:
     """Refuses options that do not go with a file without triangles; ``islands`` are what --islands may be."""
+    names = [*names, "resume", "cluster", "new", "shards"]
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
     given += [] if args.islands in islands else [f"--islands {args.islands}"]
     if given:
@@ -140,6 +142,8 @@ def mesh_parts(args) -> None:
     }
     if alone := [name for name, value in others.items() if value]:
         raise Refused(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
+    if apart_of(args) is not None:
+        raise Refused("--resume, --cluster and --shards do not go with --parts: these are held in memory; leave one out")
     if args.islands == "drop":
         raise Refused("--islands drop does not go with --parts: a dropped piece would leave a gap between them; leave it out")
     files = part_files(args.output, args.parts)
@@ -178,7 +182,15 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     asked = {} if args.chord is None else {"chord": args.chord}
     is_open = args.open or solid.open_ends
     whole = lighter or args.smooth or is_open
-    if not whole and (kind_of(args.output) == "stl" if asked else not closes(solid, resolution(args))):
+    apart = apart_of(args)
+    if apart is not None:
+        if whole:
+            out = given_of(args) or "them: the design's ends are open"
+            raise Refused(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
+        if kind_of(args.output) != "stl":
+            raise Refused(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
+    streams = kind_of(args.output) == "stl" if asked else apart is not None or not closes(solid, resolution(args))
+    if streams and not whole:
         given = {"edge": None, "per_cell": None, "chord": None} | options
 
         def accept(found) -> None:
@@ -189,7 +201,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
                 )
             settle()
 
-        return solid._save(args.output, **given, accept=accept).to_dict() | asked
+        return solid._save(args.output, **given, accept=accept, apart=apart).to_dict() | asked
     if not lighter and not asked:
         solid.check_room(args.output, **resolution(args))
     surface = solid.mesh(**options)
@@ -217,6 +229,24 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
         say("open at the region's boundary: volume and fraction are the closed part's")
     surface.write(args.output)
     return made
+
+
+def files_in(name: str) -> list[str]:
+    """The file of this name, or those of the folder."""
+    return [os.path.join(name, one) for one in os.listdir(name)] if os.path.isdir(name) else [name]
+
+
+def apart_of(args) -> dict | None:
+    """How a surface is to be made in ranges of tiles, if it is."""
+    shards = int(args.shards * 1e9) if args.shards else None
+    apart = args.resume or args.cluster or args.new or shards
+    return {"cluster": args.cluster, "new": args.new, "shards": shards} if apart else None
+
+
+def given_of(args) -> str:
+    """The options by which a surface is held in memory as a whole."""
+    names = {"--tolerance": args.tolerance, "--triangles": args.triangles, "--smooth": args.smooth, "--open": args.open}
+    return ", ".join(name for name, value in names.items() if value)
 
 
 def simplify(args) -> None:

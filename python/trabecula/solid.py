@@ -13,7 +13,7 @@ from . import _core
 from .beam_files import save_beams
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
-from .formats import MESH_WRITES, STEP_WRITES
+from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
 from .given import number, positive, thread_count
 from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
@@ -54,6 +54,11 @@ __all__ = ["Solid"]
 
 #: Most steps of a grid along an axis, and most cells, as in the core.
 MOST_STEPS, MOST_CELLS = 4e6, 2e12
+#: Why beams alone are not made in ranges.
+OF_BEAMS = (
+    "beams alone are meshed by their own patches, not on a grid whose tiles can be made apart; leave resume and cluster out, "
+    "or give an edge"
+)
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
 #: Bytes for each triangle of the temporary files of vertices and triangles.
@@ -353,13 +358,18 @@ class Solid(Seen, Simulated):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        cluster: str | None = None,
     ) -> MeshReport:
         """The figures of the surface at this spacing, as ``Mesh.measure`` gives them, taken tile by tile while it is made: in
         little more time than meshing, and without holding the mesh in memory. Of beams alone and over tetrahedra it is held.
+        ``cluster`` is as for ``save``.
         """
+        apart = {"cluster": cluster} if cluster else None
         if self._chord_of(None, edge, per_cell, "drop-small") is not None:
+            if apart:
+                raise ValueError(OF_BEAMS)
             return self.mesh(edge, per_cell, threads, progress).measure()
-        return self._measured(edge, per_cell, threads, progress)[0]
+        return self._measured(edge, per_cell, threads, progress, apart)[0]
 
     def volume_error(self, edge: float | None = None, per_cell: float | None = None) -> float | None:
         """The relative error to expect of the volume that lattices have in a mesh at this spacing, without meshing the part:
@@ -369,13 +379,24 @@ class Solid(Seen, Simulated):
         return self._core.volume_error(self.spacing(edge, per_cell))
 
     def _measured(
-        self, edge: float | None, per_cell: float | None, threads: int | None, progress: Progress | None
+        self,
+        edge: float | None,
+        per_cell: float | None,
+        threads: int | None,
+        progress: Progress | None,
+        apart: dict[str, Any] | None = None,
     ) -> tuple[MeshReport, QualityReport | None]:
-        """The figures of the surface on a grid, and the quality of its triangles."""
+        """The figures of the surface on a grid, and the quality of its triangles; ``apart`` says how it is done in ranges."""
         spacing = self.spacing(edge, per_cell)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
-        made, quality, islands = self._core.measure(spacing, self.region_volume(spacing), thread_count(threads), progress)
+        volume = self.region_volume(spacing)
+        if apart is None:
+            made, quality, islands = self._core.measure(spacing, volume, thread_count(threads), progress)
+        else:
+            from . import ranges
+
+            made, quality, islands = ranges.measure(self, spacing, volume, threads, progress, **apart)
         self._warn_coarse(made.volume + left_out(islands), spacing, pieces=islands.found + 1)
         return made, quality
 
@@ -479,6 +500,10 @@ class Solid(Seen, Simulated):
         progress: Progress | None = None,
         islands: Islands = "drop-small",
         chord: float | None = None,
+        resume: bool = False,
+        cluster: str | None = None,
+        new: bool = False,
+        shards: float | None = None,
     ) -> SurfaceReport:
         """Streams the surface to a mesh file (.stl, .3mf, .ply or .obj) without holding it in memory, and gives its figures.
 
@@ -487,8 +512,16 @@ class Solid(Seen, Simulated):
 
         An .stl is written at once; for the others vertices and triangles go to temporary files beside it, which are gone at
         the end, whatever that is.
+
+        With ``resume`` an .stl is made in ranges of tiles, which stand in the folder ``path``.parts with checksums as soon as
+        they are made. After any end the same call goes on there, unless a ``new`` run is wanted; at the end the folder is gone.
+        With ``cluster`` the ranges are made by the workers of a Dask cluster, an address or "local:N" (extra ``scale``). With
+        ``shards`` (GB) the output is a folder with the name of ``path`` without .stl: files of about this size, the triangles
+        in the same order, and ``manifest.json``, with their number, bytes and SHA-256; it may have more than 2³² triangles.
         """
-        return self._save(path, edge, per_cell, threads, progress, islands, chord)
+        size = int(1e9 * positive("shards", shards)) if shards is not None else None
+        apart = {"cluster": cluster, "new": new, "shards": size} if resume or cluster or new or size else None
+        return self._save(path, edge, per_cell, threads, progress, islands, chord, apart=apart)
 
     def save_step(self, path: str | os.PathLike[str]) -> StepReport:
         """Writes the exact surface of beams alone to a STEP file (.step or .stp; AP214, mm) for CAD systems, and gives its
@@ -544,11 +577,14 @@ class Solid(Seen, Simulated):
         islands: Islands,
         chord: float | None,
         accept: Callable[[SurfaceReport], Any] = lambda made: None,
+        apart: dict[str, Any] | None = None,
     ) -> SurfaceReport:
-        """As ``save``; what ``accept`` or a warning raises leaves no file behind."""
+        """As ``save``; what ``accept`` or a warning raises leaves no file behind. ``apart`` says how it is made in ranges."""
         check_islands(islands)
         kind = extension(path, MESH_WRITES)
         check_place(path)
+        if apart is not None:
+            return self._save_in_ranges(path, edge, per_cell, threads, progress, islands, chord, accept, apart)
         chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None and kind != "stl":
             made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
@@ -570,10 +606,46 @@ class Solid(Seen, Simulated):
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
             summary, words = self._core.stream((temporary, kind, TITLE), spacing, thread_count(threads), progress, islands)
-            self._warn_coarse(summary.volume + left_out(summary.islands), spacing, pieces=summary.islands.found + 1)
-            warn_islands(summary.islands, words)
-            accept(summary)
+            self._accept(summary, words, spacing, accept)
         return summary
+
+    def _accept(self, made: SurfaceReport, words: str, spacing: float, accept: Callable[[SurfaceReport], Any]) -> None:
+        """Warns of what may be wrong with a surface before its file gets its name."""
+        self._warn_coarse(made.volume + left_out(made.islands), spacing, pieces=made.islands.found + 1)
+        warn_islands(made.islands, words)
+        accept(made)
+
+    def _save_in_ranges(
+        self,
+        path: str | os.PathLike[str],
+        edge: float | None,
+        per_cell: float | None,
+        threads: int | None,
+        progress: Progress | None,
+        islands: Islands,
+        chord: float | None,
+        accept: Callable[[SurfaceReport], Any],
+        apart: dict[str, Any],
+    ) -> SurfaceReport:
+        from . import ranges
+
+        name = os.fsdecode(path)
+        if extension(path, MESH_WRITES) != "stl" or special(name):
+            raise ValueError(f"{name}: a surface is made in ranges as .stl only, to a file; leave resume and cluster out")
+        if self._chord_of(chord, edge, per_cell, islands) is not None:
+            raise ValueError(OF_BEAMS)
+        if apart.get("shards"):
+            name = os.path.splitext(name)[0]
+            if os.path.exists(name):
+                raise ValueError(f"{name} exists; shards go to a new folder of this name")
+        spacing = self.spacing(edge, per_cell)
+        self._warn_coarser(edge, per_cell)
+        self._warn_thin(spacing)
+
+        def told(made: SurfaceReport, words: str) -> None:
+            self._accept(made, words, spacing, accept)
+
+        return ranges.save(self, name, spacing, islands, threads, progress, accept=told, **apart)
 
     def voxels(
         self,
@@ -591,6 +663,47 @@ class Solid(Seen, Simulated):
         made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
+
+    def save_voxels(
+        self,
+        path: str | os.PathLike[str],
+        step: float | None = None,
+        per_cell: float | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        cluster: str | None = None,
+        new: bool = False,
+    ) -> dict[str, Any]:
+        """Writes the voxels that ``voxels`` gives to a file (.npy, .vti) without holding them in memory: layers stand in the
+        folder ``path``.parts as soon as they are made, and after any end the same call goes on there, as for ``save`` with
+        ``resume``. Gives ``shape``, ``step`` and ``origin`` (mm), ``volume`` (mm³).
+        """
+        return self._save_voxels(path, step, per_cell, threads, progress, {"cluster": cluster, "new": new})
+
+    def _save_voxels(
+        self,
+        path: str | os.PathLike[str],
+        step: float | None,
+        per_cell: float | None,
+        threads: int | None,
+        progress: Progress | None,
+        apart: dict[str, Any],
+        settle: Callable[[], Any] = lambda: None,
+    ) -> dict[str, Any]:
+        from . import ranges
+
+        name, kind = os.fsdecode(path), extension(path, VOXEL_WRITES)
+        check_place(path)
+        if special(name):
+            raise ValueError(f"{name} is a device or a pipe; voxels are made in ranges to a file")
+        spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
+        self._warn_thin(spacing, "step")
+
+        def accept(volume: float) -> None:
+            self._warn_coarse(volume, spacing, "step")
+            settle()
+
+        return ranges.save_voxels(self, name, kind, spacing, threads, progress, accept=accept, **apart)
 
     def layers(
         self,

@@ -35,11 +35,11 @@ pub use elements::Elements;
 pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};
 pub use indexed::{Aside, Indexed};
 pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, Stack, Target};
-pub use npy::{read_npy, write_npy};
+pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
 pub use threemf::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
-pub use vti::write_vti;
+pub use vti::{vti_frame, write_vti};
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;
 

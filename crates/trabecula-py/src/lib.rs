@@ -16,6 +16,7 @@ mod machine;
 mod mesh;
 mod node;
 mod quadors;
+mod ranges;
 mod region;
 mod report;
 mod run;
@@ -65,6 +66,8 @@ mod _core {
     #[pymodule_export]
     use crate::quadors::{Quadors, Slice};
     #[pymodule_export]
+    use crate::ranges::{Joined, TileRanges, VoxelRanges};
+    #[pymodule_export]
     use crate::region::Region;
     #[pymodule_export]
     use crate::shells::Shells;
@@ -95,6 +98,12 @@ mod _core {
     fn read_file(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Bound<'_, pyo3::types::PyBytes>> {
         let bytes = py.detach(|| crate::file::read(&path))?;
         Ok(pyo3::types::PyBytes::new(py, &bytes))
+    }
+
+    /// The first bytes of a binary STL of so many triangles.
+    #[pyfunction]
+    fn stl_header(py: Python<'_>, triangles: u32) -> Bound<'_, pyo3::types::PyBytes> {
+        pyo3::types::PyBytes::new(py, &crate::ranges::stl_header(triangles))
     }
 
     /// Bytes of memory that may yet be taken, or None where the system does not tell; `root` is that of its files.

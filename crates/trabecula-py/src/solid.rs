@@ -72,13 +72,23 @@ type NamedColumns<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
 type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
 
 /// Reports of a surface, the quality of its triangles, and its other connected components.
-type Measured<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>);
+pub type Measured<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>);
 
 /// What is to become of the connected components other than the largest.
-fn islands_word(word: &str) -> PyResult<Islands> {
+pub fn islands_word(word: &str) -> PyResult<Islands> {
     Islands::named(word).ok_or_else(|| {
         PyValueError::new_err(format!(r#"islands is "{word}"; it must be "keep", "drop-small", "drop" or "error""#))
     })
+}
+
+/// What is measured of a surface in a region of this volume (mm³), as reports.
+pub fn measured<'py>(py: Python<'py>, made: &surface_maker::Measured, region: f64) -> PyResult<Measured<'py>> {
+    let quality = made.quality.map(|q| report(py, "QualityReport", &QualityReport::from(q)));
+    Ok((
+        report(py, "MeshReport", &MeshReport::of(&made.figures, true, Some(region)))?,
+        quality.transpose()?,
+        report(py, "IslandsReport", &IslandsReport::from(&made.components))?,
+    ))
 }
 
 #[pymethods]
@@ -340,12 +350,7 @@ impl Solid {
     ) -> PyResult<Measured<'py>> {
         let made = run(py, threads, progress, |p| self.built.surface().measure(&Options::new(edge), p))?;
         let made = made.map_err(error::stopped)?;
-        let quality = made.quality.map(|q| report(py, "QualityReport", &QualityReport::from(q)));
-        Ok((
-            report(py, "MeshReport", &MeshReport::of(&made.figures, true, Some(region)))?,
-            quality.transpose()?,
-            report(py, "IslandsReport", &IslandsReport::from(&made.components))?,
-        ))
+        measured(py, &made, region)
     }
 
     /// Whether files of its mesh have no caps on the region's boundary.

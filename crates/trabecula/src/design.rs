@@ -349,6 +349,21 @@ impl Built {
         }
     }
 
+    /// Whether `surface` meshes it on a grid, so that it can be made range by range of the grid's tiles.
+    ///
+    /// # Errors
+    /// A lattice over tetrahedra that is the only one, whose tetrahedra are cut instead.
+    pub fn on_grid(&self) -> Result<(), Fault> {
+        match &self.tilings[..] {
+            [only] if only.explicit && self.blend.is_none() => Err(Fault::new(
+                "",
+                "a lattice over tetrahedra is meshed tetrahedron by tetrahedron, not on a grid whose tiles can be made apart; leave \
+                 --resume and --cluster out",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// The surface maker whose resolution is a chord error, for designs of uncut beams alone.
     ///
     /// # Errors

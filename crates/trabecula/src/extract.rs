@@ -19,7 +19,10 @@ use crate::surface_maker::{
 mod cube_table;
 mod feature_cells;
 mod feature_edges;
+mod joined_ranges;
+mod packed;
 mod planar_caps;
+mod range_partial;
 mod sampling_grid;
 mod sign_words;
 mod spaces;
@@ -28,9 +31,11 @@ mod tile;
 mod tile_components;
 mod tile_figures;
 mod tile_queue;
+mod tile_ranges;
 mod vertex_id;
 mod voxelize;
 
+pub use joined_ranges::{JoinedRanges, WholeSurface};
 use sampling_grid::Grid;
 pub use spaces::{SpaceMade, spaces};
 use stitched::Stitched;
@@ -38,7 +43,8 @@ use tile::{Scratch, View};
 use tile_components::{TileComponents, TileSweep};
 use tile_figures::{FigureSums, TileFigures};
 use tile_queue::{borrow, each_tile, give_back};
-pub use voxelize::voxels;
+pub use tile_ranges::{RangeMade, TileRanges};
+pub use voxelize::{VoxelGrid, voxels};
 
 /// Meshes a solid on a grid whose spacing is the resolution.
 pub struct GridSurface<'a>(pub &'a Solid);
@@ -76,7 +82,13 @@ impl SurfaceMaker for GridSurface<'_> {
         let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
         let mut out = Stitched::new(out);
-        each_tile(&grid, progress, |view: View| view.patch(0, middle), |patch| out.add(patch))?;
+        each_tile(
+            (&grid, &Mutex::default()),
+            grid.all(),
+            progress,
+            |view: View| view.patch(0, middle),
+            |patch| out.add(patch),
+        )?;
         out.finish(options)
     }
 
@@ -97,7 +109,7 @@ impl SurfaceMaker for GridSurface<'_> {
             (components, records)
         };
         let scaled = stream.progress();
-        each_tile(&grid, &scaled, map, |(components, mut records)| {
+        each_tile((&grid, &Mutex::default()), grid.all(), &scaled, map, |(components, mut records)| {
             triangles += (records.len() / stl::RECORD) as u64;
             surface_maker::check_count(triangles)?;
             sweep.add(components).map_err(Stopped::Refused)?;
@@ -117,7 +129,8 @@ impl SurfaceMaker for GridSurface<'_> {
         let middle = self.0.region.bounds().center();
         let (mut sweep, mut sums, mut triangles) = (TileSweep::default(), FigureSums::default(), 0);
         each_tile(
-            &grid,
+            (&grid, &Mutex::default()),
+            grid.all(),
             progress,
             |view: View| TileFigures::of(&view, middle),
             |tile| {

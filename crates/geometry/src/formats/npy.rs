@@ -106,6 +106,14 @@ pub fn write_npy<W: Write>(shape: [usize; 3], data: &[u8], out: &mut W) -> io::R
     out.write_all(data)
 }
 
+/// What precedes the bytes of such an array.
+pub fn npy_head(shape: [usize; 3]) -> Vec<u8> {
+    let mut head = Vec::new();
+    // Memory takes all that is written.
+    drop(write_header(shape, &mut head));
+    head
+}
+
 /// Writes what precedes the bytes of such an array.
 pub(super) fn write_header<W: Write + ?Sized>([x, y, z]: [usize; 3], out: &mut W) -> io::Result<()> {
     let mut header = format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");

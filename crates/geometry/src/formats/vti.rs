@@ -5,6 +5,7 @@
 use std::io::{self, Write};
 
 use super::invalid;
+use crate::math::Vec3;
 use crate::voxels::Voxels;
 
 /// Writes voxels as image data with the cell array `solid` (`UInt8`), raw and appended.
@@ -16,9 +17,15 @@ pub fn write_vti<W: Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
     if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(count) {
         return Err(invalid(format!("a grid of {x} × {y} × {z} does not have {count} voxels")));
     }
-    let ([ox, oy, oz], step) = (voxels.origin, voxels.step);
-    write!(
-        out,
+    let [head, tail] = vti_frame(voxels.origin, voxels.step, voxels.shape);
+    out.write_all(&head)?;
+    out.write_all(&voxels.solid)?;
+    out.write_all(&tail)
+}
+
+/// What precedes and what follows the voxels in such a file: origin and step in mm, numbers of voxels along x, y, z.
+pub fn vti_frame([ox, oy, oz]: Vec3, step: f64, [x, y, z]: [usize; 3]) -> [Vec<u8>; 2] {
+    let mut head = format!(
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{ox} {oy} {oz}" Spacing="{step} {step} {step}">
@@ -30,10 +37,10 @@ pub fn write_vti<W: Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
 </ImageData>
 <AppendedData encoding="raw">
 _"#
-    )?;
-    out.write_all(&(count as u64).to_le_bytes())?;
-    out.write_all(&voxels.solid)?;
-    out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+    )
+    .into_bytes();
+    head.extend(([x, y, z].iter().map(|n| *n as u64).product::<u64>()).to_le_bytes());
+    [head, b"\n</AppendedData>\n</VTKFile>\n".to_vec()]
 }
 
 #[cfg(test)]

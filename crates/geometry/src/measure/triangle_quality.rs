@@ -36,6 +36,16 @@ impl Default for Shapes {
 }
 
 impl Shapes {
+    /// The smallest angle (degrees) and the largest aspect ratio, and for each triangle the interval of its smallest angle.
+    pub fn parts(&self) -> ([f64; 2], &[u16]) {
+        ([self.smallest_angle, self.largest_aspect], &self.intervals)
+    }
+
+    /// Shapes of these `parts`.
+    pub fn of_parts([smallest_angle, largest_aspect]: [f64; 2], intervals: Vec<u16>) -> Shapes {
+        Shapes { smallest_angle, largest_aspect, intervals }
+    }
+
     /// Adds the triangle with these corners.
     pub fn push(&mut self, corners: [Vec3; 3]) {
         let (angle, aspect) = shape(corners);
@@ -54,6 +64,23 @@ pub struct ShapeCounts {
 }
 
 impl ShapeCounts {
+    /// The smallest angle (degrees) and the largest aspect ratio, and how many triangles have their smallest angle in each interval;
+    /// none of no triangles.
+    pub fn parts(&self) -> ([f64; 2], &[u64]) {
+        (self.all.parts().0, &self.counts)
+    }
+
+    /// Adds counts of these `parts`; intervals beyond the last one are none.
+    pub fn add_parts(&mut self, [smallest_angle, largest_aspect]: [f64; 2], counts: impl Iterator<Item = (u16, u64)>) {
+        self.all.smallest_angle = self.all.smallest_angle.min(smallest_angle);
+        self.all.largest_aspect = self.all.largest_aspect.max(largest_aspect);
+        for (interval, count) in counts {
+            self.counts.resize(1 << 16, 0);
+            let all = &mut self.counts[usize::from(interval)];
+            *all = all.wrapping_add(count);
+        }
+    }
+
     /// Adds the triangles of a part.
     pub fn add(&mut self, part: &Shapes) {
         self.all.smallest_angle = self.all.smallest_angle.min(part.smallest_angle);

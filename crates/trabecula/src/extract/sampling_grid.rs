@@ -127,7 +127,7 @@ impl Grid {
             let local = self.local(&self.nodes(tile), &self.block(tile).bounds());
             local.map_or(0, |l| l.live.len())
         };
-        let most = (0..self.tiles().iter().product()).map(count).max();
+        let most = self.all().map(count).max();
         match most {
             Some(n) if n > MOST_SURFACES => Err(Fault::new(
                 "edge",
@@ -153,6 +153,17 @@ impl Grid {
     /// Number of tiles along each axis.
     pub(super) fn tiles(&self) -> [usize; 3] {
         self.cells().map(|n| n.div_ceil(TILE))
+    }
+
+    /// The numbers of all tiles, in the order x fastest.
+    pub(super) fn all(&self) -> std::ops::Range<usize> {
+        0..self.tiles().iter().product()
+    }
+
+    /// The number of a tile in that order.
+    pub(super) fn number(&self, [i, j, k]: [usize; 3]) -> usize {
+        let n = self.tiles();
+        i + n[0] * (j + n[1] * k)
     }
 
     /// Whether a plane normal to an axis is both a node plane and a surface of the solid.

@@ -4,6 +4,8 @@
 //! void on either side. A triangle between two is the same for both, turned round; so no gap or overlap is possible, and the
 //! volumes add up to that of the region.
 
+use std::sync::Mutex;
+
 use geometry::fault::{Fault, number};
 use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
@@ -46,7 +48,7 @@ pub fn spaces(
         Some(at) => Err(at),
         None => Ok(wanted.iter().map(|s| view.patch(*s as usize, middle)).collect::<Vec<_>>()),
     };
-    each_tile(&grid, progress, map, |patches| {
+    each_tile((&grid, &Mutex::default()), grid.all(), progress, map, |patches| {
         let patches = patches.map_err(|at| Stopped::Refused(no_wall(at)))?;
         all.iter_mut().zip(patches).try_for_each(|(out, patch)| out.add(patch))
     })?;

@@ -6,9 +6,11 @@
 //!   That no edge has four triangles is by construction.
 //! - *A point in each void*, the middle of the longest interval of void on a grid line that ends at its wall.
 
+use geometry::fault::Fault;
 use geometry::math::{Vec3, add, scale};
 use geometry::measure::{Cavity, ShapeCounts, Shapes, Size};
 
+use super::packed::{Packer, Unpacker, damaged};
 use super::tile::View;
 use super::tile_components::{Gap, TileComponents};
 use crate::surface_maker::{Figures, Measured, Resolved, Totals};
@@ -78,7 +80,7 @@ fn mixed(word: u64) -> u64 {
 }
 
 /// What is measured of the tiles so far.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct FigureSums {
     balance: u64,
     counts: ShapeCounts,
@@ -102,6 +104,70 @@ impl FigureSums {
         }
         self.gaps.extend(&tile.components.gaps);
         tile.components
+    }
+
+    /// Adds what is measured of the tiles that come next.
+    pub fn join(&mut self, next: FigureSums) {
+        let base = self.gaps.len() as u32;
+        self.balance = self.balance.wrapping_add(next.balance);
+        let (all, counts) = next.counts.parts();
+        self.counts.add_parts(all, (0..=u16::MAX).zip(counts.iter().copied()));
+        self.open.extend(next.open.into_iter().map(|(n, shapes)| (base + n, shapes)));
+        self.gaps.extend(next.gaps);
+    }
+
+    /// As bytes.
+    pub fn pack(&self, out: &mut Packer) {
+        out.whole(self.balance.into());
+        let (all, counts) = self.counts.parts();
+        all.iter().for_each(|v| out.real(*v));
+        let some = || counts.iter().enumerate().filter(|(_, n)| **n > 0);
+        out.count(some().count());
+        let mut before = 0;
+        for (interval, n) in some() {
+            out.count(interval - before);
+            out.whole((*n).into());
+            before = interval;
+        }
+        out.count(self.open.len());
+        for (n, shapes) in &self.open {
+            let (all, intervals) = shapes.parts();
+            out.whole((*n).into());
+            all.iter().for_each(|v| out.real(*v));
+            out.count(intervals.len());
+            intervals.iter().for_each(|i| out.whole((*i).into()));
+        }
+        // Few components have a gap.
+        let gaps = || self.gaps.iter().enumerate().filter(|(_, gap)| gap.0 > 0.0);
+        out.count(gaps().count());
+        for (n, (length, middle)) in gaps() {
+            out.count(n);
+            [*length].iter().chain(middle).for_each(|v| out.real(*v));
+        }
+    }
+
+    /// From bytes; of so many components.
+    pub fn unpack(from: &mut Unpacker, components: usize) -> Result<FigureSums, Fault> {
+        let mut sums = FigureSums { balance: from.word()?, ..FigureSums::default() };
+        let all = from.reals()?;
+        let mut counts = Vec::new();
+        let mut interval = 0u32;
+        for _ in 0..from.count()? {
+            interval += from.below(1 << 16)?;
+            counts.push((u16::try_from(interval).map_err(|_| damaged())?, from.word()?));
+        }
+        sums.counts.add_parts(all, counts.into_iter());
+        for _ in 0..from.count()? {
+            let (n, all, count) = (from.below(components as u128)?, from.reals()?, from.count()?);
+            let intervals = (0..count).map(|_| from.below(1 << 16).map(|i| i as u16)).collect::<Result<_, Fault>>()?;
+            sums.open.push((n, Shapes::of_parts(all, intervals)));
+        }
+        sums.gaps = vec![(0.0, [0.0; 3]); components];
+        for _ in 0..from.count()? {
+            let n = from.below(components as u128)?;
+            sums.gaps[n as usize] = (from.real()?, from.reals()?);
+        }
+        Ok(sums)
     }
 
     /// What is measured of the whole surface, once its components are known.

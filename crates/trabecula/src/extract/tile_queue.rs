@@ -1,6 +1,7 @@
 //! Tiles of a grid are extracted in parallel, a few at a time, and consumed in order.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use geometry::progress::{Progress, Stopped};
@@ -38,40 +39,50 @@ struct Queue<T> {
     ended: Result<(), Stopped>,
 }
 
-/// Extracts all tiles, maps each by `map` on its thread and passes the results to `take` in order.
+/// Extracts tiles, maps each by `map` on its thread and passes the results to `take` in order; those without surface are left out.
+///
+/// Buffers of threads are taken from `spare`, and left there for the next call.
 ///
 /// Every thread extracts the next tile, then consumes what is ready unless another thread does. A thread that is too far
 /// ahead ends and is started again when a tile has been consumed: none ever blocks, so there is no deadlock.
 pub(super) fn each_tile<T: Send>(
-    grid: &Grid,
+    (grid, spare): (&Grid, &Mutex<Vec<Scratch>>),
+    tiles: Range<usize>,
     progress: &dyn Progress,
     map: impl Fn(View) -> T + Sync,
     take: impl FnMut(T) -> Result<(), Stopped> + Send,
 ) -> Result<(), Stopped> {
-    let total: usize = grid.tiles().iter().product();
+    let start = tiles.start;
     let threads = rayon::current_num_threads();
     let work = Work {
         grid,
         progress,
-        total,
+        tiles,
         ahead: AHEAD * threads,
-        scratch: Mutex::default(),
+        spare,
         map,
         take: Mutex::new(take),
-        queue: Mutex::new(Queue { next: 0, turn: 0, ready: HashMap::new(), consuming: false, idle: 0, ended: Ok(()) }),
+        queue: Mutex::new(Queue {
+            next: start,
+            turn: start,
+            ready: HashMap::new(),
+            consuming: false,
+            idle: 0,
+            ended: Ok(()),
+        }),
     };
     rayon::scope(|scope| (0..threads).for_each(|_| scope.spawn(|scope| work.run(scope))));
     let queue = work.queue.into_inner();
     queue.unwrap_or_else(PoisonError::into_inner).ended
 }
 
-/// The work on all tiles.
+/// The work on these tiles.
 struct Work<'a, T, C, K> {
     grid: &'a Grid,
     progress: &'a dyn Progress,
-    total: usize,
+    tiles: Range<usize>,
     ahead: usize,
-    scratch: Mutex<Vec<Scratch>>,
+    spare: &'a Mutex<Vec<Scratch>>,
     map: C,
     take: Mutex<K>,
     queue: Mutex<Queue<T>>,
@@ -89,19 +100,19 @@ where
     }
 
     fn run<'s>(&'s self, scope: &Scope<'s>) {
-        let mut scratch = borrow(&self.scratch);
+        let mut scratch = borrow(self.spare);
         while let Some(i) = self.claim() {
             let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(&self.map);
             self.queue().ready.insert(i, found);
             self.take_ready(scope);
         }
-        give_back(&self.scratch, scratch);
+        give_back(self.spare, scratch);
     }
 
     /// The next tile to extract, unless there is none or too many wait.
     fn claim(&self) -> Option<usize> {
         let mut q = self.queue();
-        if q.next == self.total || q.ended.is_err() {
+        if q.next >= self.tiles.end || q.ended.is_err() {
             return None;
         }
         if q.next >= q.turn + self.ahead {
@@ -129,7 +140,7 @@ where
                 (Some(found), Ok(mut take)) => take(found),
                 _ => Ok(()),
             };
-            let go_on = self.progress.step(turn as u64 + 1, self.total as u64);
+            let go_on = self.progress.step((turn - self.tiles.start) as u64 + 1, self.tiles.len() as u64);
             q = self.queue();
             q.turn += 1;
             if q.ended.is_ok() {

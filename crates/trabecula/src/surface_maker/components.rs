@@ -197,6 +197,11 @@ pub struct Resolved {
 }
 
 impl Resolved {
+    /// The triangles that stay, by their numbers in order.
+    pub fn kept(&self) -> Vec<std::ops::Range<u64>> {
+        super::compact::ranges(&self.parts)
+    }
+
     /// What is left of the surface.
     pub fn summary(self) -> Summary {
         Summary {

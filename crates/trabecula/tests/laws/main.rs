@@ -19,6 +19,7 @@ mod periods;
 mod phase;
 mod pore;
 mod principal_lengths;
+mod ranges;
 mod shells;
 mod simplify;
 mod skin;

@@ -1,0 +1,219 @@
+//! The surface of a solid range by range of tiles, for other processes and later runs, and the ranges joined.
+
+use std::sync::{Arc, Mutex};
+
+use geometry::formats::{npy_head, stl, vti_frame};
+use geometry::progress::{Progress, Stopped};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use trabecula::design::Built;
+use trabecula::extract::{JoinedRanges, RangeMade, VoxelGrid};
+use trabecula::report::SurfaceReport;
+use trabecula::surface_maker::Options;
+
+use crate::error;
+use crate::report::report;
+use crate::run::{run, run_apart};
+use crate::solid::{Measured, Solid, islands_word, measured};
+
+/// A range: its first item and the one after its last, its bytes of the output, its partial result.
+type Range<'py> = (usize, usize, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
+
+/// Calls `take` with a range; what it raises is put aside and ends the work.
+fn told(take: &Py<PyAny>, raised: &Mutex<Option<PyErr>>, range: (usize, usize, &[u8], &[u8])) -> Result<(), Stopped> {
+    let call = Python::attach(|py| {
+        let range: Range<'_> = (range.0, range.1, PyBytes::new(py, range.2), PyBytes::new(py, range.3));
+        take.call1(py, range).map(drop)
+    });
+    call.map_err(|e| {
+        if let Ok(mut raised) = raised.lock() {
+            *raised = Some(e);
+        }
+        Stopped::Interrupted
+    })
+}
+
+/// What the work ended with, if nothing was raised.
+fn ended(raised: Mutex<Option<PyErr>>, made: Result<(), Stopped>) -> PyResult<()> {
+    match raised.into_inner().ok().flatten() {
+        Some(e) => Err(e),
+        None => made.map_err(error::stopped),
+    }
+}
+
+/// A solid on its grid, whose tiles are taken range by range.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct TileRanges {
+    tiles: Arc<trabecula::extract::TileRanges>,
+    figures: bool,
+}
+
+#[pymethods]
+impl TileRanges {
+    /// The tiles of a solid at grid spacing `edge` (mm), for its triangles or for its `figures`; a ValueError for a solid that is not
+    /// meshed on a grid.
+    #[staticmethod]
+    #[pyo3(signature = (solid, edge, figures=false))]
+    fn of(solid: Py<Solid>, py: Python<'_>, edge: f64, figures: bool) -> PyResult<TileRanges> {
+        let work = move || {
+            let built: &Built = solid.get().built();
+            built.on_grid()?;
+            trabecula::extract::TileRanges::new(&built.solid, edge)
+        };
+        Ok(TileRanges { tiles: Arc::new(run_apart(py, None, work)?.map_err(error::fault)?), figures })
+    }
+
+    /// Number of tiles.
+    #[getter]
+    fn count(&self) -> usize {
+        self.tiles.tiles()
+    }
+
+    /// The surface in the tiles from `start` to before `end`, in ranges that end at multiples of `size`: calls `take` for each, in order
+    /// and from another thread, with its first tile, the one after its last, its triangles as records of a binary STL (none for
+    /// figures) and its partial result. What `take` raises ends the work.
+    #[pyo3(signature = (start, end, size, take, threads=None))]
+    fn each(
+        &self,
+        py: Python<'_>,
+        start: usize,
+        end: usize,
+        size: usize,
+        take: Py<PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<()> {
+        let raised: Mutex<Option<PyErr>> = Mutex::default();
+        let taken = |m: RangeMade| told(&take, &raised, (m.tiles.start, m.tiles.end, &m.records, &m.partial));
+        let made = run(py, threads, None, |p| match self.figures {
+            false => self.tiles.surface(start..end, size, p, taken),
+            true => self.tiles.figures(start..end, size, p, taken),
+        })?;
+        ended(raised, made)
+    }
+}
+
+/// The voxels of a solid, taken range by range of layers.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct VoxelRanges {
+    solid: Py<Solid>,
+    grid: VoxelGrid,
+}
+
+#[pymethods]
+impl VoxelRanges {
+    /// Voxels of edge `step` (mm) of a solid.
+    #[staticmethod]
+    fn of(solid: Py<Solid>, step: f64) -> PyResult<VoxelRanges> {
+        let grid = VoxelGrid::new(solid.get().solid(), step).map_err(error::fault)?;
+        Ok(VoxelRanges { solid, grid })
+    }
+
+    /// Number of layers.
+    #[getter]
+    fn count(&self) -> usize {
+        self.grid.shape[2]
+    }
+
+    /// Voxels along x, y, z.
+    #[getter]
+    fn shape(&self) -> [usize; 3] {
+        self.grid.shape
+    }
+
+    /// Lower corner of the first voxel, mm.
+    #[getter]
+    fn origin(&self) -> [f64; 3] {
+        self.grid.origin
+    }
+
+    /// What precedes and what follows the voxels in a file, `npy` or `vti`.
+    fn frame<'py>(&self, py: Python<'py>, extension: &str) -> [Bound<'py, PyBytes>; 2] {
+        let [head, tail] = match extension {
+            "npy" => [npy_head(self.grid.shape), Vec::new()],
+            _ => vti_frame(self.grid.origin, self.grid.step, self.grid.shape),
+        };
+        [PyBytes::new(py, &head), PyBytes::new(py, &tail)]
+    }
+
+    /// As `TileRanges.each`, of layers: their voxels, x fastest, and the number of those that are solid as eight bytes, the lowest first.
+    #[pyo3(signature = (start, end, size, take, threads=None))]
+    fn each(
+        &self,
+        py: Python<'_>,
+        start: usize,
+        end: usize,
+        size: usize,
+        take: Py<PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<()> {
+        let raised: Mutex<Option<PyErr>> = Mutex::default();
+        let (end, size) = (end.min(self.count()), size.max(1));
+        let solid = self.solid.get().solid();
+        let work = |p: &dyn Progress| {
+            let mut at = start;
+            while at < end {
+                let next = ((at / size + 1) * size).min(end);
+                let voxels = self.grid.layers(solid, at..next, p)?;
+                let count = voxels.iter().map(|v| u64::from(*v)).sum::<u64>();
+                told(&take, &raised, (at, next, &voxels, &count.to_le_bytes()))?;
+                at = next;
+            }
+            Ok(())
+        };
+        let made = run(py, threads, None, work)?;
+        ended(raised, made)
+    }
+}
+
+/// Ranges of tiles that are joined, in order.
+#[pyclass(module = "trabecula._core")]
+#[derive(Default)]
+pub struct Joined {
+    ranges: Option<JoinedRanges>,
+}
+
+/// Report of the surface, its other connected components in words, ranges of the triangles that stay, triangles before any are
+/// dropped.
+type Whole<'py> = (Bound<'py, PyAny>, String, Vec<(u64, u64)>, u64);
+
+#[pymethods]
+impl Joined {
+    #[new]
+    fn new() -> Joined {
+        Joined { ranges: Some(JoinedRanges::default()) }
+    }
+
+    /// Adds the partial result of the next range; a ValueError for bytes that are none.
+    fn add(&mut self, py: Python<'_>, partial: &[u8]) -> PyResult<()> {
+        let ranges = self.ranges.as_mut().ok_or_else(joined_already)?;
+        py.detach(|| ranges.add(partial)).map_err(error::fault)
+    }
+
+    /// The whole surface: its `reports.SurfaceReport`, its other connected components in words, the triangles that stay as ranges of
+    /// their numbers, and how many there are before any are dropped.
+    fn finish<'py>(&mut self, py: Python<'py>, edge: f64, islands: &str) -> PyResult<Whole<'py>> {
+        let options = Options { resolution: edge, islands: islands_word(islands)? };
+        let ranges = self.ranges.take().ok_or_else(joined_already)?;
+        let made = py.detach(|| ranges.finish(&options)).map_err(error::stopped)?;
+        let kept = made.kept.iter().map(|r| (r.start, r.end)).collect();
+        let told = report(py, "SurfaceReport", &SurfaceReport::from(&made.summary))?;
+        Ok((told, made.summary.components.words(), kept, made.triangles))
+    }
+
+    /// The figures of the whole surface, in a region of this volume (mm³): as `Solid.measure`.
+    fn measured<'py>(&mut self, py: Python<'py>, edge: f64, region: f64) -> PyResult<Measured<'py>> {
+        let ranges = self.ranges.take().ok_or_else(joined_already)?;
+        let made = py.detach(|| ranges.measured(&Options::new(edge))).map_err(error::stopped)?;
+        measured(py, &made, region)
+    }
+}
+
+fn joined_already() -> PyErr {
+    PyValueError::new_err("the ranges are joined already")
+}
+
+/// The first bytes of a binary STL of so many triangles.
+pub fn stl_header(triangles: u32) -> [u8; stl::HEADER] {
+    stl::header(triangles)
+}

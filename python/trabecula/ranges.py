@@ -1,0 +1,269 @@
+"""Parts that outgrow one process or one run, range by range: surfaces and their figures by tiles of the grid, voxels by layers.
+
+Ranges are made by threads here or by the workers of a cluster, and stand in a folder as soon as they are made: a run goes on
+where the last one ended. The result is that of one process to the last byte.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from . import _core, terminal
+from .clusters import connected, in_order
+from .design import _moved, parsed
+from .given import thread_count
+from .sent import digest_of, files_of, put_files
+from .unfinished import Unfinished
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .islands import Islands
+    from .reports import IslandsReport, MeshReport, QualityReport, SurfaceReport
+    from .solid import Solid
+
+    Progress = Callable[[int, int], Any]
+
+__all__ = ["measure", "save", "save_voxels"]
+
+#: Bytes of a range, about: what a worker makes, and sends, at a time.
+WANTED = 1 << 22
+#: Bytes of the header and of a triangle of a binary STL, and the most triangles that it counts.
+HEADER, RECORD, MOST = 84, 50, 2**32 - 1
+
+#: For each kind of work what gives its ranges, of a solid and a step in mm.
+KINDS: dict[str, Callable[[_core.Solid, float], Any]] = {
+    "surface": lambda solid, step: _core.TileRanges.of(solid, step),
+    "figures": lambda solid, step: _core.TileRanges.of(solid, step, True),
+    "voxels": lambda solid, step: _core.VoxelRanges.of(solid, step),
+}
+
+
+def save(
+    solid: Solid,
+    path: str,
+    spacing: float,
+    islands: Islands,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cluster: str | None = None,
+    new: bool = False,
+    size: int | None = None,
+    shards: int | None = None,
+    accept: Callable[[SurfaceReport, str], Any] = lambda made, words: None,
+) -> SurfaceReport:
+    """Writes the surface of a solid at a grid ``spacing`` (mm) as binary STL, in ranges of ``size`` tiles. ``accept`` is told
+    of the surface before it gets its name. With ``shards`` ``path`` is a folder of files of about so many
+    bytes. Gives its report.
+
+    Raises ValueError for a solid that is not meshed on a grid and for a cluster that cannot be used, Refused for the folder of
+    another run, OSError for a disk that is full.
+    """
+    more = {"islands": islands} | ({"shards": shards} if shards else {})
+    work = _Work("surface", solid, spacing, path, HEADER, more, size or _tiles_at_once(solid, spacing))
+    with work.opened(new):
+        joined = _core.Joined()
+        work.make(joined.add, cluster, threads, progress)
+        report, words, kept, _ = joined.finish(spacing, islands)
+        accept(report, words)
+        if shards:
+            told = work.folder.head | {"design": solid._core.design, "surface": report.to_dict()}
+            work.folder.split(kept, RECORD, _core.stl_header, shards, told)
+        else:
+            work.folder.keep(kept, RECORD, _core.stl_header(report.triangles))
+    work.folder.finish()
+    return report
+
+
+def measure(
+    solid: Solid,
+    spacing: float,
+    region: float,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cluster: str | None = None,
+    new: bool = False,
+    beside: str | None = None,
+    size: int | None = None,
+) -> tuple[MeshReport, QualityReport | None, IslandsReport]:
+    """What is measured of the surface at a grid ``spacing`` (mm), in a ``region`` of this volume (mm³), in ranges of ``size``
+    tiles: its figures, the quality of its triangles, its other connected components. ``beside`` is the file beside which it
+    stands and is gone on with in a later run; else nothing is kept.
+
+    Raises as ``save``.
+    """
+    with tempfile.TemporaryDirectory(prefix="trabecula-") as scratch:
+        output = f"{beside}.figures" if beside else os.path.join(scratch, "figures")
+        work = _Work("figures", solid, spacing, output, 0, {}, size or _tiles_at_once(solid, spacing))
+        with work.opened(new):
+            joined = _core.Joined()
+            work.make(joined.add, cluster, threads, progress)
+            made = joined.measured(spacing, region)
+        work.folder.finish()
+    return made
+
+
+def save_voxels(
+    solid: Solid,
+    path: str,
+    kind: str,
+    step: float,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cluster: str | None = None,
+    new: bool = False,
+    size: int | None = None,
+    accept: Callable[[float], Any] = lambda volume: None,
+) -> dict[str, Any]:
+    """Writes a solid as voxels of edge ``step`` (mm) to a file of a ``kind`` ("npy", "vti"), in ranges of ``size`` layers.
+    ``accept`` is told of the volume (mm³) before it gets its name. Gives ``shape``, ``step``, ``origin`` (mm) and ``volume``.
+
+    Raises as ``save``.
+    """
+    grid = _core.VoxelRanges.of(solid._core, step)
+    head, tail = grid.frame(kind)
+    nx, ny, nz = grid.shape
+    work = _Work("voxels", solid, step, path, len(head), {"kind": kind}, size or max(WANTED // (nx * ny), 1))
+    with work.opened(new):
+        counts: list[int] = []
+        work.make(lambda partial: counts.append(int.from_bytes(partial, "little")), cluster, threads, progress)
+        volume = float(sum(counts)) * step**3
+        accept(volume)
+        work.folder.keep([(0, nx * ny * nz)], 1, head, tail)
+    work.folder.finish()
+    return {"shape": [nx, ny, nz], "step": step, "origin": list(grid.origin), "volume": volume}
+
+
+def _tiles_at_once(solid: Solid, spacing: float) -> int:
+    """The number of tiles whose triangles take about as many bytes as are wanted."""
+    made = solid._core.estimate(spacing, spacing)
+    tiles = 1.0
+    for n in made.cells:
+        tiles *= -(-n // 61)
+    return int(min(max(WANTED * tiles / made.stl, 1), 4096))
+
+
+class _Work:
+    """Ranges of ``size`` tiles or layers that are to be made of a solid, and the folder in which they stand."""
+
+    def __init__(self, kind: str, solid: Solid, step: float, output: str, first: int, more: dict[str, Any], size: int):
+        self.ranges = KINDS[kind](solid._core, step)
+        self.size = size
+        self.count = -(-self.ranges.count // size)
+        files = files_of(solid)
+        text = solid._core.design
+        head = {
+            "of": kind,
+            "version": _core.__version__,
+            "design": hashlib.sha256(text.encode()).hexdigest(),
+            "files": {name: digest_of(content) for name, content in files.items()},
+            "edge": step,
+            **more,
+            "count": self.ranges.count,
+            "range": size,
+        }
+        self.folder = Unfinished(output, head, first)
+        self.limit = HEADER + RECORD * MOST if kind == "surface" and "shards" not in more else None
+        key = hashlib.sha256(repr(sorted(head.items())).encode()).hexdigest()
+        self.job = {"key": key, "of": kind, "version": _core.__version__, "design": text, "files": files, "edge": step}
+
+    @contextmanager
+    def opened(self, new: bool) -> Iterator[None]:
+        """The folder, while it is worked in; says after any other end what stands there."""
+        try:
+            with self.folder.opened(new):
+                yield
+        except BaseException:
+            if done := len(self.folder.ranges):
+                where = f"{done} of {self.count} ranges stand in {self.folder.folder}"
+                terminal.left.append(f"{where}; the same command goes on from there")
+            raise
+
+    def make(self, join: Callable[[bytes], Any], cluster: str | None, threads: int | None, progress: Progress | None) -> None:
+        """Makes what is missing or damaged, and calls ``join`` with the partial results of all ranges in order."""
+        folder = self.folder
+        begun = len(folder.ranges)
+        damaged = [] if folder.stage else folder.damaged()
+        if begun:
+            again = f", {len(damaged)} of them damaged and made again" if damaged else ""
+            terminal.say(f"{begun} of {self.count} ranges are there already ({folder.folder}){again}")
+
+        def put(number: int, data: bytes, partial: bytes) -> None:
+            folder.add(number, data, partial)
+            if self.limit and folder.length > self.limit:
+                raise ValueError("more than 2^32 triangles, the most an STL can count; use a larger edge")
+            if number >= begun:
+                join(partial)
+            if progress:
+                progress(len(folder.ranges), self.count)
+
+        self._make(damaged, cluster, threads, put)
+        for partial in folder.partials():
+            join(partial)
+        self._make(list(range(begun, self.count)), cluster, threads, put)
+
+    def _make(
+        self, missing: list[int], cluster: str | None, threads: int | None, put: Callable[[int, bytes, bytes], None]
+    ) -> None:
+        """Makes ranges by their numbers, and calls ``put`` with each, in order."""
+        if missing and cluster:
+            with connected(cluster) as client:
+                tasks = [(n * self.size, min((n + 1) * self.size, self.ranges.count), self.size) for n in missing]
+                made = in_order(client, range_of, self.job, tasks)
+                for number, (data, partial) in zip(missing, made, strict=True):
+                    put(number, data, partial)
+            return
+        for first, end in _rows(missing):  # ranges in a row are made without a pause between them
+            self.ranges.each(
+                first * self.size,
+                end * self.size,
+                self.size,
+                lambda start, _, data, partial: put(start // self.size, data, partial),
+                thread_count(threads),
+            )
+
+
+def _rows(numbers: list[int]) -> Iterator[tuple[int, int]]:
+    """Ascending numbers as ranges."""
+    first = None
+    for n, number in enumerate(numbers):
+        first = number if first is None else first
+        if n + 1 == len(numbers) or numbers[n + 1] != number + 1:
+            yield first, number + 1
+            first = None
+
+
+# --- workers ---------------------------------------------------------------------------------------------------------
+
+#: What gives the ranges of the last job of this process.
+_last: tuple[str, Any] | None = None
+_lock = threading.Lock()
+
+
+def range_of(job: dict[str, Any], start: int, end: int, size: int) -> tuple[bytes, bytes]:
+    """A range of a job: its bytes and its partial result. Workers of clusters call it.
+
+    Raises ValueError for a job of another version.
+    """
+    if job["version"] != _core.__version__:
+        raise ValueError(f"a worker has version {_core.__version__}, the job is of {job['version']}")
+    made: list[tuple[bytes, bytes]] = []
+    _ranges_of(job).each(start, end, size, lambda _, __, data, partial: made.append((data, partial)), 1)
+    return made[0]
+
+
+def _ranges_of(job: dict[str, Any]) -> Any:
+    global _last
+    with _lock:
+        if _last is None or _last[0] != job["key"]:
+            with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
+                places = put_files(job["files"], folder)
+                data = parsed(job["design"], False, "<design>", folder).to_dict()
+                built = _core.Design.from_data(_moved(data, lambda name: places.get(name, name))).build(folder)
+            _last = job["key"], KINDS[job["of"]](built, job["edge"])
+        return _last[1]

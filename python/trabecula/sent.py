@@ -1,0 +1,55 @@
+"""The files that a design reads, by their content: as they are sent to workers of a cluster, and told apart from others."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+
+from .design import _files, parsed
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .solid import Solid
+
+__all__ = ["digest_of", "files_of", "put_files"]
+
+
+def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
+    """The files of a design by its names for them; a name stands for one file, or for all of a pattern or a folder."""
+    made = {}
+    for name in _files(parsed(solid._core.design, False, "<design>", solid._folder).to_dict()):
+        path = os.path.join(solid._folder, name)
+        if os.path.isdir(path):
+            found = [os.path.join(at, one) for at, _, files in os.walk(path) for one in files]
+        else:
+            found = glob.glob(glob.escape(path).replace("[*]", "*"))
+        base = os.path.dirname(path.rstrip("/"))
+        made[name] = {os.path.relpath(one, base).replace(os.sep, "/"): _content(one) for one in sorted(found)}
+    return made
+
+
+def digest_of(files: dict[str, bytes]) -> str:
+    """The SHA-256 of files with their names."""
+    digest = hashlib.sha256()
+    for name, content in files.items():
+        digest.update(f"{name}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+def put_files(given: dict[str, dict[str, bytes]], folder: str) -> dict[str, str]:
+    """Writes such files to a folder; their names there by those that the design has for them."""
+    places = {}
+    for n, (name, files) in enumerate(given.items()):
+        places[name] = f"{n}/{os.path.basename(name.rstrip('/'))}"
+        for inner, content in files.items():
+            at = os.path.join(folder, str(n), inner)
+            os.makedirs(os.path.dirname(at), exist_ok=True)
+            with open(at, "wb") as file:
+                file.write(content)
+    return places
+
+
+def _content(path: str) -> bytes:
+    with open(path, "rb") as file:
+        return file.read()
