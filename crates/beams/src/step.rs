@@ -15,7 +15,6 @@ use geometry::progress::{Stopped, checkpoint};
 use crate::quador::Quadors;
 use crate::quador::brep::{Brep, CurveKey, Surface, Use};
 
-
 /// What a STEP file contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StepSummary {

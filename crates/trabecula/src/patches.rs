@@ -8,7 +8,6 @@
 //! The grid is refined until the distance is within the tolerance and the surface has the topology of a finer grid's.
 
 use std::io;
-use std::sync::Arc;
 
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
@@ -17,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::csg_tree::CsgTree;
 use crate::field::Field;
+use crate::implicit::Surface;
 use crate::solid::Solid;
 
 mod bezier;
@@ -33,6 +33,7 @@ use boundary::Boundary;
 use contour_polygons::{Grid, Polygons, euler};
 use fitted_patches::{ON_SIDE, curve, distances, patch};
 use quad_net::{Net, TooCoarse};
+use relaxed_net::gradients;
 use shells::Shells;
 
 /// Tolerance unless another is asked for, in parts of the smallest wavelength.
@@ -40,7 +41,24 @@ pub const TOLERANCE: f64 = 1e-3;
 /// Most faces of a file.
 pub const MOST_FACES: f64 = 4e5;
 /// Grid cells a wavelength to begin with, and at most.
-const CELLS: [f64; 2] = [4.0, 64.0];
+const CELLS: [f64; 2] = [4.0, 40.0];
+/// How much finer the next grid is after one that is too coarse.
+const COARSER: f64 = 1.25;
+/// Shifts of the level that are tried, in tolerances: where a surface touches itself, the box or one of its edges, one that is
+/// moved does not.
+const SHIFTS: [f64; 3] = [0.0, 0.3, -0.3];
+/// How often faces are divided where patches are not near enough.
+const DIVISIONS: u64 = 4;
+/// Rounds in which vertices are spread after a division.
+const AGAIN: usize = 2;
+/// Share of the faces divided that may be left for the next division.
+const FEWER: f64 = 0.8;
+/// Share of the faces beyond which the grid is refined instead.
+const MANY: f64 = 0.25;
+/// A face is divided across its longer sides, and across the others too where they are longer than this share of them.
+const LONG: f64 = 0.6;
+/// Greatest angle between the normals of adjacent patches, degrees.
+const ANGLE: f64 = 1.0;
 /// Rounds in which vertices are spread.
 const ROUNDS: usize = 12;
 /// Least cosine of the angle between a patch's normal and the surface's.
@@ -81,24 +99,25 @@ impl Patches {
     /// themselves or the box; an interruption.
     pub fn new(solid: &Solid, tolerance: f64, progress: &dyn Progress) -> Result<Patches, Stopped> {
         let (bounds, surfaces) = smooth_in_box(solid).map_err(Stopped::Refused)?;
-        let fields: Vec<&dyn Field> = surfaces.iter().map(|f| &**f).collect();
         let mut cells = CELLS[0];
         let mut why = "";
-        for round in 0..24 {
-            let from = 1.0 - 0.75f64.powi(round);
-            let stage = Stage { whole: progress, from, to: from + 0.25 * (1.0 - from) };
-            if cells > CELLS[1] {
-                break;
-            }
+        let mut round = 0;
+        while cells <= CELLS[1] {
             let grid = grid(&bounds, solid.wavelength / cells);
-            let factor = match attempt(&bounds, &grid, &fields, tolerance, &stage)? {
-                Attempt::Made(made) => return Ok(*made),
-                Attempt::Off(deviation) => (deviation / (0.7 * tolerance)).powf(0.25).clamp(1.1, 1.7),
-                Attempt::Coarse(found) => {
-                    why = found;
-                    1.25
+            let mut factor = COARSER;
+            for shift in SHIFTS {
+                let from = 1.0 - 0.8f64.powi(round);
+                let stage = Stage { whole: progress, from, to: from + 0.2 * (1.0 - from) };
+                round += 1;
+                match attempt(&bounds, &grid, &surfaces, (tolerance, shift), &stage)? {
+                    Attempt::Made(made) => return Ok(*made),
+                    Attempt::Off(deviation) => {
+                        factor = (deviation / (0.7 * tolerance)).powf(0.25).clamp(1.1, 1.7);
+                        break;
+                    }
+                    Attempt::Coarse(found) => why = found,
                 }
-            };
+            }
             cells *= factor;
         }
         let message = format!(
@@ -134,7 +153,7 @@ impl Patches {
 }
 
 /// The box that the region is, and the smooth surfaces of the lattice in it.
-fn smooth_in_box(solid: &Solid) -> Result<(Aabb, Vec<Arc<dyn Field>>), Fault> {
+fn smooth_in_box(solid: &Solid) -> Result<(Aabb, Vec<Surface>), Fault> {
     let other = "; write a mesh instead, such as .3mf or .stl";
     let refused = |at: &str, what: &str| Fault::new(at, format!("{what}{other}"));
     let (surfaces, tree) = solid.surfaces();
@@ -149,9 +168,10 @@ fn smooth_in_box(solid: &Solid) -> Result<(Aabb, Vec<Arc<dyn Field>>), Fault> {
     let mut leaves = 0;
     tree.for_each_bounding(&mut |_| leaves += 1);
     let planes = surfaces.iter().filter(|s| s.cut);
-    let sides: usize = planes.clone().filter(|s| s.plane.is_some_and(|p| {
-        p.at == [bounds.min, bounds.max][usize::from(p.below)][p.axis]
-    })).count();
+    let sides: usize = planes
+        .clone()
+        .filter(|s| s.plane.is_some_and(|p| p.at == [bounds.min, bounds.max][usize::from(p.below)][p.axis]))
+        .count();
     if leaves != surfaces.len() || matches!(tree, CsgTree::Union(_)) || sides != 6 || planes.count() != 6 {
         let what = "a STEP file has patches of lattices in a box, and this region is no box";
         return Err(refused("region", what));
@@ -161,7 +181,7 @@ fn smooth_in_box(solid: &Solid) -> Result<(Aabb, Vec<Arc<dyn Field>>), Fault> {
         let what = "a STEP file has patches of smooth surfaces, and that of this design has creases";
         return Err(refused("lattice", what));
     }
-    Ok((bounds, own.into_iter().map(|s| s.field.clone()).collect()))
+    Ok((bounds, own.into_iter().cloned().collect()))
 }
 
 /// A grid that ends at the planes of a box, no coarser than `spacing` (mm).
@@ -189,10 +209,15 @@ enum Attempt {
 fn attempt(
     bounds: &Aabb,
     grid: &Grid,
-    fields: &[&dyn Field],
-    tolerance: f64,
+    surfaces: &[Surface],
+    (tolerance, shift): (f64, f64),
     progress: &dyn Progress,
 ) -> Result<Attempt, Stopped> {
+    let by = |of: &Surface| shift * tolerance * mean_slope(&*of.field, grid);
+    let shifted: Vec<Surface> =
+        surfaces.iter().map(|s| if shift == 0.0 { s.clone() } else { s.clone().offset(by(s)) }).collect();
+    let fields: &[&dyn Field] = &shifted.iter().map(|s| &*s.field).collect::<Vec<_>>();
+    let asked: &[&dyn Field] = &surfaces.iter().map(|s| &*s.field).collect::<Vec<_>>();
     let fine = refined(grid);
     let mut net = Net::default();
     let mut corners = Vec::new();
@@ -223,28 +248,75 @@ fn attempt(
         }));
     }
     let spacing = (0..3).map(|a| bounds.size()[a] / (grid.shape()[a] - 1) as f64).fold(0.0, f64::max);
-    let normals = net.relax(fields, ROUNDS, 0.25 * spacing);
-    if !progress.step(3, 8) {
-        return Err(Stopped::Interrupted);
-    }
-    let curves = curves(&net, fields, &normals);
-    let patches = patches(&net, fields, &curves);
-    if !progress.step(6, 8) {
-        return Err(Stopped::Interrupted);
-    }
-    let Some(deviation) = deviation(&net, fields, &patches) else {
-        return Ok(Attempt::Coarse("patches would fold"));
+    let fitted = match fit(&mut net, bounds, [fields, asked], (tolerance, spacing), progress)? {
+        Ok(fitted) => fitted,
+        Err(attempt) => return Ok(attempt),
     };
-    if deviation > tolerance {
-        return Ok(Attempt::Off(deviation));
-    }
-    let angle = angle(&net, &patches);
+    let Fitted { curves, patches, near } = fitted;
+    let (deviation, angle) = (near.deviation(), near.angle());
     let boundary = Boundary::new(*bounds, &net, &curves, patches, &corners);
     let solids = boundary.solids();
     if solids.is_empty() {
         return Err(Stopped::Refused(Fault::new("region", "nothing of the lattice lies in the region")));
     }
     Ok(Attempt::Made(Box::new(Patches { boundary, solids, deviation, angle })))
+}
+
+/// Curves and patches of a net.
+struct Fitted {
+    curves: Vec<Curve>,
+    patches: Vec<Patch>,
+    near: Nearness,
+}
+
+/// Spreads the vertices of a net over the surfaces and fits its patches; where they are not near enough to the surfaces asked
+/// for, faces are divided. `fields` are the surfaces fitted to, and those asked for.
+fn fit(
+    net: &mut Net,
+    bounds: &Aabb,
+    [fields, asked]: [&[&dyn Field]; 2],
+    (tolerance, spacing): (f64, f64),
+    progress: &dyn Progress,
+) -> Result<Result<Fitted, Attempt>, Stopped> {
+    let (mut divisions, mut last) = (0, usize::MAX);
+    loop {
+        let normals = net.relax(fields, bounds, if divisions == 0 { ROUNDS } else { AGAIN }, spacing);
+        let curves = curves(net, fields, &normals);
+        let patches = patches(net, fields, &curves);
+        if !progress.step(2 + divisions, 3 + DIVISIONS) {
+            return Err(Stopped::Interrupted);
+        }
+        let near = Nearness::new(net, asked, &patches);
+        let bad: Vec<usize> = (0..patches.len()).filter(|f| !near.within(*f, tolerance)).collect();
+        if bad.is_empty() {
+            return Ok(Ok(Fitted { curves, patches, near }));
+        }
+        let more = core::mem::replace(&mut last, bad.len()) as f64;
+        if divisions == DIVISIONS || bad.len() as f64 > (FEWER * more).min(MANY * patches.len() as f64) {
+            let deviation = near.deviation();
+            let off = deviation.is_finite() && deviation > tolerance;
+            return Ok(Err(if off { Attempt::Off(deviation) } else { Attempt::Coarse("patches would fold") }));
+        }
+        divisions += 1;
+        net.divide(across(net, &bad));
+    }
+}
+
+/// The edges across which faces are divided: their longer sides, and the others where these are nearly as long.
+fn across(net: &Net, faces: &[usize]) -> Vec<bool> {
+    let mut divided = vec![false; net.edges.len()];
+    for f in faces {
+        let sides = net.faces[*f].sides;
+        let length = sides.map(|(e, _)| {
+            let [a, b] = net.edges[e as usize].ends.map(|v| net.vertices[v as usize].at);
+            norm(sub(a, b))
+        });
+        let pairs = [length[0] + length[2], length[1] + length[3]];
+        for k in (0..2).filter(|k| pairs[*k] >= LONG * pairs[1 - *k]) {
+            divided[sides[k].0 as usize] = true;
+        }
+    }
+    divided
 }
 
 /// The grid with twice as many cells along each axis.
@@ -255,6 +327,15 @@ fn refined(grid: &Grid) -> Grid {
         all
     };
     Grid { axes: [0, 1, 2].map(|a| halved(&grid.axes[a])) }
+}
+
+/// The mean length of a field's gradient at places of a grid that are near its zero set.
+fn mean_slope(field: &dyn Field, grid: &Grid) -> f64 {
+    let values = node_values(field, grid);
+    let polygons = Polygons::new(grid, &values);
+    let points: Vec<Vec3> = polygons.edges.iter().map(|e| crossing(field, grid, &values, *e)).collect();
+    let (_, slopes) = gradients(field, &points);
+    slopes.iter().map(|g| norm(*g)).sum::<f64>() / slopes.len().max(1) as f64
 }
 
 /// The values of a field at the nodes of a grid.
@@ -279,7 +360,11 @@ fn crossing(field: &dyn Field, grid: &Grid, values: &[f64], edge: u64) -> Vec3 {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..60 {
             let v = field.value(at(t));
-            if (v < 0.0) == (va < 0.0) { low = t } else { high = t }
+            if (v < 0.0) == (va < 0.0) {
+                low = t
+            } else {
+                high = t
+            }
             t = 0.5 * (low + high);
         }
     }
@@ -321,44 +406,69 @@ fn patches(net: &Net, fields: &[&dyn Field], curves: &[Curve]) -> Vec<Patch> {
     net.faces.par_iter().with_min_len(16).map(of).collect()
 }
 
-/// The greatest distance (mm) of patches from their surfaces; none if one is turned away from its surface.
-fn deviation(net: &Net, fields: &[&dyn Field], patches: &[Patch]) -> Option<f64> {
-    const PARTS: usize = 6;
-    let of = |(face, patch): (&quad_net::Face, &Patch)| {
-        let parameters: [[f64; 2]; 49] =
-            core::array::from_fn(|k| [k % 7, k / 7].map(|i| i as f64 / PARTS as f64));
-        let frames = parameters.map(|[u, v]| frame(patch, u, v));
-        let (off, normals) = distances(fields[usize::from(face.surface)], &frames.map(|f| f[0]));
-        let upright = frames.iter().zip(normals).all(|([_, du, dv], n)| {
-            let across = cross(*du, *dv);
-            dot(across, n) > TURNED * norm(across)
-        });
-        upright.then(|| off.into_iter().fold(0.0, |a: f64, b| a.max(b.abs())))
-    };
-    net.faces.par_iter().zip(patches).with_min_len(16).map(of).try_reduce(|| 0.0, |a, b| Some(a.max(b)))
+/// How near patches come to their surfaces and to each other.
+struct Nearness {
+    /// Of each patch the greatest distance from its surface (mm); infinite if it is turned away from it.
+    deviations: Vec<f64>,
+    /// Of each patch the greatest angle to an adjacent one (radians).
+    angles: Vec<f64>,
 }
 
-/// The greatest angle (degrees) between the normals of adjacent patches along their common edges.
-fn angle(net: &Net, patches: &[Patch]) -> f64 {
+impl Nearness {
+    fn new(net: &Net, fields: &[&dyn Field], patches: &[Patch]) -> Nearness {
+        let each = net.faces.par_iter().zip(patches).with_min_len(16);
+        let deviations = each.map(|(face, patch)| deviation(fields[usize::from(face.surface)], patch)).collect();
+        Nearness { deviations, angles: angles(net, patches) }
+    }
+
+    fn within(&self, f: usize, tolerance: f64) -> bool {
+        self.deviations[f] <= tolerance && self.angles[f] <= ANGLE.to_radians()
+    }
+
+    fn deviation(&self) -> f64 {
+        self.deviations.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// In degrees.
+    fn angle(&self) -> f64 {
+        self.angles.iter().copied().fold(0.0, f64::max).to_degrees()
+    }
+}
+
+/// The greatest distance (mm) of a patch from its surface, at 49 points; infinite if it is turned away from it.
+fn deviation(field: &dyn Field, patch: &Patch) -> f64 {
+    let parameters: [[f64; 2]; 49] = core::array::from_fn(|k| [k % 7, k / 7].map(|i| i as f64 / 6.0));
+    let frames = parameters.map(|[u, v]| frame(patch, u, v));
+    let (off, normals) = distances(field, &frames.map(|f| f[0]));
+    let upright = frames.iter().zip(normals).all(|([_, du, dv], n)| {
+        let across = cross(*du, *dv);
+        dot(across, n) > TURNED * norm(across)
+    });
+    if upright { off.into_iter().fold(0.0, |a: f64, b| a.max(b.abs())) } else { f64::INFINITY }
+}
+
+/// Of each patch the greatest angle (radians) between its normals and those of adjacent ones along their common edges.
+fn angles(net: &Net, patches: &[Patch]) -> Vec<f64> {
     const AT: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-    let mut first: Vec<Option<[Vec3; 5]>> = vec![None; net.edges.len()];
-    let mut most = 0.0f64;
-    for (face, patch) in net.faces.iter().zip(patches) {
+    let mut first: Vec<Option<(usize, [Vec3; 5])>> = vec![None; net.edges.len()];
+    let mut most = vec![0.0f64; patches.len()];
+    for (f, (face, patch)) in net.faces.iter().zip(patches).enumerate() {
         for (side, (edge, forward)) in face.sides.into_iter().enumerate() {
             let normals = AT.map(|t| {
                 let [u, v] = on_side(side, if forward { t } else { 1.0 - t });
                 bezier::normal(patch, u, v)
             });
             match &first[edge as usize] {
-                None => first[edge as usize] = Some(normals),
-                Some(known) => {
-                    for (a, b) in known.iter().zip(&normals) {
-                        // The chord between unit vectors is 2 sin of half the angle, exact for small ones.
-                        most = most.max(2.0 * (0.5 * norm(sub(*a, *b))).min(1.0).asin());
-                    }
+                None => first[edge as usize] = Some((f, normals)),
+                Some((other, known)) => {
+                    // The chord between unit vectors is 2 sin of half the angle, exact for small ones.
+                    let chords = known.iter().zip(&normals).map(|(a, b)| 0.5 * norm(sub(*a, *b)));
+                    let angle = 2.0 * chords.fold(0.0, f64::max).min(1.0).asin();
+                    most[f] = most[f].max(angle);
+                    most[*other] = most[*other].max(angle);
                 }
             }
         }
     }
-    most.to_degrees()
+    most
 }

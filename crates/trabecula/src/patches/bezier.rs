@@ -63,10 +63,8 @@ pub fn coons(sides: &[Curve; 4]) -> Patch {
     let [bottom, right, top, left] = [sides[0], sides[1], reversed(&sides[2]), reversed(&sides[3])];
     let at = |i: usize, j: usize| {
         let (u, v) = (i as f64 / 3.0, j as f64 / 3.0);
-        let ruled = add(
-            add(scale(bottom[i], 1.0 - v), scale(top[i], v)),
-            add(scale(left[j], 1.0 - u), scale(right[j], u)),
-        );
+        let ruled =
+            add(add(scale(bottom[i], 1.0 - v), scale(top[i], v)), add(scale(left[j], 1.0 - u), scale(right[j], u)));
         let corners = add(
             add(scale(bottom[0], (1.0 - u) * (1.0 - v)), scale(bottom[3], u * (1.0 - v))),
             add(scale(top[0], (1.0 - u) * v), scale(top[3], u * v)),

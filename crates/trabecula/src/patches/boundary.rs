@@ -17,10 +17,10 @@ pub struct BoundaryEdge {
 }
 
 /// What a face lies on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Carrier {
     /// A patch; the loop runs around its parameters from (0, 0) by way of (1, 0).
-    Patch(Patch),
+    Patch(Box<Patch>),
     /// A plane of the box: 2 · axis + side.
     Plane(u8),
 }
@@ -63,7 +63,8 @@ impl Boundary {
     /// The boundary of the part of a box in which all surfaces are negative, from a net with its curves and patches. `corners`
     /// says for each surface in which corners of the box it is negative.
     pub fn new(bounds: Aabb, net: &Net, curves: &[Curve], patches: Vec<Patch>, corners: &[[bool; 8]]) -> Boundary {
-        let with = |(edge, curve): (&super::quad_net::Edge, &Curve)| BoundaryEdge { ends: edge.ends, curve: Some(*curve) };
+        let with =
+            |(edge, curve): (&super::quad_net::Edge, &Curve)| BoundaryEdge { ends: edge.ends, curve: Some(*curve) };
         let mut made = Boundary {
             bounds,
             vertices: net.vertices.iter().map(|v| v.at).collect(),
@@ -81,7 +82,8 @@ impl Boundary {
         }
         made.add_lines(net, corners, &mut sides);
         for (face, patch) in net.faces.iter().zip(patches) {
-            made.faces.push(BoundaryFace { carrier: Carrier::Patch(patch), loops: vec![face.sides.to_vec()] });
+            made.faces
+                .push(BoundaryFace { carrier: Carrier::Patch(Box::new(patch)), loops: vec![face.sides.to_vec()] });
         }
         for (plane, sides) in sides.into_iter().enumerate() {
             made.add_planar_faces(plane as u8, sides);
@@ -199,7 +201,8 @@ impl Boundary {
         const PARTS: usize = 12;
         let mut points = Vec::with_capacity(walked.len() * PARTS);
         for side in walked {
-            let (curve, parts) = (self.curve(*side), if self.edges[side.0 as usize].curve.is_some() { PARTS } else { 1 });
+            let (curve, parts) =
+                (self.curve(*side), if self.edges[side.0 as usize].curve.is_some() { PARTS } else { 1 });
             points.extend((0..parts).map(|k| flat(sum(&curve, basis(k as f64 / parts as f64)), plane)));
         }
         points

@@ -98,8 +98,7 @@ pub struct Polygons {
 
 /// Corners of a cell's faces, counter-clockwise seen from outside; bit a of a corner is its offset along axis a. Faces in the
 /// order −x, +x, −y, +y, −z, +z.
-const FACES: [[usize; 4]; 6] =
-    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+const FACES: [[usize; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 impl Polygons {
     /// The polygons of the surface where a function is zero, from its values at the nodes of a grid. A value of zero counts as

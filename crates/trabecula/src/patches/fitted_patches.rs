@@ -18,7 +18,7 @@ pub const ON_SIDE: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Parameters within a patch at which distances are fitted, along both directions.
 const IN_PATCH: [f64; 4] = [0.14, 0.38, 0.62, 0.86];
 /// Length, in parts of a side, by which an angle counts as a distance.
-const LEVER: f64 = 0.1;
+const LEVER: f64 = 0.2;
 /// Rounds of least squares.
 const ROUNDS: usize = 4;
 /// Share of the mean diagonal that damps a step.
@@ -56,7 +56,8 @@ impl<const N: usize> Normal<N> {
         for i in 0..N {
             for j in 0..=i {
                 let rest: f64 = (0..j).map(|k| m[i][k] * m[j][k]).sum();
-                m[i][j] = if i == j { (m[i][i] - rest).max(f64::MIN_POSITIVE).sqrt() } else { (m[i][j] - rest) / m[j][j] };
+                m[i][j] =
+                    if i == j { (m[i][i] - rest).max(f64::MIN_POSITIVE).sqrt() } else { (m[i][j] - rest) / m[j][j] };
             }
         }
         let mut x = self.right;
@@ -98,7 +99,8 @@ pub fn curve(field: &dyn Field, ends: [Vec3; 2], normals: [Vec3; 2], plane: Opti
         };
         scale(t, 1.0 / norm(t).max(f64::MIN_POSITIVE))
     });
-    let across: [Vec3; 2] = core::array::from_fn(|k| if plane.is_some() { [0.0; 3] } else { cross(normals[k], along[k]) });
+    let across: [Vec3; 2] =
+        core::array::from_fn(|k| if plane.is_some() { [0.0; 3] } else { cross(normals[k], along[k]) });
     let mut c: Curve = [ends[0], [0.0; 3], [0.0; 3], ends[1]];
     let mut by = [length / 3.0, 0.0, length / 3.0, 0.0];
     let place = |by: &[f64; 4], c: &mut Curve| {

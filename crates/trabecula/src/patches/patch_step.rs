@@ -157,7 +157,8 @@ impl Writer<'_> {
                 let sides: [Side; 4] = core::array::from_fn(|k| face.loops[0][k]);
                 let id = self.patch(patch, sides)?;
                 for (k, (edge, forward)) in sides.into_iter().enumerate() {
-                    let curve = self.file.entity(&format!("PCURVE('',{id},{})", self.lines[k][usize::from(!forward)]))?;
+                    let curve =
+                        self.file.entity(&format!("PCURVE('',{id},{})", self.lines[k][usize::from(!forward)]))?;
                     self.flat[edge as usize].push(curve);
                 }
                 id

@@ -7,8 +7,10 @@
 //! edges of the box is bound to the grid.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use geometry::math::{Vec3, add, scale};
+use geometry::union_find::{labels, singles, unite};
 
 use super::contour_polygons::{Grid, Polygons};
 
@@ -39,6 +41,8 @@ pub struct Vertex {
 pub struct Edge {
     /// Its vertices.
     pub ends: [u32; 2],
+    /// A place between them (mm), near its surface: what tells two edges between the same vertices apart.
+    pub middle: Vec3,
     /// The plane of the box in which it lies.
     pub plane: Option<u8>,
     /// The number of its surface.
@@ -74,7 +78,7 @@ impl Net {
     /// Adds the faces of a surface. `crossing` gives the position (mm) where a grid edge crosses it.
     ///
     /// # Errors
-    /// A grid on which two polygons have two segments in common, whose edges would coincide.
+    /// Polygons that do not fit together.
     pub fn add(
         &mut self,
         grid: &Grid,
@@ -83,6 +87,7 @@ impl Net {
         crossing: &dyn Fn(u64) -> Vec3,
     ) -> Result<(), TooCoarse> {
         let points: Vec<Vec3> = of.edges.iter().map(|e| crossing(*e)).collect();
+        let first = self.edges.len();
         let mut own = Dual { net: self, surface, polygons: Vec::new(), segments: vec![(0, None); of.segments.len()] };
         for polygon in &of.polygons {
             let corners = polygon.corners.iter().map(|c| points[c[0] as usize]);
@@ -94,10 +99,13 @@ impl Net {
             let [a, b] = found.ends.map(|e| points[e as usize]);
             let middle = scale(add(a, b), 0.5);
             own.segments[segment] = match (found.plane, &found.polygons[..]) {
-                (None, &[p, q]) => (own.edge([p, q].map(|p| own.polygons[p as usize]), None), None),
+                (None, &[p, q]) => (own.edge([p, q].map(|p| own.polygons[p as usize]), middle, None), None),
                 (Some(plane), &[p]) => {
                     let on = own.vertex(middle, Place::Plane(plane));
-                    (own.edge([on, own.polygons[p as usize]], None), Some(on))
+                    (
+                        own.edge([on, own.polygons[p as usize]], own.between([on, own.polygons[p as usize]]), None),
+                        Some(on),
+                    )
                 }
                 _ => return Err(TooCoarse),
             };
@@ -115,14 +123,117 @@ impl Net {
             let planes: Vec<u8> = grid.planes(of.edges[e]).collect();
             own.face(of, &found, &planes, (points[e], (of.edges[e] % 3) as u8))?;
         }
-        self.check_distinct()
+        self.separate(first);
+        Ok(())
     }
 
-    fn check_distinct(&self) -> Result<(), TooCoarse> {
-        let mut seen: HashMap<[u32; 2], ()> = HashMap::with_capacity(self.edges.len());
-        let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        let distinct = |e: &Edge| e.ends[0] != e.ends[1] && seen.insert(ordered(e.ends), ()).is_none();
-        if self.edges.iter().all(distinct) { Ok(()) } else { Err(TooCoarse) }
+    /// Divides the edges between vertices that others join too, so that every edge has its own two.
+    fn separate(&mut self, first: usize) {
+        let mut seen: HashMap<[u32; 2], usize> = HashMap::with_capacity(self.edges.len() - first);
+        let mut divided = vec![false; self.edges.len()];
+        for (e, edge) in self.edges.iter().enumerate().skip(first) {
+            let [a, b] = edge.ends;
+            match seen.entry([a.min(b), a.max(b)]) {
+                Entry::Vacant(free) => drop(free.insert(e)),
+                Entry::Occupied(known) => {
+                    divided[e] = true;
+                    divided[*known.get()] = true;
+                }
+            }
+        }
+        if divided.contains(&true) {
+            self.divide(divided);
+        }
+    }
+
+    /// Divides faces into two or four: all edges of the strips of faces, each across opposite sides, to which the given edges
+    /// belong.
+    pub fn divide(&mut self, mut divided: Vec<bool>) {
+        let mut strips = singles(self.edges.len());
+        for face in &self.faces {
+            for k in 0..2 {
+                unite(&mut strips, face.sides[k].0, face.sides[k + 2].0);
+            }
+        }
+        let (strip, count) = labels(&mut strips);
+        let mut wanted = vec![false; count];
+        (0..divided.len()).filter(|e| divided[*e]).for_each(|e| wanted[strip[e] as usize] = true);
+        divided.iter_mut().zip(&strip).for_each(|(d, s)| *d = wanted[*s as usize]);
+        // Each divided edge keeps its number for its first half.
+        let mut halves: Vec<Option<(u32, u32)>> = vec![None; divided.len()];
+        for e in (0..divided.len()).filter(|e| divided[*e]) {
+            let edge = self.edges[e];
+            let place = edge.plane.map_or(Place::Surface, Place::Plane);
+            let middle = self.vertices.len() as u32;
+            self.vertices.push(Vertex { at: edge.middle, place, surface: edge.surface });
+            let [a, b] = edge.ends;
+            self.edges[e] = self.straight([a, middle], edge.plane, edge.surface);
+            halves[e] = Some((middle, self.edges.len() as u32));
+            let second = self.straight([middle, b], edge.plane, edge.surface);
+            self.edges.push(second);
+        }
+        for face in core::mem::take(&mut self.faces) {
+            self.divide_face(&face, &halves);
+        }
+    }
+
+    fn straight(&self, ends: [u32; 2], plane: Option<u8>, surface: u8) -> Edge {
+        let [a, b] = ends.map(|v| self.vertices[v as usize].at);
+        Edge { ends, middle: scale(add(a, b), 0.5), plane, surface }
+    }
+
+    /// Adds the parts of a face whose sides are divided at these vertices, each with the number of its second half.
+    fn divide_face(&mut self, face: &Face, halves: &[Option<(u32, u32)>]) {
+        let surface = face.surface;
+        let middle = face.sides.map(|(e, _)| halves[e as usize]);
+        // The halves of a side in its direction.
+        let half = |k: usize, last: bool| match (face.sides[k], middle[k]) {
+            ((first, forward), Some((_, second))) => (if forward == last { second } else { first }, forward),
+            (side, None) => side,
+        };
+        let joined = |net: &mut Net, ends: [u32; 2]| {
+            let edge = net.straight(ends, None, surface);
+            net.edges.push(edge);
+            net.edges.len() as u32 - 1
+        };
+        let [c0, c1, c2, c3] = face.corners;
+        match middle {
+            [None, None, ..] => self.faces.push(*face),
+            [Some((m0, _)), None, Some((m2, _)), None] | [None, Some((m0, _)), None, Some((m2, _))] => {
+                let k = usize::from(middle[0].is_none());
+                let across = joined(self, [m0, m2]);
+                let c = |i: usize| face.corners[(k + i) % 4];
+                let h = |i: usize, last: bool| half((k + i) % 4, last);
+                self.faces.push(Face {
+                    sides: [h(0, false), (across, true), h(2, true), face.sides[(k + 3) % 4]],
+                    corners: [c(0), m0, m2, c(3)],
+                    surface,
+                });
+                self.faces.push(Face {
+                    sides: [h(0, true), face.sides[(k + 1) % 4], h(2, false), (across, false)],
+                    corners: [m0, c(1), c(2), m2],
+                    surface,
+                });
+            }
+            [Some((m0, _)), Some((m1, _)), Some((m2, _)), Some((m3, _))] => {
+                let corners = [c0, c1, c2, c3].map(|c| self.vertices[c as usize].at);
+                let at = scale(corners.into_iter().fold([0.0; 3], add), 0.25);
+                let center = self.vertices.len() as u32;
+                self.vertices.push(Vertex { at, place: Place::Surface, surface });
+                let m = [m0, m1, m2, m3];
+                let spokes = m.map(|m| joined(self, [m, center]));
+                for k in 0..4 {
+                    let before = (k + 3) % 4;
+                    self.faces.push(Face {
+                        sides: [half(k, false), (spokes[k], true), (spokes[before], false), half(before, true)],
+                        corners: [face.corners[k], m[k], center, m[before]],
+                        surface,
+                    });
+                }
+            }
+            // Opposite sides are divided together.
+            _ => self.faces.push(*face),
+        }
     }
 }
 
@@ -132,7 +243,7 @@ pub struct TooCoarse;
 
 /// Sorts the polygons around a grid edge counter-clockwise, seen from the positive side: across the segment that leads to it
 /// each has the next one. The first of an open fan is the one whose leaving segment lies in a plane of the box.
-fn ordered(of: &Polygons, found: &mut Vec<[u32; 3]>) {
+fn ordered(of: &Polygons, found: &mut [[u32; 3]]) {
     if let Some(first) = found.iter().position(|f| of.segments[f[2] as usize].plane.is_some()) {
         found.swap(0, first);
     }
@@ -160,9 +271,14 @@ impl Dual<'_> {
         self.net.vertices.len() as u32 - 1
     }
 
-    fn edge(&mut self, ends: [u32; 2], plane: Option<u8>) -> u32 {
-        self.net.edges.push(Edge { ends, plane, surface: self.surface });
+    fn edge(&mut self, ends: [u32; 2], middle: Vec3, plane: Option<u8>) -> u32 {
+        self.net.edges.push(Edge { ends, middle, plane, surface: self.surface });
         self.net.edges.len() as u32 - 1
+    }
+
+    fn between(&self, ends: [u32; 2]) -> Vec3 {
+        let [a, b] = ends.map(|v| self.net.vertices[v as usize].at);
+        scale(add(a, b), 0.5)
     }
 
     /// The face of a crossed grid edge: `found` as `ordered` leaves it, `crossing` the place and the axis of the edge.
@@ -182,7 +298,7 @@ impl Dual<'_> {
         match (found.len(), planes, on) {
             (4, [], [None, None]) => {}
             (2, [plane], [Some(first), Some(last)]) => {
-                let closing = self.edge([last, first], Some(*plane));
+                let closing = self.edge([last, first], crossing.0, Some(*plane));
                 corners.push(last);
                 corners.push(first);
                 edges.extend([closing, self.segments[ends[0] as usize].0]);
@@ -190,7 +306,9 @@ impl Dual<'_> {
             (1, [_, _], [Some(first), Some(last)]) => {
                 let corner = self.vertex(crossing.0, Place::Edge(crossing.1));
                 let plane = |s: u32| of.segments[s as usize].plane;
-                let [to, from] = [self.edge([last, corner], plane(ends[1])), self.edge([corner, first], plane(ends[0]))];
+                let [to, from] = [[last, corner], [corner, first]].map(|e| (e, self.between(e)));
+                let to = self.edge(to.0, to.1, plane(ends[1]));
+                let from = self.edge(from.0, from.1, plane(ends[0]));
                 corners.extend([last, corner, first]);
                 edges.extend([to, from, self.segments[ends[0] as usize].0]);
             }
