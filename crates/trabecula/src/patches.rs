@@ -30,7 +30,7 @@ mod shells;
 
 use bezier::{Curve, Patch, basis, frame, on_side, reversed, sum};
 use boundary::Boundary;
-use contour_polygons::{Grid, Polygons, euler};
+use contour_polygons::{Grid, Polygons, crossings, euler};
 use fitted_patches::{ON_SIDE, curve, distances, patch};
 use quad_net::{Net, TooCoarse};
 use relaxed_net::gradients;
@@ -40,6 +40,8 @@ use shells::Shells;
 pub const TOLERANCE: f64 = 1e-3;
 /// Most faces of a file.
 pub const MOST_FACES: f64 = 4e5;
+/// Most nodes of a grid: the next finer one, which is held too, has eight times as many.
+const MOST_NODES: f64 = 4e6;
 /// Grid cells a wavelength to begin with, and at most.
 const CELLS: [f64; 2] = [4.0, 40.0];
 /// How much finer the next grid is after one that is too coarse.
@@ -103,7 +105,7 @@ impl Patches {
         let mut why = "";
         let mut round = 0;
         while cells <= CELLS[1] {
-            let grid = grid(&bounds, solid.wavelength / cells);
+            let grid = grid(&bounds, solid.wavelength / cells).ok_or_else(|| too_many(tolerance))?;
             let mut factor = COARSER;
             for shift in SHIFTS {
                 let from = 1.0 - 0.8f64.powi(round);
@@ -184,8 +186,22 @@ fn smooth_in_box(solid: &Solid) -> Result<(Aabb, Vec<Surface>), Fault> {
     Ok((bounds, own.into_iter().cloned().collect()))
 }
 
-/// A grid that ends at the planes of a box, no coarser than `spacing` (mm).
-fn grid(bounds: &Aabb, spacing: f64) -> Grid {
+/// The refusal of a file that would have too many faces.
+fn too_many(tolerance: f64) -> Stopped {
+    let message = format!(
+        "a STEP file has at most {MOST_FACES:.0} faces, and this one would have more within {} mm; take a smaller region or a \
+         greater tolerance, or write a mesh, such as .3mf or .stl",
+        number(tolerance)
+    );
+    Stopped::Refused(Fault::new("tolerance", message))
+}
+
+/// A grid that ends at the planes of a box, no coarser than `spacing` (mm); none if it has more than `MOST_NODES` nodes.
+fn grid(bounds: &Aabb, spacing: f64) -> Option<Grid> {
+    let nodes: f64 = bounds.size().iter().map(|s| (s / spacing).ceil() + 1.0).product();
+    if nodes > MOST_NODES {
+        return None;
+    }
     let axis = |a: usize| {
         let n = (bounds.size()[a] / spacing).ceil().max(1.0);
         let at = |i: usize| bounds.min[a] + bounds.size()[a] * i as f64 / n;
@@ -193,7 +209,7 @@ fn grid(bounds: &Aabb, spacing: f64) -> Grid {
         all.push(bounds.max[a]);
         all
     };
-    Grid { axes: [0, 1, 2].map(axis) }
+    Some(Grid { axes: [0, 1, 2].map(axis) })
 }
 
 /// What became of a grid.
@@ -223,15 +239,10 @@ fn attempt(
     let mut corners = Vec::new();
     for (surface, field) in fields.iter().enumerate() {
         let values = node_values(*field, grid);
-        let polygons = Polygons::new(grid, &values);
-        if polygons.edges.len() as f64 > MOST_FACES {
-            let message = format!(
-                "a STEP file has at most {MOST_FACES:.0e} faces, and this one would have more within {} mm; take a smaller \
-                 region or a greater tolerance",
-                number(tolerance)
-            );
-            return Err(Stopped::Refused(Fault::new("tolerance", message)));
+        if crossings(grid, &values) as f64 > MOST_FACES {
+            return Err(too_many(tolerance));
         }
+        let polygons = Polygons::new(grid, &values);
         if !progress.step(surface as u64, 8) {
             return Err(Stopped::Interrupted);
         }

@@ -178,6 +178,19 @@ impl Polygons {
     }
 }
 
+/// How many grid edges a surface crosses: the number of faces of its net.
+pub fn crossings(grid: &Grid, values: &[f64]) -> usize {
+    let [nx, ny, _] = grid.shape();
+    let step = [1, nx, nx * ny];
+    let of = |node: usize| {
+        let at = grid.indices(node);
+        let crossed =
+            |a: &usize| at[*a] + 1 < grid.shape()[*a] && (values[node] < 0.0) != (values[node + step[*a]] < 0.0);
+        (0..3).filter(crossed).count()
+    };
+    (0..grid.len()).into_par_iter().with_min_len(4096).map(of).sum()
+}
+
 /// The Euler characteristic of the surface where a function is zero, from its values at the nodes of a grid: that of its
 /// `Polygons`, without making them.
 pub fn euler(grid: &Grid, values: &[f64]) -> i64 {
