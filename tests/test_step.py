@@ -154,6 +154,17 @@ def test_a_cad_kernel_reads_closed_solids_of_cells(cell, part, tmp_path):
     assert abs(made.volume - mesh.volume) < made.deviation * mesh.area
 
 
+def test_a_cad_kernel_reads_closed_voids(tmp_path):
+    pytest.importorskip("OCP.STEPControl")
+    from step_judge import step_solid
+
+    built = cells("primitive", "lower", 0.97, lt.region.box(size=[8, 8, 8])).build()
+    made = built.save_step(tmp_path / "void.step")
+    found = step_solid(tmp_path / "void.step")
+    assert found["valid"] and found["free_edges"] == 0 and found["solids"] == made.solids == 1
+    assert found["volume"] == pytest.approx(made.volume, rel=1e-7) == pytest.approx(0.97 * 512, rel=2e-4)
+
+
 def test_other_maps_and_levels_have_patches(tmp_path):
     turned = cells("diamond", "sheet", map={"rotate": [10, 20, 30]})
     uneven = cells("gyroid", "lower", fraction=lt.grade.linear([1, 0, 0], [[0, 0.3], [10, 0.5]]), wavelength=[6, 8, 10])

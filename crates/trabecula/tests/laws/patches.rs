@@ -123,6 +123,17 @@ fn the_volume_of_whole_cells_is_exact_to_the_tolerance() {
 }
 
 #[test]
+fn a_closed_void_belongs_to_the_solid_around_it() {
+    // Where cos x + cos y + cos z is greatest, in the middle of the box, nothing is solid.
+    let field = lattice("primitive", Part::Lower, 0.97, [1.0; 3], [0.0; 3]);
+    let (summary, text) = made(&solid(cuboid([-0.5; 3], [0.5; 3]), Some(field)), 1e-3);
+    let found = entities(&text);
+    assert_eq!(summary.solids, 1);
+    assert_eq!(["CLOSED_SHELL", "BREP_WITH_VOIDS", "MANIFOLD_SOLID_BREP"].map(|n| count(&found, n)), [2, 1, 0]);
+    assert!((summary.volume - 0.97).abs() < 2e-4, "{summary:?}");
+}
+
+#[test]
 fn what_has_no_patches_is_refused() {
     let field = lattice("gyroid", Part::Sheet, 0.3, [1.0; 3], [0.0; 3]);
     let round = solid(ball([0.0; 3], 1.0), Some(field.clone()));
