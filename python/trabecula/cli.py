@@ -277,8 +277,9 @@ COMMANDS = {
     ),
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
-        f"The name of OUT decides the format: {WRITTEN}; or .step, the exact surface of uncut beams\n"
-        "alone, for CAD systems. With --beams it has the beams themselves: .3mf with the beam lattice extension, or a graph:\n"
+        f"The name of OUT decides the format: {WRITTEN}; or .step, for CAD systems, the exact surface\n"
+        "of uncut beams alone, or smooth patches on lattices in a box, within --tolerance (default: a thousandth of the\n"
+        "wavelength). With --beams it has the beams themselves: .3mf with the beam lattice extension, or a graph:\n"
         ".ltcx, .csv, .json, .obj, .vtu, .inp (Abaqus B31), .bdf (Nastran CBAR).\n"
         "A mesh is written while it is made, in bounded memory, unless the design has a skin, whose\n"
         "closed voids are looked for.\n"

@@ -66,17 +66,24 @@ def mesh(args) -> None:
 
 def mesh_step(args) -> None:
     """``trabecula mesh -o OUT.step``."""
-    names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "tolerance", "triangles")
-    why = "a STEP file: it has the exact surface, and no triangles"
+    names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "triangles")
+    why = "a STEP file: it has smooth faces, and no triangles"
     refuse_others(args, names, ("drop-small", "keep"), why)
 
     def words(made: dict) -> str:
+        near = "exact"
+        if made["angle"] is not None:
+            near = f"within {made['deviation']:.2g} mm, normals within {made['angle']:.2g} degrees"
         return (
             f"{made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, "
-            f"{counted(made['solids'], 'solid')}; exact"
+            f"{counted(made['solids'], 'solid')}; {near}"
         )
 
-    without_mesh(args, lambda solid: solid.save_step(args.output).to_dict(), words)
+    def save(solid: Solid) -> dict:
+        with Progress("fitting patches", args.progress) as progress:
+            return solid.save_step(args.output, args.tolerance, args.threads, progress).to_dict()
+
+    without_mesh(args, save, words)
 
 
 def mesh_beams(args) -> None:

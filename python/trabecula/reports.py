@@ -916,6 +916,11 @@ class SpecificSurface(Report):
 class StepReport(Report):
     """What a STEP file contains."""
 
+    angle: float | None
+    """Greatest angle between the normals of adjacent patches along their common edge, degrees; null for beams."""
+    deviation: float
+    """Greatest distance of patches from the surface that they stand for, mm, at 49 points of each; 0 for beams, which are
+    exact."""
     edges: int
     """Number of edges."""
     faces: int
@@ -925,7 +930,7 @@ class StepReport(Report):
     vertices: int
     """Number of vertices."""
     volume: float
-    """Enclosed volume, mm³, to 1e-10."""
+    """Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches."""
 
 
 class StiffnessReport(Report):

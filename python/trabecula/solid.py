@@ -523,18 +523,30 @@ class Solid(Seen, Simulated):
         apart = {"cluster": cluster, "new": new, "shards": size} if resume or cluster or new or size else None
         return self._save(path, edge, per_cell, threads, progress, islands, chord, apart=apart)
 
-    def save_step(self, path: str | os.PathLike[str]) -> StepReport:
-        """Writes the exact surface of beams alone to a STEP file (.step or .stp; AP214, mm) for CAD systems, and gives its
-        figures.
+    def save_step(
+        self,
+        path: str | os.PathLike[str],
+        tolerance: float | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> StepReport:
+        """Writes a STEP file (.step or .stp; AP214, mm) of smooth faces for CAD systems, and gives its figures. Each connected
+        component is a solid.
 
-        Cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as rational B-splines:
-        nothing is approximated. Each connected component is a solid. A ValueError for whatever else a design has: lattices, a
-        skin, a region that cuts the beams, beams that run into each other without a node.
+        Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
+        rational B-splines. A ValueError for a region that cuts them, and beams that run into each other without a node.
+
+        Of lattices and blends of them in a box the surface is bicubic patches, with planar faces in the box's planes.
+        Patches are no farther than ``tolerance`` (mm; default: a thousandth of ``wavelength``) from the surface, and have its
+        normal at their corners; ``deviation`` (mm) and ``angle`` (degrees, between the normals of adjacent patches) of the
+        report say how near they come. A ValueError for other regions, skins, keep zones, lattices over tetrahedra and blends
+        with beams.
         """
         extension(path, STEP_WRITES)
         name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
+        within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
-            return self._core.write_step(temporary, name)
+            return self._core.write_step(temporary, name, within, thread_count(threads), progress)
 
     def save_beams(
         self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None

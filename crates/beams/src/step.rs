@@ -8,15 +8,12 @@
 use std::collections::HashMap;
 use std::io;
 
+use geometry::formats::part21::{AP214, Id, Part21, Product, list, real, spline_curve};
 use geometry::math::{Vec3, add};
 use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
 use crate::quador::brep::{Brep, CurveKey, Surface, Use};
-
-mod part21;
-
-use part21::{Id, Part21, list, real};
 
 /// What a STEP file contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,11 +39,9 @@ pub fn write_step(quadors: &Quadors, name: &str, out: &mut dyn io::Write) -> Res
 }
 
 fn write(brep: &Brep, name: &str, out: &mut dyn io::Write) -> io::Result<StepSummary> {
-    let mut file = Part21::new(out, name, "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }")?;
+    let mut file = Part21::new(out, name, AP214)?;
     let product = Product::write(&mut file, name)?;
-    let planar = file.entity(
-        "(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()REPRESENTATION_CONTEXT('',''))",
-    )?;
+    let planar = file.parameter_plane()?;
     let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
     let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
     let mut solids = Vec::new();
@@ -63,52 +58,6 @@ fn write(brep: &Brep, name: &str, out: &mut dyn io::Write) -> io::Result<StepSum
     product.finish(&mut file, &solids)?;
     file.finish()?;
     Ok(summary)
-}
-
-/// The entities that say what the solids are, and in which unit.
-struct Product {
-    context: Id,
-    shape: Id,
-    placement: Id,
-}
-
-impl Product {
-    fn write(file: &mut Part21, name: &str) -> io::Result<Product> {
-        let name = part21::string(name);
-        let application = file.entity("APPLICATION_CONTEXT('core data for automotive mechanical design processes')")?;
-        file.entity(&format!(
-            "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{application})"
-        ))?;
-        let context = file.entity(&format!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
-        let product = file.entity(&format!("PRODUCT({name},{name},'',({context}))"))?;
-        file.entity(&format!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
-        let formation = file.entity(&format!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
-        let design = file.entity(&format!("PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"))?;
-        let definition = file.entity(&format!("PRODUCT_DEFINITION('design','',{formation},{design})"))?;
-        let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
-        let length = file.entity("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")?;
-        let angle = file.entity("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")?;
-        let solid_angle = file.entity("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")?;
-        let uncertainty = file.entity(&format!(
-            "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'distance_accuracy_value','')"
-        ))?;
-        let context = file.entity(&format!(
-            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({uncertainty}))\
-             GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))"
-        ))?;
-        let origin = file.point(&[0.0; 3])?;
-        let [z, x] = [file.direction([0.0, 0.0, 1.0])?, file.direction([1.0, 0.0, 0.0])?];
-        let placement = file.entity(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))?;
-        Ok(Product { context, shape, placement })
-    }
-
-    fn finish(self, file: &mut Part21, solids: &[Id]) -> io::Result<()> {
-        let Product { context, shape, placement } = self;
-        let items = list([placement].iter().chain(solids));
-        let representation = file.entity(&format!("ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},{context})"))?;
-        file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"))?;
-        Ok(())
-    }
 }
 
 /// A corner: its point and its vertex.
@@ -276,21 +225,6 @@ impl Writer<'_> {
             }
         };
         self.file.entity(&format!("ORIENTED_EDGE('',*,*,{id},.{}.)", if forward { 'T' } else { 'F' }))
-    }
-}
-
-/// A Bézier curve, rational if it has weights.
-fn spline_curve(points: &[Id], weights: Option<&[f64]>) -> String {
-    let (degree, order) = (points.len() - 1, points.len());
-    let curve = format!("{degree},{},.UNSPECIFIED.,.F.,.F.", list(points));
-    let knots = format!("({order},{order}),(0.,1.),.UNSPECIFIED.");
-    match weights {
-        None => format!("B_SPLINE_CURVE_WITH_KNOTS('',{curve},{knots})"),
-        Some(weights) => format!(
-            "(BOUNDED_CURVE()B_SPLINE_CURVE({curve})B_SPLINE_CURVE_WITH_KNOTS({knots})CURVE()\
-             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_CURVE({})REPRESENTATION_ITEM(''))",
-            list(weights.iter().map(|w| real(*w)))
-        ),
     }
 }
 

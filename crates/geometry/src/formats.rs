@@ -18,6 +18,7 @@ mod npy;
 mod number;
 mod obj;
 mod off;
+pub mod part21;
 mod picture;
 mod ply;
 pub mod stl;

@@ -416,12 +416,21 @@ impl Solid {
         report(py, "SurfaceReport", &SurfaceReport::from(&made.map_err(error::stopped)?))
     }
 
-    /// Writes the exact surface of beams alone to a STEP file at `path`, under the name of a product; gives its
-    /// `reports.StepReport`.
-    fn write_step<'py>(&self, py: Python<'py>, path: PathBuf, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let made = run(py, None, None, |_| {
+    /// Writes a STEP file at `path`, under the name of a product: beams alone exactly, lattices in a box as patches within
+    /// `tolerance` (mm); gives its `reports.StepReport`.
+    #[pyo3(signature = (path, name, tolerance=None, threads=None, progress=None))]
+    fn write_step<'py>(
+        &self,
+        py: Python<'py>,
+        path: PathBuf,
+        name: &str,
+        tolerance: Option<f64>,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let made = run(py, threads, progress, |p| {
             let mut out = BufWriter::new(file::anew(&path).map_err(Stopped::Io)?);
-            self.built.write_step(name, &mut out)
+            self.built.write_step(name, tolerance, &mut out, p)
         })?;
         report(py, "StepReport", &made.map_err(error::stopped)?)
     }

@@ -12,6 +12,7 @@ mod build_level;
 mod build_pattern;
 mod build_property;
 mod build_skin;
+mod build_step;
 mod build_tets;
 mod build_tiling;
 mod built_report;
@@ -54,7 +55,6 @@ use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
 use crate::truss::Beams;
 use crate::volume_mesh;
-use beams::{StepSummary, write_step};
 use geometry::fault::Fault;
 use geometry::fe_mesh::HexMesh;
 use geometry::progress::{Progress, Stopped};
@@ -372,15 +372,20 @@ impl Built {
         Ok(BeamSurface(build_beams::alone(self)?))
     }
 
-    /// Writes the exact surface of beams alone as a STEP file (AP214, mm), under the name of a product.
+    /// Writes a STEP file (AP214, mm) under the name of a product: of beams alone their exact surface, of lattices in a box bicubic
+    /// patches no farther than `tolerance` (mm; a thousandth of the smallest wavelength unless given) from it.
     ///
     /// # Errors
-    /// What else the design contains, as for `beam_surface`; beams without a boundary in closed form; failures of the output.
-    pub fn write_step(&self, name: &str, out: &mut dyn io::Write) -> Result<StepReport, Stopped> {
-        let quadors = build_beams::exact(self).map_err(Stopped::Refused)?;
-        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, name, out)?;
-        let volume = quadors.volume().map_err(Stopped::Refused)?;
-        Ok(StepReport { solids, faces, edges, vertices, volume })
+    /// What else the design contains; beams without a boundary in closed form, and as `Patches::new`; a tolerance for beams;
+    /// failures of the output; an interruption.
+    pub fn write_step(
+        &self,
+        name: &str,
+        tolerance: Option<f64>,
+        out: &mut dyn io::Write,
+        progress: &dyn Progress,
+    ) -> Result<StepReport, Stopped> {
+        build_step::write(self, name, tolerance, out, progress)
     }
 
     /// The chord error (mm) at which `beam_surface` makes a surface unless another resolution is asked for: a fiftieth of the radius

@@ -53,6 +53,7 @@ pub mod lattice;
 pub mod layers;
 pub mod map;
 pub mod mesher;
+pub mod patches;
 pub mod region;
 pub mod report;
 pub mod shell_mesh;

@@ -23,7 +23,7 @@ const LAYERS: &[&[&str]] = &[
     &["mesher", "lattice", "tiling", "truss", "skin", "beam_surface"],
     &["blend"],
     &["solid"],
-    &["extract", "layers", "volume_mesh", "voxel_fractions"],
+    &["extract", "layers", "patches", "volume_mesh", "voxel_fractions"],
     &["analysis", "shell_mesh"],
     &["report"],
     &["effective"],

@@ -146,8 +146,12 @@ pub struct StepReport {
     pub edges: usize,
     /// Number of vertices.
     pub vertices: usize,
-    /// Enclosed volume, mm³, to 1e-10.
+    /// Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches.
     pub volume: f64,
+    /// Greatest distance of patches from the surface that they stand for, mm, at 49 points of each; 0 for beams, which are exact.
+    pub deviation: f64,
+    /// Greatest angle between the normals of adjacent patches along their common edge, degrees; null for beams.
+    pub angle: Option<f64>,
 }
 
 /// What a file of beams contains.

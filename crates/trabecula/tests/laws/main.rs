@@ -15,6 +15,7 @@ mod load_cases;
 mod local_thickness;
 mod measured;
 mod noisy_stress;
+mod patches;
 mod periods;
 mod phase;
 mod pore;

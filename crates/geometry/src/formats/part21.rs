@@ -1,0 +1,215 @@
+//! Text of ISO 10303-21, the clear text encoding of STEP: numbered entities in the order in which they are written; and the
+//! entities that every part has.
+
+use core::fmt::{self, Display, Write as _};
+use std::collections::HashMap;
+use std::io;
+
+use crate::math::Vec3;
+
+/// The schema of the application protocol AP214.
+pub const AP214: &str = "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }";
+
+/// The number of an entity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Id(u64);
+
+impl Display for Id {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "#{}", self.0)
+    }
+}
+
+/// A file that is being written.
+pub struct Part21<'a> {
+    out: &'a mut dyn io::Write,
+    last: u64,
+    /// Entities that others share, by their text.
+    shared: HashMap<String, Id>,
+}
+
+impl<'a> Part21<'a> {
+    /// Starts a file of a schema, under a name. The time stamp is left empty, so that the same data give the same bytes.
+    pub fn new(out: &'a mut dyn io::Write, name: &str, schema: &str) -> io::Result<Part21<'a>> {
+        write!(
+            out,
+            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME({},'',(''),(''),'Trabecula {}','Trabecula','');\n\
+             FILE_SCHEMA(('{schema}'));\nENDSEC;\nDATA;\n",
+            string(name),
+            env!("CARGO_PKG_VERSION")
+        )?;
+        Ok(Part21 { out, last: 0, shared: HashMap::new() })
+    }
+
+    /// Writes an entity.
+    pub fn entity(&mut self, text: &str) -> io::Result<Id> {
+        self.last += 1;
+        writeln!(self.out, "#{}={text};", self.last)?;
+        Ok(Id(self.last))
+    }
+
+    /// An entity of this text: the one that was written before, if any was.
+    pub fn shared(&mut self, text: &str) -> io::Result<Id> {
+        if let Some(known) = self.shared.get(text) {
+            return Ok(*known);
+        }
+        let id = self.entity(text)?;
+        self.shared.insert(text.to_string(), id);
+        Ok(id)
+    }
+
+    /// Writes a point of two or three coordinates.
+    pub fn point(&mut self, at: &[f64]) -> io::Result<Id> {
+        self.entity(&point(at))
+    }
+
+    /// A unit vector, shared.
+    pub fn direction(&mut self, along: Vec3) -> io::Result<Id> {
+        self.shared(&format!("DIRECTION('',{})", list(along.map(real))))
+    }
+
+    /// The context of curves in the parameter planes of surfaces.
+    pub fn parameter_plane(&mut self) -> io::Result<Id> {
+        self.entity(
+            "(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()REPRESENTATION_CONTEXT('',''))",
+        )
+    }
+
+    /// Ends the file.
+    pub fn finish(self) -> io::Result<()> {
+        self.out.write_all(b"ENDSEC;\nEND-ISO-10303-21;\n")?;
+        self.out.flush()
+    }
+}
+
+/// The entities that say what the solids are, and in which unit.
+pub struct Product {
+    context: Id,
+    shape: Id,
+    placement: Id,
+}
+
+impl Product {
+    /// Writes what stands before the solids: a product of this name, lengths in mm, to be finished with the solids.
+    pub fn write(file: &mut Part21, name: &str) -> io::Result<Product> {
+        let name = string(name);
+        let application = file.entity("APPLICATION_CONTEXT('core data for automotive mechanical design processes')")?;
+        file.entity(&format!(
+            "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{application})"
+        ))?;
+        let context = file.entity(&format!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
+        let product = file.entity(&format!("PRODUCT({name},{name},'',({context}))"))?;
+        file.entity(&format!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
+        let formation = file.entity(&format!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
+        let design = file.entity(&format!("PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"))?;
+        let definition = file.entity(&format!("PRODUCT_DEFINITION('design','',{formation},{design})"))?;
+        let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
+        let length = file.entity("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")?;
+        let angle = file.entity("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")?;
+        let solid_angle = file.entity("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")?;
+        let uncertainty = file.entity(&format!(
+            "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'distance_accuracy_value','')"
+        ))?;
+        let context = file.entity(&format!(
+            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({uncertainty}))\
+             GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))"
+        ))?;
+        let origin = file.point(&[0.0; 3])?;
+        let [z, x] = [file.direction([0.0, 0.0, 1.0])?, file.direction([1.0, 0.0, 0.0])?];
+        let placement = file.entity(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))?;
+        Ok(Product { context, shape, placement })
+    }
+
+    /// Writes what follows the solids.
+    pub fn finish(self, file: &mut Part21, solids: &[Id]) -> io::Result<()> {
+        let Product { context, shape, placement } = self;
+        let items = list([placement].iter().chain(solids));
+        let representation = file.entity(&format!("ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},{context})"))?;
+        file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"))?;
+        Ok(())
+    }
+}
+
+fn point(at: &[f64]) -> String {
+    format!("CARTESIAN_POINT('',{})", list(at.iter().map(|v| real(*v))))
+}
+
+/// Items in parentheses.
+pub fn list<T: Display>(items: impl IntoIterator<Item = T>) -> String {
+    let mut out = String::from("(");
+    for (k, item) in items.into_iter().enumerate() {
+        if k > 0 {
+            out.push(',');
+        }
+        // Formatting into a string cannot fail.
+        let _ = write!(out, "{item}");
+    }
+    out.push(')');
+    out
+}
+
+/// A finite number in the fewest digits that read back as the same number.
+pub fn real(v: f64) -> String {
+    let text = format!("{v:?}");
+    match text.split_once('e') {
+        None => text.strip_suffix('0').filter(|t| t.ends_with('.')).unwrap_or(&text).to_string(),
+        Some((digits, power)) => format!("{digits}{}E{power}", if digits.contains('.') { "" } else { "." }),
+    }
+}
+
+/// A string in quotes: apostrophes and backslashes doubled, other characters than printable ASCII as UTF-16.
+pub fn string(text: &str) -> String {
+    let mut out = String::from("'");
+    for c in text.chars() {
+        match c {
+            '\'' => out.push_str("''"),
+            '\\' => out.push_str("\\\\"),
+            ' '..='~' => out.push(c),
+            _ => {
+                out.push_str("\\X2\\");
+                c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| out.push_str(&format!("{unit:04X}")));
+                out.push_str("\\X0\\");
+            }
+        }
+    }
+    out.push('\'');
+    out
+}
+
+/// A Bézier curve, rational if it has weights.
+pub fn spline_curve(points: &[Id], weights: Option<&[f64]>) -> String {
+    let (degree, order) = (points.len() - 1, points.len());
+    let curve = format!("{degree},{},.UNSPECIFIED.,.F.,.F.", list(points));
+    let knots = format!("({order},{order}),(0.,1.),.UNSPECIFIED.");
+    match weights {
+        None => format!("B_SPLINE_CURVE_WITH_KNOTS('',{curve},{knots})"),
+        Some(weights) => format!(
+            "(BOUNDED_CURVE()B_SPLINE_CURVE({curve})B_SPLINE_CURVE_WITH_KNOTS({knots})CURVE()\
+             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_CURVE({})REPRESENTATION_ITEM(''))",
+            list(weights.iter().map(|w| real(*w)))
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_a_point_and_read_back() {
+        let cases =
+            [(0.0, "0."), (1.0, "1."), (-2.5, "-2.5"), (1e-7, "1.E-7"), (1.25e300, "1.25E300"), (100.0, "100.")];
+        for (v, text) in cases {
+            assert_eq!(real(v), text);
+        }
+        for v in [0.1 + 0.2, core::f64::consts::PI * 1e-9, f64::MIN_POSITIVE, -1e22] {
+            assert_eq!(real(v).parse::<f64>(), Ok(v));
+        }
+    }
+
+    #[test]
+    fn strings_are_printable_ascii() {
+        assert_eq!(string("a 'b' \\"), "'a ''b'' \\\\'");
+        assert_eq!(string("Ø"), "'\\X2\\00D8\\X0\\'");
+    }
+}

@@ -1,0 +1,41 @@
+//! STEP files of designs: beams alone exactly, lattices in a box as patches.
+
+use std::io;
+
+use super::{Built, build_beams};
+use crate::patches::{PatchSummary, Patches, TOLERANCE};
+use crate::report::StepReport;
+use ::beams::{StepSummary, write_step};
+use geometry::fault::Fault;
+use geometry::progress::{Progress, Stage, Stopped};
+
+/// Writes the STEP file of a design, as `Built::write_step` says.
+pub(super) fn write(
+    built: &Built,
+    name: &str,
+    tolerance: Option<f64>,
+    out: &mut dyn io::Write,
+    progress: &dyn Progress,
+) -> Result<StepReport, Stopped> {
+    let refuse = |at: &str, message: &str| Err(Stopped::Refused(Fault::new(at, message)));
+    if built.lattices.is_empty() && built.tilings.is_empty() {
+        if tolerance.is_some() {
+            let message = "tolerance is of patches on lattices; a STEP file of beams is exact: leave it out";
+            return refuse("tolerance", message);
+        }
+        let quadors = build_beams::exact(built).map_err(Stopped::Refused)?;
+        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, name, out)?;
+        let volume = quadors.volume().map_err(Stopped::Refused)?;
+        return Ok(StepReport { solids, faces, edges, vertices, volume, deviation: 0.0, angle: None });
+    }
+    if !built.tilings.is_empty() {
+        let message = "a STEP file has patches of smooth surfaces, and a lattice over tetrahedra has creases between them; \
+                       write a mesh instead, such as .3mf or .stl";
+        return refuse("lattice", message);
+    }
+    let tolerance = tolerance.unwrap_or(TOLERANCE * built.solid.wavelength);
+    let made = Patches::new(&built.solid, tolerance, &Stage { whole: progress, from: 0.0, to: 0.8 })?;
+    made.write_step(name, out, &Stage { whole: progress, from: 0.8, to: 1.0 })?;
+    let PatchSummary { solids, faces, edges, vertices, volume, deviation, angle } = made.summary();
+    Ok(StepReport { solids, faces, edges, vertices, volume, deviation, angle: Some(angle) })
+}
