@@ -180,7 +180,7 @@ fn users(grid: &Grid, name: u128) -> [usize; 2] {
         node /= grid.axes[a].len();
         let last_tile = tiles[a] - 1;
         // Two tiles meet in a node plane.
-        let both = at % TILE == 0 && spans >> a & 1 == 0;
+        let both = at.is_multiple_of(TILE) && spans >> a & 1 == 0;
         last[a] = (at / TILE).min(last_tile);
         first[a] = if both { (at / TILE).saturating_sub(1) } else { last[a] };
     }
