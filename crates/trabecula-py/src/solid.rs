@@ -65,6 +65,8 @@ impl Solid {
     }
 }
 
+/// A number and a 3 × 3 matrix for each point.
+type CellAt<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 /// Names, and a column of numbers (n, names) for each.
 type NamedColumns<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
 
@@ -275,7 +277,7 @@ impl Solid {
         py: Python<'py>,
         lattice: &str,
         points: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>)>> {
+    ) -> PyResult<Option<CellAt<'py>>> {
         let Some((_, found)) = self.built.lattices.iter().find(|(n, _)| n == lattice) else { return Ok(None) };
         let points = arrays::points(&points)?;
         let n = points.len();
