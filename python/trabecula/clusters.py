@@ -22,6 +22,8 @@ __all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
 PATIENCE = 30
 #: Tasks that wait at each thread of a worker: enough to keep it busy, few enough for the scheduler's memory.
 WAITING = 2
+#: Environment of workers here: freed memory is used again rather than given back at once, which costs as much as the work.
+MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25, "OMP_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1}
 #: How often a task is tried that ends with its worker.
 TRIES = 20
 
@@ -55,7 +57,7 @@ def _client(dask: Any, cluster: str) -> Any:
         if not count.isdigit() or not 1 <= int(count) <= 4096:
             raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
         # A worker that is killed is started again: its task is not to blame.
-        with _settings({"distributed.scheduler.allowed-failures": 1000}):
+        with _settings({"distributed.scheduler.allowed-failures": 1000, "distributed.nanny.pre-spawn-environ": MEMORY}):
             local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
             # Results do not go by way of the scheduler, which is in this process.
             return dask.Client(n_workers=int(count), direct_to_workers=True, **local)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["measure", "save", "save_voxels"]
 
 #: Bytes of a range, about: what a worker makes, and sends, at a time.
-WANTED = 1 << 22
+WANTED = 1 << 25
 #: Bytes of the header and of a triangle of a binary STL, and the most triangles that it counts.
 HEADER, RECORD, MOST = 84, 50, 2**32 - 1
 

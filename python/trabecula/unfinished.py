@@ -176,11 +176,12 @@ class Unfinished:
         """
         if self.stage and "done" in self.stage[-1]:
             return
-        moves, to = [], self.first
+        # The moves of an earlier run are gone on with as they were divided.
+        moves, to, most = [], self.first, self.stage[0]["most"] if self.stage else CHUNK
         for start, end in kept:
             at, last = self.first + start * size, self.first + end * size
             while at < last and at != to:
-                length = min(last - at, CHUNK)
+                length = min(last - at, most)
                 moves.append((at, to, length))
                 at, to = at + length, to + length
             to += last - at
@@ -200,7 +201,7 @@ class Unfinished:
                 _write(file, chunk)
                 file.flush()
                 os.fsync(file.fileno())
-            self._staged({"move": n, "sha256": _sha256(chunk)})
+            self._staged({"move": n, "most": most, "sha256": _sha256(chunk)})
             self._put(place, chunk)
         self._data.truncate(to)
         for at, content in ((0, header), (to, tail)):

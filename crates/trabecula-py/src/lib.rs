@@ -100,7 +100,7 @@ mod _core {
         Ok(pyo3::types::PyBytes::new(py, &bytes))
     }
 
-    /// The first bytes of a binary STL of so many triangles.
+    /// The first bytes of a binary STL, given the number of its triangles.
     #[pyfunction]
     fn stl_header(py: Python<'_>, triangles: u32) -> Bound<'_, pyo3::types::PyBytes> {
         pyo3::types::PyBytes::new(py, &crate::ranges::stl_header(triangles))

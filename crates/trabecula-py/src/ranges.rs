@@ -213,7 +213,7 @@ fn joined_already() -> PyErr {
     PyValueError::new_err("the ranges are joined already")
 }
 
-/// The first bytes of a binary STL of so many triangles.
+/// The first bytes of a binary STL, given the number of its triangles.
 pub fn stl_header(triangles: u32) -> [u8; stl::HEADER] {
     stl::header(triangles)
 }

@@ -1,5 +1,5 @@
-//! What is known of a range of tiles once they are extracted: their components, joined as far as the range alone says how, and what
-//! the tiles around it need. It goes to other processes, and into files, as bytes.
+//! What is known of a range of tiles once they are extracted: their components, joined where the range alone says how, and what the
+//! tiles around it need. It goes to other processes, and into files, as bytes.
 //!
 //! Totals stay those of each tile: they are summed in the order of the tiles, whatever the ranges, and so to the same bits.
 

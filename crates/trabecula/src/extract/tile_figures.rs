@@ -146,7 +146,7 @@ impl FigureSums {
         }
     }
 
-    /// From bytes; of so many components.
+    /// From bytes, given the number of components.
     pub fn unpack(from: &mut Unpacker, components: usize) -> Result<FigureSums, Fault> {
         let mut sums = FigureSums { balance: from.word()?, ..FigureSums::default() };
         let all = from.reals()?;

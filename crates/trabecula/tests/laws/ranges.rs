@@ -31,7 +31,7 @@ fn ranges(solid: &Solid, edge: f64, size: usize, runs: usize) -> Vec<RangeMade> 
             Ok(())
         };
         tiles
-            .each(part(run)..if run + 1 == runs { usize::MAX } else { part(run + 1) }, size, &Silent, take)
+            .surface(part(run)..if run + 1 == runs { usize::MAX } else { part(run + 1) }, size, &Silent, take)
             .expect("ranges");
     }
     made
