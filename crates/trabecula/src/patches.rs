@@ -44,6 +44,8 @@ pub const MOST_FACES: f64 = 4e5;
 const MOST_NODES: f64 = 4e6;
 /// Grid cells a wavelength to begin with, and at most.
 const CELLS: [f64; 2] = [4.0, 40.0];
+/// Cells a wavelength of the grid whose topology counts, where its nodes are not too many.
+const FINE: f64 = 32.0;
 /// How much finer the next grid is after one that is too coarse.
 const COARSER: f64 = 1.25;
 /// Shifts of the level that are tried, in tolerances: where a surface touches itself, the box or one of its edges, one that is
@@ -102,7 +104,7 @@ impl Patches {
     pub fn new(solid: &Solid, tolerance: f64, progress: &dyn Progress) -> Result<Patches, Stopped> {
         let (bounds, surfaces) = smooth_in_box(solid).map_err(Stopped::Refused)?;
         let mut cells = CELLS[0];
-        let mut why = "";
+        let mut why = "patches are not near enough on the finest grid";
         let mut round = 0;
         while cells <= CELLS[1] {
             let grid = grid(&bounds, solid.wavelength / cells).ok_or_else(|| too_many(tolerance))?;
@@ -111,7 +113,7 @@ impl Patches {
                 let from = 1.0 - 0.8f64.powi(round);
                 let stage = Stage { whole: progress, from, to: from + 0.2 * (1.0 - from) };
                 round += 1;
-                match attempt(&bounds, &grid, &surfaces, (tolerance, shift), &stage)? {
+                match attempt(&bounds, &grid, &surfaces, (tolerance, shift, solid.wavelength / FINE), &stage)? {
                     Attempt::Made(made) => return Ok(*made),
                     Attempt::Off(deviation) => {
                         factor = (deviation / (0.7 * tolerance)).powf(0.25).clamp(1.1, 1.7);
@@ -226,7 +228,7 @@ fn attempt(
     bounds: &Aabb,
     grid: &Grid,
     surfaces: &[Surface],
-    (tolerance, shift): (f64, f64),
+    (tolerance, shift, finest): (f64, f64, f64),
     progress: &dyn Progress,
 ) -> Result<Attempt, Stopped> {
     let by = |of: &Surface| shift * tolerance * mean_slope(&*of.field, grid);
@@ -234,7 +236,10 @@ fn attempt(
         surfaces.iter().map(|s| if shift == 0.0 { s.clone() } else { s.clone().offset(by(s)) }).collect();
     let fields: &[&dyn Field] = &shifted.iter().map(|s| &*s.field).collect::<Vec<_>>();
     let asked: &[&dyn Field] = &surfaces.iter().map(|s| &*s.field).collect::<Vec<_>>();
-    let fine = refined(grid);
+    let mut fine = refined(grid);
+    while widest(&fine, bounds) > finest && fine.len() as f64 <= MOST_NODES {
+        fine = refined(&fine);
+    }
     let mut net = Net::default();
     let mut corners = Vec::new();
     for (surface, field) in fields.iter().enumerate() {
@@ -258,7 +263,7 @@ fn attempt(
             values[grid.node([0, 1, 2].map(|a| if c >> a & 1 == 1 { last[a] } else { 0 }))] < 0.0
         }));
     }
-    let spacing = (0..3).map(|a| bounds.size()[a] / (grid.shape()[a] - 1) as f64).fold(0.0, f64::max);
+    let spacing = widest(grid, bounds);
     let fitted = match fit(&mut net, bounds, [fields, asked], (tolerance, spacing), progress)? {
         Ok(fitted) => fitted,
         Err(attempt) => return Ok(attempt),
@@ -328,6 +333,11 @@ fn across(net: &Net, faces: &[usize]) -> Vec<bool> {
         }
     }
     divided
+}
+
+/// The longest edge of a grid's cells (mm).
+fn widest(grid: &Grid, bounds: &Aabb) -> f64 {
+    (0..3).map(|a| bounds.size()[a] / (grid.shape()[a] - 1) as f64).fold(0.0, f64::max)
 }
 
 /// The grid with twice as many cells along each axis.
