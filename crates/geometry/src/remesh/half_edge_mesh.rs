@@ -107,7 +107,7 @@ impl HalfEdgeMesh {
         self.twin(prev(h))
     }
 
-    /// The half-edges that leave `v`, counter-clockwise; at a boundary as far as it.
+    /// The half-edges that leave `v`, counter-clockwise; up to a boundary.
     pub fn leaving(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
         let first = self.out[v as usize];
         let mut now = first;

@@ -8,13 +8,13 @@ use crate::mesh::Mesh;
 
 /// Triangles of a block: as many as keep its working memory in the tens of megabytes.
 pub const BLOCK: usize = 1 << 18;
-/// Triangles that are looked at to choose the size of blocks.
+/// Triangles that are counted to choose the size of blocks.
 const SAMPLE: usize = 1 << 18;
 /// Most blocks along an axis.
 const MOST: f64 = 400.0;
 /// Blocks become smaller by this factor until none holds too many triangles.
 const FINER: f64 = 1.25;
-/// A share of the block's edge and of the largest coordinate within which a face of a block is not told from the next.
+/// A share of the block's edge and of the largest coordinate within which a point counts to neither side of a face.
 const CLOSE: f64 = 1e-9;
 
 /// Blocks and the triangles that come near each.
@@ -122,7 +122,7 @@ impl Blocks {
         self.reach(b).grown(-self.close)
     }
 
-    /// Block `b` and what is too close to its faces to be told apart.
+    /// Block `b` with what is too close to its faces.
     pub fn around(&self, b: usize) -> Aabb {
         self.reach(b).grown(self.close)
     }

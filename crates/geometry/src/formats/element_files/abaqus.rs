@@ -110,8 +110,8 @@ fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
 /// The forces at nodes of a load on a set.
 pub(super) type Forces<'a> = dyn Fn(&str, Vec3) -> Option<Vec<(u32, Vec3)>> + 'a;
 
-/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the domains, whose
-/// nodes have so many degrees of freedom.
+/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the domains, with
+/// the number of degrees of freedom of their nodes.
 pub(super) fn step(
     text: &FeText,
     (domains, freedoms): (&[&str], usize),
