@@ -835,7 +835,7 @@ class ShellReport(Report):
     sets: dict[str, SetReport]
     """The named sets; faces are edges on the border."""
     straight: int
-    """Number of edges of quadratic triangles that stayed straight, on the border where it is no plane normal to an axis."""
+    """Number of edges of quadratic triangles that stayed straight: on the border where it is no bounding plane."""
     thickest: float
     """Greatest thickness at a node, mm."""
     thinnest: float
