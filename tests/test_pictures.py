@@ -101,7 +101,7 @@ def test_the_command_draws_at_a_size_in_print(mesh, tmp_path):
     in_process("render", tmp_path / "box.stl", "-o", tmp_path / "wide.svg", "--size", "1800x900mm")
     assert paths((tmp_path / "wide.svg").read_text())[1:3] == ("1800mm", "900mm")
     for dpi in (1e300, 1e-3):
-        with pytest.raises(ValueError, match="a drawing is 0.1 to 1e5 mm wide"):
+        with pytest.raises(ValueError, match=r"a drawing is 0\.1 to 1e5 mm wide"):
             mesh.svg(dpi=dpi)
     with pytest.raises(ValueError, match='section is "4"'):
         mesh.view(section=4)

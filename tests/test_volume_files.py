@@ -437,7 +437,7 @@ def test_fields_say_what_the_design_does_at_nodes(tmp_path):
         "level.fraction.linear = { along = [0, 0, 1], stops = [[-4, 0.2], [4, 0.4]] }\n"
     )
     out = tmp_path / "part.vtu"
-    in_process("volume", design, "-o", out, "--per-cell", "12", "--fields", "fraction,share,orientation,wavelength")
+    in_process("volume", design, "-o", out, "--per-cell", "16", "--fields", "fraction,share,orientation,wavelength")
     read = pytest.importorskip("meshio").read(out)
     data, z = read.point_data, read.points[:, 2]
     np.testing.assert_allclose(data["solid_fraction"], 0.3 + z / 40, rtol=1e-12)
@@ -446,8 +446,8 @@ def test_fields_say_what_the_design_does_at_nodes(tmp_path):
     c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
     for name, axis in {"axis_1": [c, s, 0], "axis_2": [-s, c, 0], "axis_3": [0, 0, 1]}.items():
         np.testing.assert_allclose(data[name], np.broadcast_to(axis, (len(z), 3)), atol=1e-12)
-    in_process("volume", design, "-o", tmp_path / "c.vtu", "--per-cell", "12", "--fields", "colour", status=1)
-    in_process("volume", design, "-o", tmp_path / "c.inp", "--per-cell", "12", "--fields", "fraction", status=1)
+    in_process("volume", design, "-o", tmp_path / "c.vtu", "--per-cell", "16", "--fields", "colour", status=1)
+    in_process("volume", design, "-o", tmp_path / "c.inp", "--per-cell", "16", "--fields", "fraction", status=1)
     assert not (tmp_path / "c.inp").exists() and not (tmp_path / "c.vtu").exists()
 
 

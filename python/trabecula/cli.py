@@ -390,8 +390,8 @@ COMMANDS = {
             "--of",
             choices=("solid", "pore", "lower", "upper", "all", "shell"),
             default="solid",
-            help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes; or shell: triangles on\n"
-            "the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu)",
+            help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes; "
+            "or shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu)",
         ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
@@ -400,8 +400,8 @@ COMMANDS = {
             "--fields",
             type=names,
             metavar="NAMES",
-            help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), orientation (unit\n"
-            "vectors along the cell's axes), wavelength",
+            help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), "
+            "orientation (unit vectors along the cell's axes), wavelength",
         ),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(

@@ -69,7 +69,8 @@ def resolution(args) -> tuple[tuple[int, int], float | None]:
         finer = MOST_PIXELS / max(wide, high)
         return (max(1, round(wide * finer)), max(1, round(high * finer))), dpi
     if max(across, down) > MOST_PIXELS:
-        raise Refused(f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels; at most {MOST_PIXELS} are possible each")
+        found = f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels"
+        raise Refused(f"{found}; at most {MOST_PIXELS} are possible each")
     return (across, down), dpi
 
 

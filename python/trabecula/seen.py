@@ -65,7 +65,8 @@ class Seen(Picture):
         name = lattice if lattice is not None or not names else names[0]
         found = None if name is None else self._core.cell_at(name, _points(points))
         if found is None:
-            raise ValueError(f"there is no lattice named {name}; there are {', '.join(names)}" if names else "the design has no lattice")
+            there = f"there is no lattice named {name}; there are {', '.join(names)}" if names else "the design has no lattice"
+            raise ValueError(there)
         fraction, gradients = found
         columns = np.linalg.inv(gradients).transpose(0, 2, 1)
         wavelength = np.linalg.norm(columns, axis=2)

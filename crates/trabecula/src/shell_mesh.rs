@@ -84,17 +84,19 @@ pub fn shell_mesh(
         return refuse("the region holds none of the sheet's mid-surface");
     }
     let bounds = solid.region.bounds();
-    border_slivers::merge(&mut open, &bounds, options.edge);
-    let border = border(&open.triangles);
-    let mut mesh = ShellMesh { nodes: open.vertices, triangles: open.triangles, ..ShellMesh::default() };
-    let mut inner = vec![true; mesh.nodes.len()];
-    border.iter().flat_map(|e| mesh.edge(*e).take(2)).for_each(|n| inner[n as usize] = false);
-    mesh.nodes.par_iter_mut().zip(&inner).for_each(|(p, inner)| {
+    // First, since the border may then run through an edge of the bounds.
+    let mut inner = vec![true; open.vertices.len()];
+    let ends = |(t, k): (u32, u8)| [k, (k + 1) % 3].map(|k| open.triangles[t as usize][k as usize]);
+    border(&open.triangles).into_iter().flat_map(ends).for_each(|n| inner[n as usize] = false);
+    open.vertices.par_iter_mut().zip(&inner).for_each(|(p, inner)| {
         let common = planes(*p, &bounds);
         if *inner || common != 0 {
             *p = middle.nearest(*p, 0.5 * options.edge, |g| if *inner { g } else { held(g, common) }).unwrap_or(*p);
         }
     });
+    border_slivers::merge(&mut open, &bounds, options.edge);
+    let border = border(&open.triangles);
+    let mut mesh = ShellMesh { nodes: open.vertices, triangles: open.triangles, ..ShellMesh::default() };
     let straight = if options.quadratic { add_middles(&mut mesh, &border, &middle, &bounds) } else { 0 };
     let reach = 0.5 * solid.wavelength;
     mesh.thickness = mesh.nodes.par_iter().map(|p| middle.thickness(*p, reach)).collect();
