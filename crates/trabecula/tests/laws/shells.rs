@@ -55,12 +55,13 @@ proptest! {
             .filter(|n| exact(*n) && (value(&*sheet, mesh.nodes[*n]) + t).abs() > 1e-9)
             .collect();
         prop_assert!(mesh.thickness.iter().all(|t| *t > 0.0));
-        prop_assert!(off.len() <= made.straight && off.iter().all(|n| *n >= linear.nodes.len()), "{off:?}");
+        prop_assert!(off.len() <= made.straight && off.iter().all(|n| *n >= linear.nodes.len()), "{:?}", off);
         prop_assert!(off.len() * 1000 < mesh.nodes.len(), "{} of {}", off.len(), mesh.nodes.len());
         // Every edge of the border is on a bounding plane, or straight; and a closed curve: each node has two.
         let on_planes: usize =
             ["X0", "X1", "Y0", "Y1", "Z0", "Z1"].iter().filter_map(|s| mesh.set(s)).map(|s| s.faces.len()).sum();
-        prop_assert!(if round { made.straight >= border.faces.len() } else { on_planes == border.faces.len() });
+        let all = if round { made.straight >= border.faces.len() } else { on_planes == border.faces.len() };
+        prop_assert!(all, "{} straight, {} on planes, {} in all", made.straight, on_planes, border.faces.len());
         let mut ends = vec![0; linear.nodes.len()];
         border.faces.iter().flat_map(|e| mesh.edge(*e).take(2)).for_each(|n| ends[n as usize] += 1);
         prop_assert!(ends.iter().all(|n| *n == 0 || *n == 2));
