@@ -59,7 +59,20 @@ class FiniteElements:
 
     _of_sets = "faces"
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells
-    _figures: VolumeReport | VoxelElementsReport | ShellReport
+
+    @cached_property
+    def _figures(self) -> Any:
+        return self._core.report()
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid, mm³: of all domains of tetrahedra, of each hexahedron its solid share, of shells the thickness
+        integrated over the area.
+        """
+        return self._figures.volume
+
+    def _named_sets(self) -> dict[str, VolumeSet]:
+        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
 
     def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
@@ -107,7 +120,7 @@ class FiniteElements:
 
     def _of_elements(self) -> dict[str, NDArray]:
         """What each element has."""
-        raise NotImplementedError
+        return {}
 
     def _field(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
         """A field of a file: a row for each node or element."""
@@ -174,7 +187,7 @@ class VolumeMesh(FiniteElements):
         they belong to the solid. Nodes and tetrahedra are those of the faces. SKIN, KEEP_NAME: all nodes and tetrahedra of a
         skin or keep zone, and their faces on the boundary.
         """
-        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
+        return self._named_sets()
 
     @cached_property
     def pairs(self) -> NDArray[np.uint32]:
@@ -183,18 +196,9 @@ class VolumeMesh(FiniteElements):
         """
         return self._core.pairs
 
-    @cached_property
-    def _figures(self) -> VolumeReport:
-        return self._core.report()
-
     def report(self) -> VolumeReport:
         """The figures: numbers of elements and nodes, volume, dihedral angles, distance from the surface, domains, sets."""
         return copy.deepcopy(self._figures)
-
-    @property
-    def volume(self) -> float:
-        """Volume of all domains, mm³."""
-        return self._figures.volume
 
     def boundary(self) -> Mesh:
         """The boundary of all domains together as a closed surface, straight between corners."""
@@ -290,23 +294,14 @@ class VoxelElements(FiniteElements):
         """The named sets that are not empty: X0 X1 Y0 Y1 Z0 Z1, the faces on the sides of the grid; SURFACE, the rest of the
         boundary; and those of the design. Faces (n, 2) are a hexahedron and the number, from 0, of S1 to S6 of Abaqus.
         """
-        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
+        return self._named_sets()
 
     def _of_elements(self) -> dict[str, NDArray]:
         return {"fraction": self.fraction}
 
-    @cached_property
-    def _figures(self) -> VoxelElementsReport:
-        return self._core.report()
-
     def report(self) -> VoxelElementsReport:
         """The figures: numbers of elements and nodes, solid volume, what was left out, sets."""
         return copy.deepcopy(self._figures)
-
-    @property
-    def volume(self) -> float:
-        """Solid volume, mm³: of each hexahedron its solid share."""
-        return self._figures.volume
 
     def write(
         self,
@@ -361,20 +356,11 @@ class ShellMesh(FiniteElements):
         one triangle only; and those of the design, all triangles within their region. Faces (n, 2) are edges: a triangle, and
         the corner from which the edge goes to the next one.
         """
-        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
-
-    @cached_property
-    def _figures(self) -> ShellReport:
-        return self._core.report()
+        return self._named_sets()
 
     def report(self) -> ShellReport:
         """The figures: numbers of triangles and nodes, area, volume, thickness, angles, sets."""
         return copy.deepcopy(self._figures)
-
-    @property
-    def volume(self) -> float:
-        """Volume, mm³: the thickness integrated over the area."""
-        return self._figures.volume
 
     def write(
         self,
@@ -393,9 +379,6 @@ class ShellMesh(FiniteElements):
         of ``VolumeMesh.write``, for .vtu.
         """
         self._write(path, extension(path, SHELL_WRITES), (E, nu), (hold, load), fields)
-
-    def _of_elements(self) -> dict[str, NDArray]:
-        return {}
 
 
 def _resultant(name: str, value: Sequence[float]) -> list[float]:

@@ -1,12 +1,13 @@
 //! What meshes for finite elements give and take: sets, forces and fields as arrays, files.
 
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use geometry::fe_mesh::FeSet;
-use geometry::formats::FeField;
+use geometry::formats::{FeField, FeText};
 use geometry::math::Vec3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::file;
@@ -38,6 +39,23 @@ pub fn forces(py: Python<'_>, of: Vec<(u32, Vec3)>) -> PyResult<Forces<'_>> {
 /// A field as the core takes it.
 pub fn field((name, components, at_nodes, values): Field) -> FeField {
     FeField { name, components, at_nodes, values }
+}
+
+/// What writes a mesh of one kind.
+type Writer<M> = fn(&M, &FeText, &mut dyn Write) -> io::Result<()>;
+
+/// Writes a mesh as a file, given as path, suffix and title, in one of its formats.
+pub fn write_as<M: Sync>(
+    py: Python<'_>,
+    mesh: &M,
+    formats: &[(&str, &str, Writer<M>)],
+    (path, suffix, title): (PathBuf, String, String),
+    text: FeText,
+) -> PyResult<()> {
+    let Some((.., write)) = formats.iter().find(|f| f.0 == suffix) else {
+        return Err(PyValueError::new_err(format!("no format of this mesh is named {suffix}")));
+    };
+    to_file(py, &path, |out| write(mesh, &FeText { title, ..text }, out))
 }
 
 /// Writes a file that is made anew.

@@ -21,7 +21,11 @@ use crate::solid::{Measured, Solid, islands_word, measured};
 type Range<'py> = (usize, usize, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
 /// Calls `take` with a range; what it raises is put aside and ends the work.
-fn told(take: &Py<PyAny>, raised: &Mutex<Option<PyErr>>, range: (usize, usize, &[u8], &[u8])) -> Result<(), Stopped> {
+fn hand_over(
+    take: &Py<PyAny>,
+    raised: &Mutex<Option<PyErr>>,
+    range: (usize, usize, &[u8], &[u8]),
+) -> Result<(), Stopped> {
     let call = Python::attach(|py| {
         let range: Range<'_> = (range.0, range.1, PyBytes::new(py, range.2), PyBytes::new(py, range.3));
         take.call1(py, range).map(drop)
@@ -84,7 +88,7 @@ impl TileRanges {
         threads: Option<usize>,
     ) -> PyResult<()> {
         let raised: Mutex<Option<PyErr>> = Mutex::default();
-        let taken = |m: RangeMade| told(&take, &raised, (m.tiles.start, m.tiles.end, &m.records, &m.partial));
+        let taken = |m: RangeMade| hand_over(&take, &raised, (m.tiles.start, m.tiles.end, &m.records, &m.partial));
         let made = run(py, threads, None, |p| match self.figures {
             false => self.tiles.surface(start..end, size, p, taken),
             true => self.tiles.figures(start..end, size, p, taken),
@@ -156,7 +160,7 @@ impl VoxelRanges {
                 let next = ((at / size + 1) * size).min(end);
                 let voxels = self.grid.layers(solid, at..next, p)?;
                 let count = voxels.iter().map(|v| u64::from(*v)).sum::<u64>();
-                told(&take, &raised, (at, next, &voxels, &count.to_le_bytes()))?;
+                hand_over(&take, &raised, (at, next, &voxels, &count.to_le_bytes()))?;
                 at = next;
             }
             Ok(())
@@ -197,8 +201,8 @@ impl Joined {
         let ranges = self.ranges.take().ok_or_else(joined_already)?;
         let made = py.detach(|| ranges.finish(&options)).map_err(error::stopped)?;
         let kept = made.kept.iter().map(|r| (r.start, r.end)).collect();
-        let told = report(py, "SurfaceReport", &SurfaceReport::from(&made.summary))?;
-        Ok((told, made.summary.components.words(), kept, made.triangles))
+        let summary = report(py, "SurfaceReport", &SurfaceReport::from(&made.summary))?;
+        Ok((summary, made.summary.components.words(), kept, made.triangles))
     }
 
     /// The figures of the whole surface, in a region of this volume (mm³): as `Solid.measure`.

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 
 use geometry::formats::{FeText, SHELL_FORMATS};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::report::ShellReport;
 use trabecula::shell_mesh::{Made, Options};
 
 use crate::error;
-use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
+use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -101,12 +100,9 @@ impl Shells {
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let (path, suffix, title) = file;
-        let Some((.., write)) = SHELL_FORMATS.iter().find(|f| f.0 == suffix) else {
-            return Err(PyValueError::new_err(format!("no format of shells is named {suffix}")));
-        };
-        let text = FeText { title, elastic, held, loads, fields: fields.into_iter().map(field).collect() };
-        to_file(py, &path, |out| write(&self.made.mesh, &text, out))
+        let text =
+            FeText { elastic, held, loads, fields: fields.into_iter().map(field).collect(), ..FeText::default() };
+        write_as(py, &self.made.mesh, &SHELL_FORMATS, file, text)
     }
 }
 

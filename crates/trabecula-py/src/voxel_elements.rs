@@ -5,12 +5,11 @@ use std::path::PathBuf;
 use geometry::fe_mesh::HexMesh;
 use geometry::formats::{FeText, HEX_FORMATS};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::report::VoxelElementsReport;
 
 use crate::error;
-use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
+use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -91,12 +90,9 @@ impl VoxelElements {
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let (path, suffix, title) = file;
-        let Some((.., write)) = HEX_FORMATS.iter().find(|f| f.0 == suffix) else {
-            return Err(PyValueError::new_err(format!("no format of voxels is named {suffix}")));
-        };
-        let text = FeText { title, elastic, held, loads, fields: fields.into_iter().map(field).collect() };
-        to_file(py, &path, |out| write(&self.mesh, &text, out))
+        let text =
+            FeText { elastic, held, loads, fields: fields.into_iter().map(field).collect(), ..FeText::default() };
+        write_as(py, &self.mesh, &HEX_FORMATS, file, text)
     }
 }
 

@@ -90,20 +90,8 @@ impl RangeSweep {
             }
             self.at[0] = layer;
         }
-        let ComponentGraph { totals, surface, solid } = &mut self.graph;
-        for (name, component) in tile.border {
-            let component = base + component;
-            let known = self.below.get(&name).copied();
-            let first = known.unwrap_or_else(|| *self.here.entry(name).or_insert(component));
-            if first == component && known.is_none() {
-                totals[component as usize].vertices += 1;
-            } else {
-                unite(surface, component, first);
-            }
-        }
-        for (a, b) in tile.adjacent {
-            unite(solid, base + a, base + b);
-        }
+        tile.join(&mut self.graph, base, &self.below, &mut self.here);
+        let solid = &mut self.graph.solid;
         let row = [tile.tile[1] as u64, tile.tile[2] as u64];
         if self.row != Some(row) {
             // Tiles of a later row come after the first of their row, which nothing enters.

@@ -93,6 +93,32 @@ impl TileComponents {
     }
 }
 
+impl TileComponents {
+    /// Joins its components, numbered from `base` on, with those of the tiles before it, whose border vertices are `here`, in its own layer,
+    /// and `below`; adds its own vertices to `here`.
+    pub fn join(
+        &self,
+        graph: &mut ComponentGraph,
+        base: u32,
+        below: &FxHashMap<u128, u32>,
+        here: &mut FxHashMap<u128, u32>,
+    ) {
+        for (name, component) in &self.border {
+            let component = base + component;
+            let known = below.get(name).copied();
+            let first = known.unwrap_or_else(|| *here.entry(*name).or_insert(component));
+            if first == component && known.is_none() {
+                graph.totals[component as usize].vertices += 1;
+            } else {
+                unite(&mut graph.surface, component, first);
+            }
+        }
+        for (a, b) in &self.adjacent {
+            unite(&mut graph.solid, base + a, base + b);
+        }
+    }
+}
+
 /// Joins the components of tiles as they come, in order.
 ///
 /// It holds the border vertices of two layers of tiles (the current one and the one below it), and one number for each line
@@ -113,26 +139,14 @@ impl TileSweep {
     /// Adds the components of the next tile.
     pub fn add(&mut self, tile: TileComponents) -> Result<(), Fault> {
         let base = self.graph.add(&tile.totals, 0)?;
-        let ComponentGraph { totals, surface, solid } = &mut self.graph;
         // A vertex is shared within a layer of tiles or with the layer below, so names need not be kept for longer.
         if tile.tile[2] != self.layer {
             let last = std::mem::take(&mut self.here);
             self.below = if tile.tile[2] == self.layer + 1 { last } else { FxHashMap::default() };
             self.layer = tile.tile[2];
         }
-        for (name, component) in tile.border {
-            let component = base + component;
-            let known = self.below.get(&name).copied();
-            let first = known.unwrap_or_else(|| *self.here.entry(name).or_insert(component));
-            if first == component && known.is_none() {
-                totals[component as usize].vertices += 1;
-            } else {
-                unite(surface, component, first);
-            }
-        }
-        for (a, b) in tile.adjacent {
-            unite(solid, base + a, base + b);
-        }
+        tile.join(&mut self.graph, base, &self.below, &mut self.here);
+        let solid = &mut self.graph.solid;
         if self.row != [tile.tile[1], tile.tile[2]] || self.open.is_empty() {
             self.row = [tile.tile[1], tile.tile[2]];
             self.open.clear();
