@@ -81,7 +81,7 @@ def apart_of(args) -> dict | None:
         return None
     if args.file == STDIN and (args.resume or args.new):
         raise Refused("--resume keeps what is done beside the design; name a file")
-    return {"cluster": args.cluster, "new": args.new, "beside": args.file if args.resume or args.new else None}
+    return {"cluster": args.cluster, "new": args.new, "design_file": args.file if args.resume or args.new else None}
 
 
 def measure_tets(args) -> None:

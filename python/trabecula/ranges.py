@@ -57,9 +57,9 @@ def save(
     shards: int | None = None,
     accept: Callable[[SurfaceReport, str], Any] = lambda made, words: None,
 ) -> SurfaceReport:
-    """Writes the surface of a solid at a grid ``spacing`` (mm) as binary STL, in ranges of ``size`` tiles. ``accept`` is told
-    of the surface before it gets its name. With ``shards`` ``path`` is a folder of files of about so many
-    bytes. Gives its report.
+    """Writes the surface of a solid at a grid ``spacing`` (mm) as binary STL, in ranges of ``size`` tiles; gives its report.
+    ``accept`` is called with the report and one sentence on its components before the file gets its name. With ``shards``
+    ``path`` is a folder of files of about this number of bytes.
 
     Raises ValueError for a solid that is not meshed on a grid and for a cluster that cannot be used, Refused for the folder of
     another run, OSError for a disk that is full.
@@ -72,8 +72,8 @@ def save(
         report, words, kept, _ = joined.finish(spacing, islands)
         accept(report, words)
         if shards:
-            told = work.folder.head | {"design": solid._core.design, "surface": report.to_dict()}
-            work.folder.split(kept, RECORD, _core.stl_header, shards, told)
+            about = work.folder.head | {"design": solid._core.design, "surface": report.to_dict()}
+            work.folder.split(kept, RECORD, _core.stl_header, shards, about)
         else:
             work.folder.keep(kept, RECORD, _core.stl_header(report.triangles))
     work.folder.finish()
@@ -88,17 +88,17 @@ def measure(
     progress: Progress | None = None,
     cluster: str | None = None,
     new: bool = False,
-    beside: str | None = None,
+    design_file: str | None = None,
     size: int | None = None,
 ) -> tuple[MeshReport, QualityReport | None, IslandsReport]:
     """What is measured of the surface at a grid ``spacing`` (mm), in a ``region`` of this volume (mm³), in ranges of ``size``
-    tiles: its figures, the quality of its triangles, its other connected components. ``beside`` is the file beside which it
-    stands and is gone on with in a later run; else nothing is kept.
+    tiles: its figures, the quality of its triangles, its other connected components. With ``design_file``, its path, what is
+    done is kept next to it for a later run; else nothing is kept.
 
     Raises as ``save``.
     """
     with tempfile.TemporaryDirectory(prefix="trabecula-") as scratch:
-        output = f"{beside}.figures" if beside else os.path.join(scratch, "figures")
+        output = f"{design_file}.figures" if design_file else os.path.join(scratch, "figures")
         work = _Work("figures", solid, spacing, output, 0, {}, size or _tiles_at_once(solid, spacing))
         with work.opened(new):
             joined = _core.Joined()
@@ -121,7 +121,8 @@ def save_voxels(
     accept: Callable[[float], Any] = lambda volume: None,
 ) -> dict[str, Any]:
     """Writes a solid as voxels of edge ``step`` (mm) to a file of a ``kind`` ("npy", "vti"), in ranges of ``size`` layers.
-    ``accept`` is told of the volume (mm³) before it gets its name. Gives ``shape``, ``step``, ``origin`` (mm) and ``volume``.
+    ``accept`` is called with the volume (mm³) before the file gets its name. Gives ``shape``, ``step``, ``origin`` (mm) and
+    ``volume``.
 
     Raises as ``save``.
     """

@@ -65,6 +65,8 @@ class Seen(Picture):
         name = lattice if lattice is not None or not names else names[0]
         found = None if name is None else self._core.cell_at(name, _points(points))
         if found is None:
+            if name in names:
+                raise ValueError(f"lattice {name} lies over tetrahedra, each with a map of its own")
             there = f"there is no lattice named {name}; there are {', '.join(names)}" if names else "the design has no lattice"
             raise ValueError(there)
         fraction, gradients = found

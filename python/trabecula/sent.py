@@ -1,4 +1,4 @@
-"""The files that a design reads, by their content: as they are sent to workers of a cluster, and told apart from others."""
+"""The files that a design reads, by their content: as they are sent to workers of a cluster, and their checksums."""
 
 from __future__ import annotations
 

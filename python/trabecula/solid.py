@@ -654,10 +654,10 @@ class Solid(Seen, Simulated):
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
 
-        def told(made: SurfaceReport, words: str) -> None:
+        def accepted(made: SurfaceReport, words: str) -> None:
             self._accept(made, words, spacing, accept)
 
-        return ranges.save(self, name, spacing, islands, threads, progress, accept=told, **apart)
+        return ranges.save(self, name, spacing, islands, threads, progress, accept=accepted, **apart)
 
     def voxels(
         self,

@@ -1,4 +1,4 @@
-"""Work of many hours in a folder beside its output: what is done stands there with checksums, and the same command goes on."""
+"""Work of many hours in a folder next to its output: what is done stands there with checksums, and the same command goes on."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class Unfinished:
         """Where a range begins in ``partials``."""
         return sum(r.partial for r in self.ranges[:number])
 
-    def damaged(self, tell: Callable[[int, int], Any] = lambda done, total: None) -> list[int]:
+    def damaged(self) -> list[int]:
         """The numbers of the ranges that are not what their checksums say."""
         wrong = []
         place, partial_place = self.first, 0
@@ -126,7 +126,6 @@ class Unfinished:
             if not whole or _digest(self._partials, partial_place, r.partial) != r.partial_sha256:
                 wrong.append(r.number)
             place, partial_place = place + r.bytes, partial_place + r.partial
-            tell(r.number + 1, len(self.ranges))
         return wrong
 
     def partials(self) -> Iterator[bytes]:
@@ -211,10 +210,10 @@ class Unfinished:
         self._staged({"done": True})
 
     def split(
-        self, kept: list[tuple[int, int]], size: int, header: Callable[[int], bytes], most: int, told: dict[str, Any]
+        self, kept: list[tuple[int, int]], size: int, header: Callable[[int], bytes], most: int, about: dict[str, Any]
     ) -> None:
         """Writes the ``kept`` ranges of records of ``size`` bytes to files of about ``most`` bytes, each of whole ranges and
-        with the ``header`` of its number of records, and ``manifest.json`` with what is ``told`` and the name, records, bytes
+        with the ``header`` of its number of records, and ``manifest.json`` with ``about`` and the name, records, bytes
         and SHA-256 of each, all in the folder ``shards``.
 
         From the last one to the first: what is written is cut off ``data``, so that the disk holds it once. Killed at any
@@ -246,7 +245,7 @@ class Unfinished:
             length = len(header(count)) + count * size
             self._staged({"file": name, "triangles": count, "bytes": length, "sha256": digest.hexdigest()})
             self._data.truncate(self.first + bounds[n])
-        manifest = told | {"shards": self.stage[::-1]}
+        manifest = about | {"shards": self.stage[::-1]}
         with open(os.path.join(self.name("shards"), "manifest.json"), "w", encoding="utf-8", newline="\n") as file:
             file.write(json.dumps(manifest, indent=2) + "\n")
         self._staged({"done": True})
