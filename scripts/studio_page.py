@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STUDIO, PACKAGE = ROOT / "studio", ROOT / "python" / "trabecula"
 #: In the order in which they are run.
-SCRIPTS = (PACKAGE / "viewer.js", STUDIO / "core.js", STUDIO / "controls.js", STUDIO / "studio.js")
+SCRIPTS = (PACKAGE / "viewer.js", STUDIO / "rays.js", STUDIO / "core.js", STUDIO / "controls.js", STUDIO / "studio.js")
 AXES = "".join(
     f'<g data-part="{name}"><line stroke="{colour}" stroke-width="2"/><text text-anchor="middle" dy=".35em" '
     f'fill="currentColor">{name}</text></g>'

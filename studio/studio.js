@@ -28,10 +28,11 @@ const LEAST = 12000, MOST = 600000;
 const core = new Core();
 const text = $("text");
 const screen_ = viewer(document.querySelector("figure.viewer"));
-const state = { name: "design", stale: false, busy: false, meshing: false, cells: 12000, bounds: null, opened: false };
+const state = { name: "design", stale: false, busy: false, meshing: false, cells: 12000, bounds: null, opened: false, files: 0 };
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 // What controls have changed and the text does not have yet: of each value the last change.
 const pending = new Map();
+const rays = screen_ && marcher(screen_.gl);
 const controls = new Controls((changes) => {
   for (const change of changes) {
     const place = change.path.join(".");
@@ -107,10 +108,11 @@ async function show() {
   state.warnings = head.warnings;
   keep();
   // While something moves there is a picture of each text that was read: a newer one waits for it.
-  await picture(state.cells, true);
+  const live = await marched(head.data);
+  if (!live) await picture(state.cells, true);
   await pause(state.opened ? 150 : 0);
   if (state.stale) return;
-  if (state.partly) await picture(state.cells, false);
+  if (!live && state.partly) await picture(state.cells, false);
   const partly = state.partly;
   if (state.stale) return;
   const figures = (await core.ask({ do: "figures" })).head;
@@ -118,8 +120,31 @@ async function show() {
   facts(figures);
   if (state.stale) return;
   const finer = Math.min(MOST, (state.used * AT_REST) / Math.max(state.ms, 20));
-  if (!partly && finer > 1.5 * state.used) await picture(finer, false);
+  if (!live && !partly && finer > 1.5 * state.used) await picture(finer, false);
   state.opened = true;
+}
+
+// Draws the design by rays, where that is wished and the graphics card can march through it. It keeps the textures of a cell and of a
+// region.
+async function marched(data) {
+  if (!rays || $("by").value !== "rays") return false;
+  const lattices = Object.values(data.lattice || {});
+  if (lattices.length !== 1) return false;
+  const [{ map, level, ...rest }] = lattices;
+  const thick = level && "thickness" in level;
+  const cell = JSON.stringify([rest, thick && map]), region = JSON.stringify([data.region, state.files]);
+  const { head, body, ms } = await core.ask({ do: "rays", cell: cell !== state.cell, region: region !== state.region });
+  if (head.error || head.none) return false;
+  rays.take(head, body);
+  Object.assign(state, { cell, region, shown: null });
+  const [min, max] = head.bounds, span = head.fractions && [0, 32].map((i) => head.fractions.values[i]).sort((a, b) => a - b);
+  if (screen_.seen().color === "values" || !span) screen_.look({ color: screen_.seen().color === "overhang" ? "overhang" : "faces" });
+  [thickOption.disabled, fractionOption.disabled] = [true, !span];
+  if (span) legend(span, "");
+  screen_.paint({ min, max, span }, rays.painter);
+  say(`picture by rays, ${Math.round(ms + rays.painter.ms)} ms`, false);
+  document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
+  return true;
 }
 
 async function picture(cells, moving) {
@@ -138,12 +163,16 @@ function draw({ vertices, triangles }, body, [min, max], thick = false) {
   if (!screen_ || !body.byteLength) return;
   const position = new Float32Array(body, 0, 3 * vertices), normal = new Int16Array(body, 12 * vertices, 4 * vertices);
   state.shown = [{ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) }];
-  if (screen_.seen().color === "values") screen_.look({ color: "faces" });
-  thickOption.disabled = !thick;
+  if (screen_.seen().color !== "overhang") screen_.look({ color: "faces" });
+  [thickOption.disabled, fractionOption.disabled] = [!thick, true];
   screen_.show(...state.shown);
 }
 
-const thickOption = document.querySelector("figure.viewer [name=colours] [value='2']");
+const [thickOption, fractionOption] = [2, 3].map((n) => document.querySelector(`figure.viewer [name=colours] [value='${n}']`));
+
+function legend([low, high], unit) {
+  document.querySelector("[data-part=legend]").replaceChildren(low.toPrecision(3), document.createElement("i"), `${high.toPrecision(3)}${unit}`);
+}
 
 // The thickness of the mesh's walls as its colours, and a legend of them.
 async function thickness() {
@@ -152,8 +181,7 @@ async function thickness() {
   if (!found) return screen_.look({ color: "faces" });
   const { head, body, ms } = found;
   if (head.error) { say(head.error.text); return screen_.look({ color: "faces" }); }
-  const [low, high] = head.span, bar = document.createElement("i");
-  document.querySelector("[data-part=legend]").replaceChildren(low.toPrecision(3), bar, `${high.toPrecision(3)} mm`);
+  legend(head.span, " mm");
   state.shown = [{ ...state.shown[0], span: head.span }, { ...state.shown[1], value: new Float32Array(body) }];
   screen_.show(...state.shown);
   screen_.look({ color: "values" });
@@ -325,6 +353,7 @@ async function take(files) {
       continue;
     }
     await core.file(file.name, new Uint8Array(await file.arrayBuffer()));
+    state.files++;
     if (!MESHES.includes(suffix)) { say(`${file.name} is there for the design`); changed(); continue; }
     // A part that the design names already is read anew; another becomes the region.
     if (text.value.includes(file.name)) { changed(); continue; }
@@ -389,6 +418,9 @@ async function begin() {
   text.addEventListener("scroll", lines);
   $("mesh").addEventListener("click", () => mesh().catch(broken));
   document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); });
+  // Without a graphics card meshes are drawn faster.
+  $("by").value = rays && !drawnBySoftware() ? "rays" : "mesh";
+  $("by").addEventListener("input", (e) => { e.stopPropagation(); changed(); });
   $("cancel").addEventListener("click", () => stop().catch(broken));
   $("stl").addEventListener("click", () => save("stl").catch(broken));
   $("three").addEventListener("click", () => save("3mf").catch(broken));

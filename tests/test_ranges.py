@@ -158,7 +158,7 @@ def test_figures_and_voxels_go_on_where_they_were(tmp_path: Path):
     design, out = tmp_path / "network.toml", tmp_path / "part.npy"
     design.write_text(NETWORK)
     solid = lt.load(design).build()
-    figures = {"beside": str(design), "size": 1}
+    figures = {"design_file": str(design), "size": 1}
     voxels = {"size": 3}
     for work, more in ((ranges.measure, (solid, 0.1, 100.0)), (ranges.save_voxels, (solid, str(out), "npy", 0.1))):
         settings = figures if work is ranges.measure else voxels

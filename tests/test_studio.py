@@ -292,6 +292,107 @@ def test_other_designs_have_the_bytes_of_the_command(browser, tmp_path, name):
         assert ask(page, do_="write", suffix="stl")["sum"] == sum_of(tmp_path / "command.stl")
 
 
+#: Designs through which a graphics card marches: maps that are affine, that vary, and whose phases jump; levels of each kind.
+MARCHED = {
+    "box": BOX,
+    "graded ball": MORE["graded ball"],
+    "part": MORE["part"],
+    "wrapped": """schema = 1
+[region]
+difference = [
+  { cylinder = { base = [0, 0, 0], radius = 8, height = 8 } },
+  { cylinder = { base = [0, 0, -1], radius = 4, height = 10 } },
+]
+[lattice.a]
+cell = "gyroid"
+part = "sheet"
+map.cylinder = { around = 8, wavelength = 4 }
+level.thickness = 0.5
+""",
+    "solved": """schema = 1
+region.box.size = [14, 14, 6]
+[lattice.a]
+cell = "primitive"
+part = "upper"
+map.phase = { wavelength = 4, rotate = [0, 0, { formula = "4*x" }] }
+level.fraction = { linear = { along = [1, 0, 0], stops = [[-7, 0.25], [7, 0.5]] } }
+""",
+}
+
+
+def by_rays(page):
+    """Has the design drawn by rays, as where there is a graphics card."""
+    page.select_option("#by", "rays")
+    settled(page)
+    assert page.inner_text("#status").startswith("picture by rays")
+
+
+#: Colours of the canvas, as the design is drawn by rays and by its mesh.
+DRAWN = """async (view) => {
+    screen_.look(view);
+    const pixels = async () => {
+        await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+        rays.painter.finish();
+        const gl = screen_.gl, [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * w * h);
+        gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+        return bytes;
+    };
+    const byRays = await pixels();
+    await picture(600000, false);
+    const meshed = await pixels();
+    await marched(controls.data);
+    let either = 0, both = 0, alike = 0;
+    for (let i = 0; i < byRays.length; i += 4) {
+        const [a, b] = [byRays[i + 3] > 127, meshed[i + 3] > 127];
+        either += a || b;
+        both += a && b;
+        alike += a && b && [0, 1, 2].every((c) => Math.abs(byRays[i + c] - meshed[i + c]) < 32);
+    }
+    return [either, both / either, alike / either];
+}"""
+
+
+@pytest.mark.parametrize("name", MARCHED)
+def test_rays_show_what_the_mesh_is(browser, tmp_path, name):
+    design = tmp_path / "design.toml"
+    design.write_text(MARCHED[name])
+    corner().write(tmp_path / "part.stl")
+    with served(design) as url, opened(browser, url) as page:
+        by_rays(page)
+        bounds = ask(page, do_="rays", cell=False, region=False)["bounds"]
+        middle = 0.5 * (bounds[0][1] + bounds[1][1]) + 0.3
+        cut = {"azimuth": -50, "elevation": 40, "section": f"y<{middle}", "color": "overhang"}
+        for view in ({"azimuth": 30, "elevation": 25}, cut):
+            either, covered, alike = page.evaluate(DRAWN, view)
+            # Along the edges of what is seen the pixels of a mesh of 32 steps a wavelength, or fewer, are others.
+            assert either > 20_000 and covered > 0.97 and alike > 0.93, (view, either, covered, alike)
+
+
+def test_solids_with_more_than_a_lattice_are_meshed_for_their_picture(browser, tmp_path):
+    design = tmp_path / "design.toml"
+    for name in ("formula and skin", "beams"):
+        design.write_text(MORE[name])
+        with served(design) as url, opened(browser, url) as page:
+            page.select_option("#by", "rays")
+            settled(page)
+            assert ask(page, do_="rays", cell=True, region=True).get("none")
+            assert int(page.get_attribute("figure.viewer", "data-drawn")) > 1000
+
+
+def test_a_graded_lattice_is_coloured_by_its_fraction(browser, tmp_path):
+    design = tmp_path / "design.toml"
+    design.write_text(MARCHED["solved"])
+    with served(design) as url, opened(browser, url) as page:
+        by_rays(page)
+        page.select_option("[name=colours]", "3")
+        low, high = page.inner_text("[data-part=legend]").split()
+        # Levels in the middles of voxels: the ends are half a voxel of 48 off.
+        assert 0.25 <= float(low) < 0.26 and 0.49 < float(high) <= 0.5
+        write(page, MARCHED["box"])
+        assert page.inner_text("#status").startswith("picture by rays")
+        assert page.input_value("[name=colours]") == "0" and page.is_disabled("[name=colours] [value='3']")
+
+
 #: What is changed, and what the text then is; "+" and "-" are lines that come and go.
 EDITS = {
     "a number with its comment": (

@@ -15,12 +15,9 @@ void main() {
   gl_Position = vec4((seen.xy + shift) * zoom, -seen.z * depth, 1.0);
 }`;
 
-const FRAGMENT = `#version 300 es
-precision highp float;
-// At a pixel's centre beyond its triangle the place could lie on the other side of the section.
-centroid in vec3 place; centroid in vec3 facing; centroid in float isCut; centroid in float amount;
-uniform mat3 turn; uniform vec4 plane; uniform int colours; uniform float steep; uniform vec2 span;
-out vec4 colour;
+// Colours by normal, the light, and the section's own face.
+const SHADING = `
+uniform mat3 turn; uniform int colours; uniform float steep; uniform vec2 span;
 vec3 scale(float t) {
   // Viridis by its polynomial (M. Zucker).
   t = clamp(t, 0.0, 1.0);
@@ -29,22 +26,32 @@ vec3 scale(float t) {
   vec3 c6 = vec3(-5.43546, 4.64585, 26.31244);
   return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))));
 }
-void main() {
-  if (dot(plane.xyz, place) > plane.w) discard;
-  if (!gl_FrontFacing) {
-    // The inside of the solid, seen through the section, is where the section cuts it: drawn flat, hatched.
-    vec2 at = gl_FragCoord.xy;
-    float line = step(0.78, fract((at.x + at.y) / 9.0));
-    colour = vec4(mix(vec3(0.80, 0.36, 0.24), vec3(0.62, 0.25, 0.16), line), 1.0);
-    return;
-  }
-  vec3 n = normalize(facing), seen = turn * n;
+// Flat and hatched.
+vec4 hatched() {
+  float line = step(0.78, fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0));
+  return vec4(mix(vec3(0.80, 0.36, 0.24), vec3(0.62, 0.25, 0.16), line), 1.0);
+}
+vec4 lit(vec3 n, float isCut, float amount) {
+  vec3 seen = turn * n;
   vec3 base = mix(vec3(0.72, 0.76, 0.80), vec3(0.93, 0.80, 0.58), isCut);
   if (colours == 1) base = -n.z > steep ? vec3(0.86, 0.28, 0.22) : vec3(0.74, 0.77, 0.80);
-  if (colours == 2) base = scale((amount - span.x) / max(span.y - span.x, 1e-12));
+  if (colours >= 2) base = scale((amount - span.x) / max(span.y - span.x, 1e-12));
   float key = max(dot(seen, normalize(vec3(-0.35, 0.55, 0.76))), 0.0);
   float fill = max(dot(seen, normalize(vec3(0.8, -0.2, 0.5))), 0.0);
-  colour = vec4(base * (0.30 + 0.62 * key + 0.18 * fill), 1.0);
+  return vec4(base * (0.30 + 0.62 * key + 0.18 * fill), 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+// At a pixel's centre beyond its triangle the place could lie on the other side of the section.
+centroid in vec3 place; centroid in vec3 facing; centroid in float isCut; centroid in float amount;
+uniform vec4 plane;
+out vec4 colour;
+${SHADING}
+void main() {
+  if (dot(plane.xyz, place) > plane.w) discard;
+  // The inside of the solid, seen through the section, is where the section cuts it.
+  colour = gl_FrontFacing ? lit(normalize(facing), isCut, amount) : hatched();
 }`;
 
 async function unpacked(raw) {
@@ -106,9 +113,9 @@ function corners({ head, vertices, triangles, cut, values }) {
   return of;
 }
 
-function program(gl) {
+function program(gl, vertex, fragment) {
   const made = gl.createProgram();
-  for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(type);
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
@@ -117,8 +124,17 @@ function program(gl) {
   }
   gl.linkProgram(made);
   if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
-  gl.useProgram(made);
   return made;
+}
+
+// Where a camera's rays fall: the uniforms of VERTEX and SHADING.
+function aim(gl, shader, camera) {
+  const uniform = (name) => gl.getUniformLocation(shader, name);
+  gl.useProgram(shader);
+  gl.uniformMatrix3fv(uniform("turn"), false, [0, 1, 2].flatMap((c) => camera.rows.map((r) => r[c])));
+  for (const name of ["middle", "shift", "zoom", "plane", "span"]) gl[`uniform${camera[name].length}fv`](uniform(name), camera[name]);
+  for (const name of ["depth", "steep"]) gl.uniform1f(uniform(name), camera[name]);
+  gl.uniform1i(uniform("colours"), camera.colours);
 }
 
 // A round length of about a fifth of the width for the scale bar: 1, 2 or 5 times a power of ten.
@@ -135,17 +151,18 @@ function drawnBySoftware() {
 }
 
 // Colours by number, as Python names them.
-const COLOURS = ["faces", "overhang", "values"];
+const COLOURS = ["faces", "overhang", "values", "fraction"];
 
 // A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays: of each
 // corner, or of vertices with an `index`. The camera and the section stay where they are. `seen()` is what the user sees, by names and
-// units of Python's View; `look(wanted)` changes some of it; the figure has an event "look" when the user has.
+// units of Python's View; `look(wanted)` changes some of it; the figure has an event "look" when the user has. `paint(head, painter)`
+// leaves the drawing to a function of the camera, which draws what lies in the bounds of `head` on `gl` until its `stop()`.
 function viewer(figure) {
   const canvas = figure.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: !drawnBySoftware(), alpha: true, preserveDrawingBuffer: true });
   if (!gl) return null;
-  const shader = program(gl), buffers = {}, indices = gl.createBuffer();
-  let head = { min: [0, 0, 0], max: [1, 1, 1], span: null }, count = 0, indexed = false, size = 1, middle = [0, 0, 0];
+  const shader = program(gl, VERTEX, FRAGMENT), buffers = {}, indices = gl.createBuffer();
+  let head = { min: [0, 0, 0], max: [1, 1, 1], span: null }, count = 0, indexed = false, size = 1, middle = [0, 0, 0], painter = null;
   for (const [name, width, type] of [["position", 3, gl.FLOAT], ["normal", 4, gl.SHORT], ["value", 1, gl.FLOAT]]) {
     const at = gl.getAttribLocation(shader, name);
     buffers[name] = gl.createBuffer();
@@ -153,12 +170,25 @@ function viewer(figure) {
     gl.enableVertexAttribArray(at);
     gl.vertexAttribPointer(at, width, type, type === gl.SHORT, 0, 0);
   }
-  const uniform = (name) => gl.getUniformLocation(shader, name);
   const home = { azimuth: 30, elevation: 25, zoom: 1, shift: [0, 0] };
   const state = { ...home, axis: "", share: 0.5, flip: false, colours: +figure.querySelector("[name=colours]").value, steep: 45 };
 
-  function show(shown, of) {
+  function frame(shown) {
+    painter?.stop();
     head = shown;
+    size = Math.hypot(...[0, 1, 2].map((a) => head.max[a] - head.min[a])) || 1;
+    middle = [0, 1, 2].map((a) => 0.5 * (head.min[a] + head.max[a]));
+  }
+
+  function paint(shown, by) {
+    frame(shown);
+    painter = by;
+    draw();
+  }
+
+  function show(shown, of) {
+    frame(shown);
+    painter = null;
     indexed = !!of.index;
     count = indexed ? of.index.length : of.position.length / 3;
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
@@ -172,8 +202,6 @@ function viewer(figure) {
         gl.enableVertexAttribArray(at);
       } else gl.disableVertexAttribArray(at);
     }
-    size = Math.hypot(...[0, 1, 2].map((a) => head.max[a] - head.min[a])) || 1;
-    middle = [0, 1, 2].map((a) => 0.5 * (head.min[a] + head.max[a]));
     draw();
     figure.dataset.drawn = count / 3;
   }
@@ -199,11 +227,6 @@ function viewer(figure) {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     const rows = turn(), side = Math.min(width, height);
-    gl.uniformMatrix3fv(uniform("turn"), false, [0, 1, 2].flatMap((c) => rows.map((r) => r[c])));
-    gl.uniform3fv(uniform("middle"), middle);
-    gl.uniform2fv(uniform("shift"), state.shift);
-    gl.uniform2fv(uniform("zoom"), [side / width / reach(), side / height / reach()]);
-    gl.uniform1f(uniform("depth"), 1 / size);
     const plane = [0, 0, 0, 1e30];
     const a = state.axis ? "xyz".indexOf(state.axis) : -1;
     if (state.axis) {
@@ -211,10 +234,15 @@ function viewer(figure) {
       plane[a] = state.flip ? -1 : 1;
       plane[3] = state.flip ? -at : at;
     }
-    gl.uniform4fv(uniform("plane"), plane);
-    gl.uniform1i(uniform("colours"), state.colours);
-    gl.uniform1f(uniform("steep"), Math.cos((state.steep * Math.PI) / 180));
-    gl.uniform2fv(uniform("span"), head.span || [0, 1]);
+    const camera = {
+      rows, middle, plane, shift: state.shift, zoom: [side / width / reach(), side / height / reach()], depth: 1 / size,
+      colours: state.colours, steep: Math.cos((state.steep * Math.PI) / 180), span: head.span || [0, 1], axis: a,
+    };
+    if (painter) {
+      painter(camera);
+      return marks(rows, (2 * reach()) / side, a);
+    }
+    aim(gl, shader, camera);
     if (indexed) gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
     else gl.drawArrays(gl.TRIANGLES, 0, count);
     marks(rows, (2 * reach()) / side, a);
@@ -276,7 +304,7 @@ function viewer(figure) {
   const toggled = () => {
     part("share").disabled = !state.axis;
     part("steep").hidden = state.colours !== 1;
-    part("legend").hidden = state.colours !== 2;
+    part("legend").hidden = state.colours < 2;
     part("angle").textContent = `${state.steep}°`;
   };
   const tilt = (right, up) => {
@@ -330,7 +358,7 @@ function viewer(figure) {
   figure.classList.add("live");
   // Browsers keep few contexts; one that is not needed any more is given back.
   const close = () => { resized.disconnect(); gl.getExtension("WEBGL_lose_context")?.loseContext(); };
-  return { show, draw, seen, look, close };
+  return { gl, show, paint, draw, seen, look, close };
 }
 
 // Shows the mesh of a stream in a figure; the viewer, or null where the browser cannot draw and a still picture stands for it.

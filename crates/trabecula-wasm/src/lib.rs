@@ -6,12 +6,14 @@
 //! - `requests`: what can be asked, and the answers.
 //! - `resolution`: at which spacing a mesh is made: the rules of the command.
 //! - `corners`: a mesh as the arrays that a graphics card draws.
+//! - `rays`: textures by which it marches rays through a solid that has no mesh.
 //! - `edit`: one value of a design's text changed, its comments kept.
 
 use std::cell::RefCell;
 
 mod corners;
 mod edit;
+mod rays;
 mod requests;
 mod resolution;
 

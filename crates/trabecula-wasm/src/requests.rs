@@ -19,6 +19,7 @@ use trabecula::surface_maker::{Figures, Made, Options};
 use crate::corners::arrays;
 use crate::edit::{Change, edit};
 use crate::host;
+use crate::rays::rays;
 use crate::resolution::{self, Resolution};
 
 /// Triangles of a mesh above which it is not drawn, and a picture of it must do.
@@ -55,6 +56,8 @@ enum Request {
         #[serde(default)]
         part: bool,
     },
+    /// Textures by which a graphics card marches rays through the solid; those of the cell and of the region if they are wanted.
+    Rays { cell: bool, region: bool },
     /// The surface as `trabecula mesh` makes it: its figures, and its arrays.
     Mesh { edge: Option<f64>, per_cell: Option<f64> },
     /// The local thickness of that surface's solid (mm), f32 for each vertex that was drawn; 0 where it is thinner than a voxel.
@@ -163,6 +166,9 @@ impl Session {
             Request::Open { text } => self.open(&text),
             Request::Figures => self.figures(),
             Request::Picture { cells, part } => picture(self.built()?, cells, part),
+            Request::Rays { cell, region } => {
+                Ok(rays(self.built()?, cell, region)?.unwrap_or_else(|| (json!({ "none": true }), Vec::new())))
+            }
             Request::Mesh { edge, per_cell } => self.mesh(edge, per_cell),
             Request::Thickness => self.thickness(),
             Request::Write { suffix } => self.write(&suffix),
