@@ -133,7 +133,7 @@ fn signs_of_vectors_do_not_count() {
 /// without stress have no place of their own, and cells are kept from folding by a bound on their stretch.
 #[test]
 fn a_plate_with_a_hole_is_followed_through_noise() {
-    let (a, b) = (5.0, Aabb { min: [-21.0, -21.0, 0.0], max: [21.0, 21.0, 6.0] });
+    let (a, b) = (5.0, Aabb { min: [-21.0, -21.0, 0.0], max: [21.0, 21.0, WAVELENGTH] });
     let kirsch = |[x, y, _]: Vec3| {
         let r2 = (x * x + y * y).max(a * a);
         let (double, sine, q) = ((x * x - y * y) / r2, 2.0 * x * y / r2, a * a / r2);

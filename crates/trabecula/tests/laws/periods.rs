@@ -1,6 +1,6 @@
 //! Solved maps of parts with holes: phases grow round each by a whole number of cells.
 
-use crate::common::within;
+use crate::common::{cases, within};
 use std::sync::Arc;
 
 use geometry::math::{Aabb, Vec3, add, apply, determinant, norm, sub, unit};
@@ -52,12 +52,13 @@ fn around(at: Vec3, axis: Vec3) -> [[String; 3]; 2] {
 }
 
 /// A tube with a frame, or stress, that goes round: the phases are those of `map.cylinder` with the number of cells that is nearest to
-/// what the wavelength asks for, within 1 % of a cell, wherever the tube is and however it is turned.
+/// what the wavelength asks for, within 1 % of a cell, wherever the tube is and however it is turned. Four tubes; more in
+/// `make campaign`.
 #[test]
 fn a_tube_along_its_hoops_is_wrapped_round_its_axis() {
     let mut seed = 11;
     let mut next = || random(&mut seed);
-    for case in 0..12 {
+    for case in 0..cases(4) {
         let straight = case < 2;
         let (base, axis) = match straight {
             true => ([0.0; 3], [0.0, 0.0, 1.0]),
@@ -110,7 +111,7 @@ fn a_tube_along_its_hoops_is_wrapped_round_its_axis() {
         });
         let worst = worst.fold(0.0, f64::max);
         println!("   phases within {worst:.4} of a cell");
-        // Second order in the step: at eight nodes a cell below 0.008 in all of 12 cases, at four below 0.023.
+        // Second order in the step: at eight nodes a cell below 0.008 in 12 cases, at four below 0.023.
         assert!(worst < 0.01, "{worst}");
     }
 }

@@ -34,7 +34,7 @@ fn names() -> Vec<&'static str> {
 
 proptest! {
     // 5 in `make test`.
-    #![proptest_config(ProptestConfig { cases: cases(5) as u32, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(3) as u32, ..ProptestConfig::default() })]
 
     /// Space may be turned and scaled: necks turn and scale with it, to rounding. The distance from a neck to the surface is
     /// searched on a grid that does not turn; one of several nearly nearest points in place of the nearest costs some 1e-4.

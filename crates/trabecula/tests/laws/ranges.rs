@@ -60,7 +60,7 @@ fn held(solid: &Solid, options: &Options, size: usize, runs: usize) -> [u64; 2] 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(24) as u32, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(12) as u32, ..ProptestConfig::default() })]
 
     /// Random solids on grids of up to some hundred tiles, in ranges of any size.
     #[test]
@@ -103,7 +103,7 @@ fn figures_of_ranges_join_to_those_of_one_run() {
 fn pieces_are_dropped_across_ranges() {
     let blobs = lattice("primitive", Part::Lower, 0.1, [1.0, 1.1, 0.9], [5.0, 15.0, 25.0]);
     let solid = solid(ball([0.0; 3], 1.7), Some(blobs));
-    for size in [1, 2, 3, 4, 5, 7, 16, 1000] {
+    for size in [1, 3, 4, 7, 1000] {
         let dropped = [Islands::Keep, Islands::DropSmall, Islands::Drop]
             .map(|islands| held(&solid, &Options { resolution: 0.015, islands }, size, 1 + size % 3)[0]);
         assert!(dropped[0] == 0 && dropped[2] > 10, "{dropped:?}");

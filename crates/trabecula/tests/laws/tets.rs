@@ -87,7 +87,7 @@ fn angles(what: &str, mesh: &TetMesh) -> [f64; 2] {
 fn random_regions_get_sound_meshes_of_bounded_angles_on_their_surface() {
     let mut some = Random(11);
     let mut worst = [180.0f64, 0.0];
-    for i in 0..cases(21) as usize {
+    for i in 0..cases(14) as usize {
         let [r, s, t] = [0; 3].map(|_| some.between(0.8, 1.2));
         let space = region(i % 7, r, s, t);
         let size = some.between(0.12, 0.4);
@@ -162,7 +162,7 @@ impl Field for Waves {
 fn the_bounds_of_angles_hold_for_smooth_surfaces() {
     let mut some = Random(5);
     let bounds = Aabb { min: [-2.0; 3], max: [2.0; 3] };
-    for i in 0..cases(12) {
+    for i in 0..cases(6) {
         let waves = (0..5).map(|_| (some.point(5.0), some.between(0.0, 6.3))).collect();
         let region: Region = Arc::new(Waves(waves));
         let (mesh, _) = background(&region, &bounds, &Grade::Constant(0.4), &inside(&*region, &bounds)).expect("mesh");

@@ -25,7 +25,7 @@ fn number(v: Option<Varying>) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(5) as u32, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(3) as u32, ..ProptestConfig::default() })]
 
     /// The report of the design has the fraction and the thickness that were asked for, whatever cell, part and ratios; and a
     /// design that is given the wavelength found and one of the two has the other. Both figures are of the same tables, so
