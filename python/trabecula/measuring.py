@@ -31,8 +31,8 @@ def measure(args) -> None:
     if solid is None or args.region or args.thickness or closely(solid, args):
         if apart is not None:
             raise Refused(
-                "--resume and --cluster measure the surface of a design while it is made, on a grid; leave them out, or what "
-                "it is held in memory for: a mesh file, --region, --thickness, beams alone without an edge"
+                "--resume and --cluster measure a design on a grid, tile by tile; mesh files, --region, --thickness and "
+                "beams without --edge need the whole surface in memory: leave out one or the other"
             )
         held = surface(args) if solid is None else meshed(solid, args)
         if args.region:
