@@ -188,7 +188,7 @@ def test_files_round_trip(tmp_path):
 def test_streaming_agrees_with_memory(tmp_path):
     """The streamed STL is the mesh."""
     solid = cube().build()
-    summary = solid.save_stl(tmp_path / "a.stl", edge=0.3)
+    summary = solid.save(tmp_path / "a.stl", edge=0.3)
     mesh = solid.mesh(edge=0.3)
     assert abs(summary["volume"] / mesh.volume - 1) < 1e-6
     assert abs(summary["area"] / mesh.area - 1) < 1e-6

@@ -438,7 +438,7 @@ def test_whole_beams_are_meshed_from_their_patches_unless_a_grid_is_asked_for(tm
     mesh = solid.mesh()
     assert np.array_equal(mesh.vertices, solid.mesh(chord=chord).vertices) and 0 < mesh.chord_error <= chord
     assert abs(mesh.volume / exact - 1) < 1e-9
-    assert solid.save_stl(tmp_path / "a.stl").triangles == mesh.counts[1]
+    assert solid.save(tmp_path / "a.stl").triangles == mesh.counts[1]
     assert solid.mesh(edge=0.4).chord_error is None and solid.mesh(per_cell=24, islands="drop").chord_error is None
     cut = built(**GOOD)
     assert cut.report().chord is None and "grid " in str(cut.report()) and cut.mesh(edge=0.4).chord_error is None
@@ -478,14 +478,14 @@ def test_a_stream_is_the_mesh(tmp_path, fillet):
     """Hub by hub to a file: the figures of the mesh, and as it is read back closed, in one piece and free of crossings."""
     solid = whole(fillet=fillet)
     mesh, path = solid.mesh(chord=0.05), tmp_path / "beams.stl"
-    told_of = solid.save_stl(path, chord=0.05)
+    told_of = solid.save(path, chord=0.05)
     for key in ("triangles", "volume", "area", "euler", "pieces", "cavities"):
         assert told_of[key] == pytest.approx(mesh.summary()[key], rel=1e-11), key
     assert told_of["chord_error"] == mesh.chord_error
     read = lt.Mesh.read(path)
     assert read.counts[1] == mesh.counts[1] and read.defects == [] and read.pieces == 1
     with pytest.raises(ValueError, match="chord"):
-        solid.save_stl(path, edge=0.1, chord=0.05)
+        solid.save(path, edge=0.1, chord=0.05)
 
 
 def test_hubs_and_a_profile_are_enough():

@@ -123,7 +123,7 @@ def test_small_ones_are_dropped_by_default_and_one_piece_says_nothing(tmp_path, 
 
 
 def test_python(tmp_path, balls):
-    """`Solid.mesh` and `Solid.save_stl` give the same figures; a mesh from a file knows of none."""
+    """`Solid.mesh` and `Solid.save` give the same figures; a mesh from a file knows of none."""
     with pytest.warns(lt.DesignWarning, match="periodic solid is not one piece"):
         solid = lt.load(balls).build()
     with pytest.warns(lt.DesignWarning, match="not in one piece: .* at the region's boundary"):
@@ -131,7 +131,7 @@ def test_python(tmp_path, balls):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         one = solid.mesh(edge=0.25, islands="drop")
-        told = solid.save_stl(tmp_path / "a.stl", edge=0.25, islands="drop")
+        told = solid.save(tmp_path / "a.stl", edge=0.25, islands="drop")
     assert told["islands"] == one.islands
     assert one.islands["dropped"] == mesh.pieces - 1 == mesh.islands["found"] and mesh.islands["dropped"] == 0
     assert one.pieces == told["pieces"] == 1 and one.closed
@@ -139,7 +139,7 @@ def test_python(tmp_path, balls):
     assert len(one.cut) == len(one.triangles) and one.triangles.max() + 1 == len(one.vertices)
     assert lt.Mesh.read(tmp_path / "a.stl").islands is None
     assert one.within(solid).islands == one.islands
-    for make in (solid.mesh, lambda **k: solid.save_stl(tmp_path / "b.stl", **k)):
+    for make in (solid.mesh, lambda **k: solid.save(tmp_path / "b.stl", **k)):
         with pytest.raises(ValueError, match="not in one piece"):
             make(edge=0.25, islands="error")
     assert names(tmp_path) == ["a.stl", "balls.toml"]
@@ -164,7 +164,7 @@ def test_a_cavity_stays_with_its_piece(tmp_path):
 def test_other_words_are_refused(tmp_path, balls, islands):
     """Before any work is done."""
     solid = lt.load(balls).build()
-    for make in (solid.mesh, lambda **k: solid.save_stl(tmp_path / "b.stl", **k)):
+    for make in (solid.mesh, lambda **k: solid.save(tmp_path / "b.stl", **k)):
         with pytest.raises(ValueError, match=r'islands is .*; it must be "keep", "drop-small", "drop" or "error"'):
             make(edge=0.25, islands=islands)
     words = ["mesh", balls, "-o", "b.stl", "--islands", "some"]

@@ -90,7 +90,7 @@ def test_parts_are_filled(tmp_path, name):
 
 def streams_whole(made, folder, **spacing):
     """A part that many tiles make, each by itself, is closed and has the volume that was told."""
-    told = made.save_stl(folder / "part.stl", **spacing)
+    told = made.save(folder / "part.stl", **spacing)
     mesh = judges.of_stl(folder / "part.stl")
     assert len(mesh[1]) == told["triangles"]
     assert judges.status(*mesh) == judges.manifold3d.Error.NoError

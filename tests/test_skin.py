@@ -216,7 +216,7 @@ def test_the_same_bytes_by_either_method(tmp_path):
     """A part with a skin is held in memory to look for voids; the file is the one that streaming writes."""
     file = write(tmp_path / "a.toml", CUBE + '[skin]\nthickness = 0.5\nopen = ["-z"]\n')
     command("mesh", file, "-o", tmp_path / "a.stl", "--edge", 0.2)
-    lt.load(file).build().save_stl(tmp_path / "b.stl", edge=0.2)
+    lt.load(file).build().save(tmp_path / "b.stl", edge=0.2)
     assert (tmp_path / "a.stl").read_bytes() == (tmp_path / "b.stl").read_bytes()
 
 

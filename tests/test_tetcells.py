@@ -41,7 +41,7 @@ def test_a_part_is_closed_whole_and_as_full_as_asked():
 
 def test_the_stream_is_the_same_surface(tmp_path):
     solid = design(level=lt.level.fraction(lt.grade.linear([0, 0, 1], {-8: 0.15, 8: 0.4}))).build()
-    told = solid.save_stl(tmp_path / "a.stl", edge=0.4)
+    told = solid.save(tmp_path / "a.stl", edge=0.4)
     mesh = solid.mesh(edge=0.4)
     back = lt.Mesh.read(tmp_path / "a.stl")
     assert told["triangles"] == len(mesh.triangles) == len(back.triangles)

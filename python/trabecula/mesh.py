@@ -210,7 +210,7 @@ class Mesh(Picture, Transformed):
         return self._measures
 
     def summary(self) -> SurfaceReport:
-        """The figures that a streamed surface has too (``Solid.save_stl``)."""
+        """The figures that a streamed surface has too (``Solid.save``)."""
         from .reports import SurfaceReport
 
         keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")

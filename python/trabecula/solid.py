@@ -477,20 +477,6 @@ class Solid(Seen, Simulated):
         size = file_size(kind, need) * (2 if kind == "3mf" else 1) + (0 if kind == "stl" else SPOOLED * need)
         fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
-    def save_stl(
-        self,
-        path: str | os.PathLike[str],
-        edge: float | None = None,
-        per_cell: float | None = None,
-        threads: int | None = None,
-        progress: Progress | None = None,
-        islands: Islands = "drop-small",
-        chord: float | None = None,
-    ) -> SurfaceReport:
-        """``save`` to a binary STL."""
-        extension(path, ("stl",))
-        return self._save(path, edge, per_cell, threads, progress, islands, chord)
-
     def save(
         self,
         path: str | os.PathLike[str],
