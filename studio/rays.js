@@ -217,8 +217,8 @@ function marcher(gl) {
     gl.uniform1i(uniform("straight"), of.only ? 1 : 0);
     gl.uniform4fv(uniform("only"), of.only || new Float32Array(16));
     gl.uniform1i(uniform("metered"), of.metric ? 1 : 0);
-    // Of the matrix each row is one phase: g · M is its transpose times g.
-    gl.uniformMatrix3fv(uniform("metric"), false, (of.metric || [[1, 0, 0], [0, 1, 0], [0, 0, 1]]).flatMap((_, c) => [0, 1, 2].map((r) => (of.metric ? of.metric[r][c] : +(r === c)))));
+    // By columns; each row is the gradient of one phase.
+    if (of.metric) gl.uniformMatrix3fv(uniform("metric"), false, [0, 1, 2].flatMap((c) => of.metric.map((row) => row[c])));
     gl.uniform2fv(uniform("levels"), fractions ? fractions.levels : [0, 1]);
     gl.uniform1fv(uniform("fractions"), fractions ? fractions.values : new Float32Array(33));
   }
