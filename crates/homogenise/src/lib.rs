@@ -35,6 +35,7 @@ mod multigrid;
 mod operator;
 mod percolation;
 mod pore;
+mod slab;
 mod solve;
 
 pub use cell::{Homogenised, VoxelCell, upper_edges};

@@ -4,16 +4,15 @@
 //! is by Chebyshev polynomials of D⁻¹A, whose largest eigenvalue is bounded by that of one element (`element.rs`), so that nothing
 //! is estimated. The cycle is symmetric.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::element::Element;
-use crate::fields::combine;
+use crate::fields::{combine, in_pieces};
 use crate::operator::Operator;
 
-/// The smoother damps eigenvalues from 1/RANGE of the largest on.
+/// The smoother, two steps before and two after a coarse correction, damps eigenvalues from 1/RANGE of the largest on.
 const RANGE: f64 = 6.0;
-/// Steps of smoothing before and after a coarse correction.
-const STEPS: usize = 2;
 /// On the coarsest grid: range and steps, which solve it to a tenth.
 const COARSEST: (f64, usize) = (400.0, 28);
 /// No grid is coarser than this along an axis.
@@ -26,7 +25,8 @@ struct Level<const NC: usize> {
     solution: Vec<f32>,
     residual: Vec<f32>,
     step: Vec<f32>,
-    product: Vec<f32>,
+    /// The step that is being made while `step` is read.
+    next: Vec<f32>,
 }
 
 /// A hierarchy of grids.
@@ -51,7 +51,7 @@ impl<const NC: usize> Multigrid<NC> {
                 solution: field(),
                 residual: field(),
                 step: field(),
-                product: field(),
+                next: field(),
                 operator,
             });
             let Some((coarse, means)) = next else { break };
@@ -69,62 +69,140 @@ impl<const NC: usize> Multigrid<NC> {
 
     /// One V-cycle from zero for the residual of a level.
     fn cycle(&mut self, at: usize) {
+        let largest = self.largest;
         let (fine, coarse) = self.levels.split_at_mut(at + 1);
         let level = &mut fine[at];
         let Some(next) = coarse.first_mut() else {
-            let (range, steps) = COARSEST;
-            level.solution.fill(0.0);
-            return level.smooth(self.largest, range, steps, false);
+            let mut rates = Chebyshev::new(largest, COARSEST.0);
+            level.begin(rates.first());
+            for step in 1..COARSEST.1 {
+                level.smooth(if step == 1 { Solution::Begins } else { Solution::GoesOn }, rates.next());
+            }
+            return;
         };
-        level.solution.par_chunks_mut(1 << 14).for_each(|p| p.fill(0.0));
-        level.smooth(self.largest, RANGE, STEPS, true);
+        let mut rates = Chebyshev::new(largest, RANGE);
+        level.begin(rates.first());
+        level.smooth(Solution::Begins, rates.next());
+        level.smooth(Solution::Stays, [0.0; 2]);
         restrict::<NC>(&level.residual, level.operator.shape, &mut next.residual, next.operator.shape);
         self.cycle(at + 1);
         let (fine, coarse) = self.levels.split_at_mut(at + 1);
         let (level, next) = (&mut fine[at], &coarse[0]);
         prolong::<NC>(&next.solution, next.operator.shape, &mut level.step, level.operator.shape);
-        combine(&mut level.step, &level.inverse_diagonal, |s, d| if d == 0.0 { 0.0 } else { s });
-        combine(&mut level.solution, &level.step, |x, s| x + s);
-        level.operator.apply(&level.step, &mut level.product);
-        combine(&mut level.residual, &level.product, |r, p| r - p);
-        level.smooth(self.largest, RANGE, STEPS, false);
+        level.correct();
+        let mut rates = Chebyshev::new(largest, RANGE);
+        level.smooth(Solution::GoesOn, [0.0, rates.first()]);
+        level.smooth(Solution::GoesOn, rates.next());
     }
 }
 
-impl<const NC: usize> Level<NC> {
-    /// Chebyshev's iteration on the eigenvalues from `largest` / `range` to `largest`. The residual is that before the last step,
-    /// unless it is `kept` up to date.
-    fn smooth(&mut self, largest: f64, range: f64, steps: usize, kept: bool) {
+/// The rates of Chebyshev's iteration on the eigenvalues from `largest` / `range` to `largest`.
+struct Chebyshev {
+    center: f64,
+    half: f64,
+    rho: f64,
+}
+
+impl Chebyshev {
+    fn new(largest: f64, range: f64) -> Self {
         let (low, high) = (largest / range, largest);
         let (center, half) = (0.5 * (high + low), 0.5 * (high - low));
-        let sigma = center / half;
-        let mut rho = 1.0 / sigma;
-        let Level { operator, inverse_diagonal, solution, residual, step, product } = self;
-        let first = (1.0 / center) as f32;
-        step.par_chunks_mut(1 << 14)
-            .zip(residual.par_chunks(1 << 14))
-            .zip(inverse_diagonal.par_chunks(1 << 14))
-            .for_each(|((s, r), d)| s.iter_mut().zip(r.iter().zip(d)).for_each(|(s, (r, d))| *s = first * r * d));
-        combine(solution, step, |x, s| x + s);
-        for done in 1..=steps {
-            if done == steps && !kept {
-                return;
+        Chebyshev { center, half, rho: half / center }
+    }
+
+    /// The share of the preconditioned residual in the first step.
+    fn first(&self) -> f32 {
+        (1.0 / self.center) as f32
+    }
+
+    /// The shares of the last step and of the preconditioned residual in the next one.
+    fn next(&mut self) -> [f32; 2] {
+        let next = 1.0 / (2.0 * self.center / self.half - self.rho);
+        let shares = [next * self.rho, 2.0 * next / self.half];
+        self.rho = next;
+        shares.map(|v| v as f32)
+    }
+}
+
+/// What becomes of the solution in a sweep.
+#[derive(Clone, Copy, PartialEq)]
+enum Solution {
+    /// The sum of the last step and the next.
+    Begins,
+    /// The next step is added.
+    GoesOn,
+    /// The residual alone is wanted.
+    Stays,
+}
+
+/// A plane of the fields of a level.
+struct Plane<'a> {
+    inverse_diagonal: &'a [f32],
+    step: &'a [f32],
+    residual: &'a mut [f32],
+    solution: &'a mut [f32],
+    next: &'a mut [f32],
+}
+
+impl<const NC: usize> Level<NC> {
+    /// The first step of smoothing from zero.
+    fn begin(&mut self, first: f32) {
+        in_pieces([&mut self.step], [&self.residual, &self.inverse_diagonal], |[s], [r, d]| {
+            for (s, (r, d)) in s.iter_mut().zip(r.iter().zip(d)) {
+                *s = first * r * d;
             }
-            operator.apply(step, product);
-            combine(residual, product, |r, p| r - p);
-            if done == steps {
-                return;
+        });
+    }
+
+    /// Adds `step` to the solution, and leaves it zero where nothing is solid.
+    fn correct(&mut self) {
+        in_pieces([&mut self.step, &mut self.solution], [&self.inverse_diagonal], |[s, x], [d]| {
+            for ((s, x), d) in s.iter_mut().zip(x).zip(d) {
+                *s = if *d == 0.0 { 0.0 } else { *s };
+                *x += *s;
             }
-            let next = 1.0 / (2.0 * sigma - rho);
-            let (old, new) = ((next * rho) as f32, (2.0 * next / half) as f32);
-            rho = next;
-            step.par_chunks_mut(1 << 14)
-                .zip(residual.par_chunks(1 << 14))
-                .zip(inverse_diagonal.par_chunks(1 << 14))
-                .for_each(|((s, r), d)| {
-                    s.iter_mut().zip(r.iter().zip(d)).for_each(|(s, (r, d))| *s = old * *s + new * r * d);
-                });
-            combine(solution, step, |x, s| x + s);
+        });
+    }
+
+    /// Takes the last step off the residual and makes the next one: its shares are of the last step and of the preconditioned residual.
+    fn smooth(&mut self, becomes: Solution, shares: [f32; 2]) {
+        let Level { operator, inverse_diagonal, solution, residual, step, next } = self;
+        let plane = operator.plane();
+        let fields = inverse_diagonal.chunks(plane).zip(step.chunks(plane));
+        let fields = fields.zip(residual.chunks_mut(plane)).zip(solution.chunks_mut(plane)).zip(next.chunks_mut(plane));
+        let of = |((((inverse_diagonal, step), residual), solution), next)| Plane {
+            inverse_diagonal,
+            step,
+            residual,
+            solution,
+            next,
+        };
+        let mut planes: Vec<Plane> = fields.map(of).collect();
+        operator.sweep(step, &mut planes, &|product, plane| advance(plane, product, becomes, shares));
+        std::mem::swap(step, next);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2", "aarch64+neon"))]
+fn advance(plane: &mut Plane, product: &[f32], becomes: Solution, [old, new]: [f32; 2]) {
+    let n = product.len();
+    let (d, s) = (&plane.inverse_diagonal[..n], &plane.step[..n]);
+    let (r, x, next) = (&mut plane.residual[..n], &mut plane.solution[..n], &mut plane.next[..n]);
+    match becomes {
+        Solution::Stays => (0..n).for_each(|i| r[i] -= product[i]),
+        Solution::Begins => {
+            for i in 0..n {
+                r[i] -= product[i];
+                next[i] = old * s[i] + new * d[i] * r[i];
+                x[i] = s[i] + next[i];
+            }
+        }
+        Solution::GoesOn => {
+            for i in 0..n {
+                r[i] -= product[i];
+                next[i] = old * s[i] + new * d[i] * r[i];
+                x[i] += next[i];
+            }
         }
     }
 }

@@ -2,9 +2,11 @@
 
 use geometry::fault::Fault;
 use geometry::progress::{Progress, Stopped};
+use multiversion::multiversion;
+use rayon::prelude::*;
 
 use crate::element::Element;
-use crate::fields::{add, combine, dot};
+use crate::fields::{PIECE, combine, dot, dots, piece};
 use crate::multigrid::Multigrid;
 use crate::operator::Operator;
 
@@ -17,7 +19,8 @@ pub struct System<const NC: usize> {
     pub operator: Operator<f64, NC>,
     multigrid: Multigrid<NC>,
     residual: Vec<f64>,
-    direction: Vec<f64>,
+    /// In single precision, as its parts are; products with it are not.
+    direction: Vec<f32>,
     product: Vec<f64>,
 }
 
@@ -38,7 +41,7 @@ impl<const NC: usize> System<NC> {
         System {
             multigrid: Multigrid::new(shape, weights, element),
             residual: field(),
-            direction: field(),
+            direction: vec![0.0; operator.len()],
             product: field(),
             operator,
         }
@@ -75,27 +78,48 @@ impl<const NC: usize> System<NC> {
                 return Err(Stopped::Interrupted);
             }
             let found = multigrid.precondition(residual);
-            let along = dot(found, residual);
             // Polak and Ribière's, which allows for a preconditioner that is linear to single precision only.
-            let turn = if iteration == 0 { 0.0 } else { (-dot(found, product) * size).max(0.0) };
-            combine(direction, found, |p, z| turn * p + f64::from(z));
-            operator.apply(direction, product);
-            let curvature = dot(direction, product);
+            let [along, before] = dots(found, [residual, product]);
+            let turn = if iteration == 0 { 0.0 } else { (-before * size).max(0.0) as f32 };
+            combine(direction, found, |p, z| turn * p + z);
+            let plane = operator.plane();
+            let planes = product.chunks_mut(plane).zip(residual.chunks(plane)).zip(direction.chunks(plane));
+            let mut planes: Vec<_> = planes.map(|((q, r), p)| (q, r, p, [0.0; 2])).collect();
+            operator.sweep(direction, &mut planes, &|product, (q, r, p, sums)| {
+                q.copy_from_slice(product);
+                *sums = [piece(q, p), piece(r, p)];
+            });
+            let [curvature, slope] = planes.iter().fold([0.0; 2], |s, p| [s[0] + p.3[0], s[1] + p.3[1]]);
             if !(along > 0.0 && curvature > 0.0) {
                 return Err(Stopped::Refused(stalled(iteration, now)));
             }
-            let slope = dot(direction, residual);
             let length = slope / curvature;
             size = length / along;
-            add(solution, length, direction);
-            add(residual, -length, product);
-            now = dot(residual, residual).sqrt() / start;
+            now = advance([solution, residual], direction, product, length).sqrt() / start;
             if now <= tolerance {
                 return Ok(Solved { iterations: iteration + 1, residual: now });
             }
         }
         Err(Stopped::Refused(stalled(MOST, now)))
     }
+}
+
+/// Goes a length along a direction, whose product with the operator is known: the solution, the residual, and the square of its length.
+fn advance([x, r]: [&mut [f64]; 2], p: &[f32], q: &[f64], length: f64) -> f64 {
+    let planes = x.par_chunks_mut(PIECE).zip(r.par_chunks_mut(PIECE)).zip(p.par_chunks(PIECE)).zip(q.par_chunks(PIECE));
+    let each: Vec<f64> = planes.map(|(((x, r), p), q)| advance_piece(x, r, p, q, length)).collect();
+    each.into_iter().sum()
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2", "aarch64+neon"))]
+fn advance_piece(x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64], length: f64) -> f64 {
+    let n = r.len();
+    let (x, p, q) = (&mut x[..n], &p[..n], &q[..n]);
+    for i in 0..n {
+        x[i] += length * f64::from(p[i]);
+        r[i] -= length * q[i];
+    }
+    piece(r, r)
 }
 
 fn stalled(iterations: usize, residual: f64) -> Fault {

@@ -1,5 +1,6 @@
 //! Effective figures of a periodic cell: its voxels, three grids of them, and what they tend to; flow through its pore.
 
+mod fractions;
 mod limit;
 mod permeability;
 mod pore_space;
@@ -14,7 +15,7 @@ use crate::csg_tree::CsgSolid;
 use crate::field::Field;
 use crate::kind::Warning;
 use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
-use crate::voxel_fractions::{VoxelGrid, voxel_fractions};
+use fractions::fractions;
 use limit::{Limit, limit};
 pub use permeability::Side;
 
@@ -52,6 +53,9 @@ const TOLERANCE: f64 = 1e-8;
 /// Voxels across a wall below which the figures are to be doubted.
 const ACROSS: f64 = 3.0;
 
+/// Voxels along an edge beyond which none are recommended.
+const MOST: f64 = 10_000.0;
+
 /// A tensor of a cell of voxels.
 type Solve<'a, T> = dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, Stopped> + 'a;
 
@@ -74,11 +78,9 @@ impl UnitCell {
 
     /// The voxels of a grid.
     fn voxels(&self, shape: [usize; 3], plain: bool, progress: &dyn Progress) -> Result<VoxelCell, Stopped> {
-        let step = shape.map(|n| 1.0 / n as f64);
-        let fractions = if plain {
-            self.centres(shape, progress)?
-        } else {
-            voxel_fractions(&self.solid, &VoxelGrid { origin: [0.0; 3], step, shape }, progress)?
+        let fractions = match plain {
+            true => self.centres(shape, progress)?,
+            false => fractions(&self.solid, &self.edges, shape, progress)?,
         };
         VoxelCell::new(shape, transpose(&self.edges), fractions).map_err(Stopped::Refused)
     }
@@ -122,12 +124,17 @@ impl UnitCell {
     fn across(&self, shape: [usize; 3], n: usize, warnings: &mut Vec<Warning>) -> Option<f64> {
         let edges = [0, 1, 2].map(|a| norm(self.edges[a]) / shape[a] as f64);
         let across = self.wall? / edges.into_iter().fold(0.0, f64::max);
-        if across < ACROSS {
-            let need = 8 * ((n as f64 * ACROSS / across / 8.0).ceil() as usize);
-            let message = format!(
-                "the thinnest wall is {across:.1} voxels across; below {ACROSS} the figures are too high by more than the error says: \
-                 take n = {need}"
-            );
+        // A neck of a cell that is apart is said to be none by what says so.
+        if across < ACROSS && (across > 0.0 || self.apart().is_none()) {
+            let message = match enough(n, ACROSS / across) {
+                Some(need) => format!(
+                    "the thinnest wall is {across:.1} voxels across; below {ACROSS} the figures are too high by more than the error says: \
+                     take n = {need}"
+                ),
+                None => "the thinnest wall or neck is of no thickness, which no number of voxels resolves: the figures are of a cell whose \
+                         members may touch; take a greater fraction"
+                    .into(),
+            };
             warnings.push(Warning { path: self.path.clone(), message });
         }
         Some(across)
@@ -187,11 +194,12 @@ impl UnitCell {
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
-        let Limit { tensor, error, order } = limit(&grids);
+        let limited = limit(&grids);
+        let mut warnings: Vec<Warning> = limited.doubt(&self.path, resolution.n).into_iter().collect();
+        let Limit { tensor, error, order, .. } = limited;
         let c: Voigt = std::array::from_fn(|i| std::array::from_fn(|j| tensor[6 * i + j]));
         let (finest, found) = &made[0];
         let fraction = self.fraction.unwrap_or_else(|| finest.fraction());
-        let mut warnings = Vec::new();
         let wall_voxels = self.across(finest.shape, resolution.n, &mut warnings);
         let moduli = Moduli::of(&c);
         if moduli.is_none() {
@@ -241,7 +249,6 @@ impl UnitCell {
             );
             return Err(Stopped::Refused(Fault::new("pore", message)));
         }
-        let mut warnings = Vec::new();
         let known = self.apart().filter(|_| pore == 0.0);
         let made = self.on_grids(resolution, progress, &|voxels, progress| {
             let least = if known.is_some() { 0.5 } else { 0.0 };
@@ -252,7 +259,9 @@ impl UnitCell {
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
-        let Limit { tensor, error, order } = limit(&grids);
+        let limited = limit(&grids);
+        let mut warnings: Vec<Warning> = limited.doubt(&self.path, resolution.n).into_iter().collect();
+        let Limit { tensor, error, order, .. } = limited;
         let (finest, found) = &made[0];
         if pore == 0.0 && (known.is_some() || tensor.iter().all(|v| *v == 0.0)) {
             let message = format!(
@@ -293,6 +302,12 @@ impl UnitCell {
     }
 }
 
+/// The multiple of eight from `n` times `more` on; `None` beyond what any machine holds.
+fn enough(n: usize, more: f64) -> Option<usize> {
+    let need = 8.0 * (n as f64 * more / 8.0).ceil();
+    (need <= MOST).then_some(need as usize)
+}
+
 fn work(shape: &[usize; 3]) -> f64 {
     shape.iter().product::<usize>() as f64
 }
@@ -302,5 +317,16 @@ fn grid<const N: usize>(voxels: &VoxelCell, tensor: &[[f64; N]; N]) -> CellGrid 
         shape: voxels.shape,
         fraction: voxels.fraction(),
         tensor: tensor.iter().map(|row| row.to_vec()).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::enough;
+
+    #[test]
+    fn advice_on_voxels_is_a_number_that_exists() {
+        assert_eq!(enough(32, 3.0), Some(96));
+        assert_eq!((enough(32, f64::INFINITY), enough(32, 1e5), enough(32, f64::NAN)), (None, None, None));
     }
 }

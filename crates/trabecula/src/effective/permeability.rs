@@ -5,13 +5,13 @@ use geometry::math::{Mat3, determinant, norm, transpose};
 use geometry::progress::{Progress, Stage, Stopped};
 use homogenise::{Homogenised, VoxelCell};
 
+use super::fractions::fractions;
 use super::limit::{Limit, limit};
 use super::pore_space::{CubicGrid, PoreSpace, wall_area};
-use super::{LEAST, TOLERANCE, UnitCell, work};
+use super::{LEAST, TOLERANCE, UnitCell, enough, work};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::kind::Warning;
 use crate::report::{CellGrid, PermeabilityReport};
-use crate::voxel_fractions::{VoxelGrid, voxel_fractions};
 
 /// A side of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,11 +58,11 @@ impl UnitCell {
         let flows = self.flows(n, &solids, &part(0.0, 0.9))?;
         let (conducts, porosity) = self.pore_conducts(n, &solids, &part(0.9, 1.0))?;
         let tensors: Vec<([usize; 3], Vec<f64>)> =
-            flows.iter().map(|f| (f.grid.shape, f.found.tensor.iter().flatten().copied().collect())).collect();
-        let Limit { tensor, error, order } = limit(&tensors);
-        let largest = tensor.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let clean = |v: f64| if v.abs() <= NOTHING * largest { 0.0 } else { v };
-        let k: Mat3 = std::array::from_fn(|i| std::array::from_fn(|j| clean(tensor[3 * i + j])));
+            flows.iter().map(|f| (f.grid.shape, clean(&f.found.tensor).into_iter().flatten().collect())).collect();
+        let limited = limit(&tensors);
+        let doubt = limited.doubt(&self.path, n);
+        let Limit { tensor, error, order, .. } = limited;
+        let k = clean(&std::array::from_fn(|i| std::array::from_fn(|j| tensor[3 * i + j])));
         let areas: Vec<([usize; 3], Vec<f64>)> = flows.iter().map(|f| (f.grid.shape, vec![f.area])).collect();
         let (volume, area) = (determinant(&self.edges).abs(), limit(&areas).tensor[0]);
         let diameter = (area > 0.0).then(|| 4.0 * porosity * volume / area);
@@ -73,7 +73,7 @@ impl UnitCell {
         let cube = finest.grid.lean == [0; 3] && lengths.iter().all(|l| (l / lengths[0] - 1.0).abs() < 1e-9);
         let strain = finest.grid.strain;
         Ok(PermeabilityReport {
-            k_n: finest.found.tensor.map(|row| row.map(clean)),
+            k_n: clean(&finest.found.tensor),
             k_cell: cube.then(|| k.map(|row| row.map(|v| v / (lengths[0] * lengths[0])))),
             n,
             error: error + if cube { 0.0 } else { strain },
@@ -91,7 +91,10 @@ impl UnitCell {
             edges: self.edges,
             pore_nodes: across,
             grids: flows.iter().map(grid).collect(),
-            warnings: self.doubts(&k, n, across, &finest.grid, if cube { 0.0 } else { strain }),
+            warnings: doubt
+                .into_iter()
+                .chain(self.doubts(&k, n, across, &finest.grid, if cube { 0.0 } else { strain }))
+                .collect(),
             k,
         })
     }
@@ -135,17 +138,17 @@ impl UnitCell {
             said.push(format!("the pore does not go through along {}: nothing flows there", closed.join(", ")));
         }
         if let Some(across) = across.filter(|a| *a < ACROSS) {
-            let need = 8 * ((n as f64 * ACROSS / across / 8.0).ceil() as usize);
+            let need = enough(n, ACROSS / across).map_or(String::new(), |need| format!(": take n = {need}"));
             said.push(format!(
                 "the hydraulic diameter is {across:.1} steps of the grid across; below {ACROSS} the figures may be off by more than the error \
-                 says: take n = {need}"
+                 says{need}"
             ));
         }
         // The two sides of a sheet are apart however thin its wall is.
         if let Some(wall) = self.wall.map(|w| w / grid.step).filter(|w| *w < 2.0 && !self.sheet) {
-            let need = 8 * ((n as f64 * 2.0 / wall / 8.0).ceil() as usize);
+            let need = enough(n, 2.0 / wall).map_or(String::new(), |need| format!(": take n = {need}"));
             said.push(format!(
-                "the thinnest wall or neck is {wall:.1} steps of the grid across; below 2 links may pass through it: take n = {need}"
+                "the thinnest wall or neck is {wall:.1} steps of the grid across; below 2 links may pass through it{need}"
             ));
         }
         if strain > STRAINED {
@@ -211,8 +214,7 @@ impl UnitCell {
             for (i, shape) in shapes.iter().enumerate() {
                 let part = |from, to| Stage { whole: progress, from: share(from), to: share(to) };
                 let from = i as f64 / shapes.len() as f64;
-                let grid = VoxelGrid { origin: [0.0; 3], step: shape.map(|n| 1.0 / n as f64), shape: *shape };
-                let mut open = voxel_fractions(solid, &grid, &part(from, from + 0.1))?;
+                let mut open = fractions(solid, &self.edges, *shape, &part(from, from + 0.1))?;
                 open.iter_mut().for_each(|w| *w = 1.0 - *w);
                 let cell = VoxelCell::new(*shape, transpose(&self.edges), open).map_err(Stopped::Refused)?;
                 if i == 0 {
@@ -235,6 +237,12 @@ impl UnitCell {
         };
         Ok((whole, porosity))
     }
+}
+
+/// A permeability with zeros where nothing flows.
+fn clean(k: &Mat3) -> Mat3 {
+    let largest = k.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+    k.map(|row| row.map(|v| if v.abs() <= NOTHING * largest { 0.0 } else { v }))
 }
 
 fn grid(flow: &Flow) -> CellGrid {

@@ -26,7 +26,8 @@ pub struct StiffnessReport {
     pub C_n: [[f64; 6]; 6],
     /// Voxels along the edge of the cell, or of a cube of its volume.
     pub n: usize,
-    /// Estimated relative error of C: its distance from C_n over its size (Frobenius's norm).
+    /// Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much for
+    /// an extrapolation C is C_n, and this the distance of the extrapolated one.
     pub error: f64,
     /// Exponent of the voxel's edge with which the error was taken to fall.
     pub order: f64,
@@ -73,7 +74,8 @@ pub struct ConductivityReport {
     pub k_n: [[f64; 3]; 3],
     /// Voxels along the edge of the cell, or of a cube of its volume.
     pub n: usize,
-    /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm).
+    /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm); where the grids differ too much for
+    /// an extrapolation k is k_n, and this the distance of the extrapolated one.
     pub error: f64,
     /// Exponent of the voxel's edge with which the error was taken to fall.
     pub order: f64,
@@ -109,7 +111,7 @@ pub struct PermeabilityReport {
     /// Nodes along the edge of the cell, or of a cube of its volume.
     pub n: usize,
     /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not whole numbers
-    /// of steps adds.
+    /// of steps adds; where the grids differ too much for an extrapolation k is k_n, and this the distance of the extrapolated one.
     pub error: f64,
     /// Exponent of the grid's step with which the error was taken to fall.
     pub order: f64,
