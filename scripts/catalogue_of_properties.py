@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/generated/properties.json, what all named cells do by their fraction, and catalogue.md with plots of it.
+"""Writes docs/generated/properties.json, what all cells do by their fraction, and catalogue.md with plots of it.
 
-Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--page]
+Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--parts PART ...] [--again] [--page]
 
-Cells that stand in the data at this n or a finer one are kept; --page makes the page of what is there.
+Cells that stand in the data at this n or a finer one are kept, unless --again; --page makes the page of what is there.
 """
 
 import argparse
@@ -22,7 +22,7 @@ DATA = ROOT / "docs" / "generated" / "properties.json"
 PAGE = ROOT / "docs" / "generated" / "catalogue.md"
 PICTURES = ROOT / "docs" / "images"
 FRACTIONS = (0.05, 0.6, 12)
-PARTS = ("sheet", "lower", "upper")
+PARTS = ("sheet", "lower", "upper", "beams")
 #: Plots: column, title, and whether it is logarithmic.
 SHOWN = (
     ("E", "Young's modulus along the axes, over the solid's", True),
@@ -35,21 +35,29 @@ SHOWN = (
 
 #: The named cells but one of the two gyroids, which are mirror images.
 CELLS = [cell[0] for cell in _core.cells() if cell[0] != "gyroid_mirrored"]
+BEAMS = lt.beams.names()
 
 
-def compute(n, cells):
+def order(law):
+    """Where a law stands: named cells first, then cells of beams."""
+    names = BEAMS if law["part"] == "beams" else CELLS
+    return law["part"] == "beams", names.index(law["cell"]), PARTS.index(law["part"])
+
+
+def compute(n, cells, parts, again):
     """Adds laws to the data."""
     kept = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {"laws": []}
     laws = {(law["cell"], law["part"]): law for law in kept["laws"]}
     for cell in cells:
-        for part in PARTS:
-            if laws.get((cell, part), {"n": 0})["n"] >= n:
+        for part in (part for part in parts if cell in (BEAMS if part == "beams" else CELLS)):
+            if not again and laws.get((cell, part), {"n": 0})["n"] >= n:
                 continue
             law = lt.law(cell, part, *FRACTIONS, n=n).to_dict()
             law["columns"] = {k: [v and float(f"{v:.6g}") for v in column] for k, column in law["columns"].items()}
             laws[cell, part] = law
-            order = sorted(laws.values(), key=lambda it: (CELLS.index(it["cell"]), PARTS.index(it["part"])))
-            rows = ",\n".join(json.dumps(it) for it in order)
+            law["fits"] = {k: {name: float(f"{v:.6g}") for name, v in fit.items()} for k, fit in law["fits"].items()}
+            law["notes"] = [{**note, "fraction": float(f"{note['fraction']:.6g}")} for note in law["notes"]]
+            rows = ",\n".join(json.dumps(it) for it in sorted(laws.values(), key=order))
             DATA.write_text(f'{{"laws": [\n{rows}\n]}}\n', encoding="utf-8")
             print(f"{cell} {part}: done", flush=True)
 
@@ -104,11 +112,13 @@ def main():
     """Compute what is asked for, and the page."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--n", type=int, default=64)
-    parser.add_argument("--cells", nargs="+", default=CELLS)
+    parser.add_argument("--cells", nargs="+", default=[*CELLS, *(name for name in BEAMS if name not in CELLS)])
+    parser.add_argument("--parts", nargs="+", default=PARTS, choices=PARTS)
+    parser.add_argument("--again", action="store_true")
     parser.add_argument("--page", action="store_true")
     args = parser.parse_args()
     if not args.page:
-        compute(args.n, args.cells)
+        compute(args.n, args.cells, args.parts, args.again)
     page()
 
 

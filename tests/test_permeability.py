@@ -141,6 +141,22 @@ def test_a_law_says_where_there_is_none():
         lt.law("gyroid", start=0.5, stop=0.2)
 
 
+def test_laws_of_beams():
+    """Of thin struts along three axes a third conducts, and carries, in each; names that named cells have too say which."""
+    found = lt.law("sc", start=0.1, stop=0.3, count=2, n=16, properties=["stiffness", "conductivity"])
+    assert found.part == "beams"
+    for column in ("E", "k"):
+        assert (found.columns[column] > found.columns["fraction"] / 3 * 0.95).all()
+        assert found.columns[column][0] == pytest.approx(0.1 / 3, rel=0.15)
+    named = lt.law("diamond", start=0.3, stop=0.4, count=2, n=8, properties=["area"])
+    struts = lt.law("diamond", "beams", start=0.3, stop=0.4, count=2, n=8, properties=["area"])
+    assert (named.part, struts.part) == ("sheet", "beams") and (named.columns["area"] > struts.columns["area"]).all()
+    with pytest.raises(ValueError, match="its part is 'beams'"):
+        lt.law("octet", "lower")
+    with pytest.raises(ValueError, match="did you mean octet"):
+        lt.law("octett", "beams")
+
+
 def test_a_monotone_cubic_stays_within_its_points():
     x, y = np.array([0.0, 1.0, 2.0, 4.0, 5.0]), np.array([0.0, 0.1, 0.1, 3.0, 3.2])
     along = np.linspace(0, 5, 501)

@@ -591,17 +591,21 @@ COMMANDS = {
         option("--side", choices=("lower", "upper"), help="the pore on one side of a sheet (default: both)"),
     ),
     "law": (
-        "Find what a named cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
+        "Find what a cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
         "At each fraction the limit of grids of n, n/2 and n/4 voxels along the cell; between them monotone cubics, and\n"
         "powers of the fraction fitted (Gibson and Ashby). Stiffness and conductivity are relative to the solid's, lengths\n"
         "to the wavelength. OUT: .csv, a row for each fraction; .json, with fits and notes; .svg, plots.\n\n"
         "examples:\n  trabecula law gyroid -o gyroid.csv gyroid.svg\n"
         "  trabecula law diamond --part lower --from 0.2 --to 0.5 --count 7 --properties stiffness --json",
-        option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` lists them"),
+        option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` and `trabecula cells --beams` list them"),
         option(
             "-o", "--output", nargs="+", type=ending(LAW_WRITES), metavar="OUT", help=f"files to write ({dotted(LAW_WRITES)})"
         ),
-        option("--part", choices=("sheet", "lower", "upper"), default="sheet", help="what is solid (default: sheet)"),
+        option(
+            "--part",
+            choices=("sheet", "lower", "upper", "beams"),
+            help="what is solid (default: sheet, or beams where no other is)",
+        ),
         option("--from", dest="start", type=FRACTION, default=0.05, metavar="F", help="the least fraction (default: 0.05)"),
         option("--to", dest="stop", type=FRACTION, default=0.6, metavar="F", help="the greatest fraction (default: 0.6)"),
         option("--count", type=POINTS, default=12, metavar="N", help="fractions (default: 12)"),

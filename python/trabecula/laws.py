@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from .design import Design, Lattice
-from .errors import DesignWarning
+from . import beams as unit_cells
+from .design import Beams, Design, Lattice
+from .errors import DesignError, DesignWarning
 from .files import extension, whole_file
 from .formats import LAW_WRITES
 from .given import number, positive, whole
@@ -52,6 +53,7 @@ class Law:
     """What a cell does by its solid fraction. Columns by name, NaN where there is no such number (see ``notes``)."""
 
     cell: str
+    #: What is solid; ``beams`` of a unit cell of beams.
     part: str
     n: int
     nu: float
@@ -134,7 +136,7 @@ class Law:
 
 def law(
     cell: str,
-    part: str = "sheet",
+    part: str | None = None,
     start: float = 0.05,
     stop: float = 0.6,
     count: int = 12,
@@ -144,10 +146,13 @@ def law(
     threads: int | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> Law:
-    """What a named cell does by its solid fraction: stiffness over E of a solid of Poisson's ratio ``nu``, conductivity over
-    the solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions from ``start`` to ``stop``,
-    each the limit of grids of n, n/2 and n/4 voxels along the cell, with monotone interpolation between and powers of the
-    fraction fitted (Gibson and Ashby).
+    """What a named cell, or a unit cell of beams, does by its solid fraction: stiffness over E of a solid of Poisson's ratio
+    ``nu``, conductivity over the solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions
+    from ``start`` to ``stop``, each the limit of grids of n, n/2 and n/4 voxels along the cell, with monotone interpolation
+    between and powers of the fraction fitted (Gibson and Ashby).
+
+    ``part`` is what is solid: "sheet" (the default), "lower" or "upper" of a named cell, "beams" of a cell of beams (the
+    default for names that no other cell has). Of cells with unequal edges the wavelength is the first.
 
     ``properties`` names fewer of "stiffness", "conductivity", "permeability", "area". Where a cell falls apart its stiffness is
     NaN, and ``notes`` says so. Raises ValueError for fractions outside 0 to 1 or out of order.
@@ -159,16 +164,28 @@ def law(
     for name in properties:
         if name not in PROPERTIES:
             raise ValueError(f"no property {name!r}; there are {', '.join(PROPERTIES)}")
+    named = cell in (it[0] for it in _core.cells())
+    part = part or ("beams" if not named and cell in unit_cells.names() else "sheet")
+    if part == "beams":
+        try:
+            unit_cells.cell(cell)
+        except KeyError as why:
+            raise ValueError(why.args[0]) from None
+    elif not named and cell in unit_cells.names():
+        raise ValueError(f"{cell} is a cell of beams: its part is 'beams', found {part!r}")
     fractions = np.linspace(start, stop, count)
     names = [column for key, columns in PROPERTIES.items() if key in properties for column in columns]
     columns = {"fraction": fractions} | {name: np.full(count, np.nan) for name in names}
     notes: dict[float, list[str]] = {}
     for i, fraction in enumerate(fractions):
-        lattice = Lattice(cell, part, affine(wavelength=1.0), {"fraction": float(fraction)})
-        with warnings.catch_warnings():
-            # That a cell falls apart is said by its properties, in ``notes``.
-            warnings.simplefilter("ignore", DesignWarning)
-            solid = Design(box(size=[1, 1, 1]), lattice).build()
+        try:
+            solid = _solid(cell, part, float(fraction))
+        except DesignError as why:
+            # Beams of no radius have this fraction.
+            if part != "beams":
+                raise
+            notes[float(fraction)] = [f"no such cell: {why}"]
+            continue
         for j, key in enumerate(k for k in PROPERTIES if k in properties):
             done, total = i * len(properties) + j, count * len(properties)
             work = threads, _part(progress, done, total)
@@ -182,6 +199,20 @@ def law(
                 notes.setdefault(float(fraction), []).extend(said)
     fits = {name: made for name in FITTED if name in columns and (made := _power(fractions, columns[name]))}
     return Law(cell, part, n, nu, columns, fits, notes)
+
+
+def _solid(cell: str, part: str, fraction: float):
+    """A cell of wavelength 1 at a fraction."""
+    if part == "beams":
+        shape = np.array(unit_cells.cell(cell)["aspect"])
+        shape = [float(v) for v in shape / shape[0]]
+        design = Design(box(size=shape), beams=Beams(cell, affine(wavelength=shape), fraction=fraction))
+    else:
+        design = Design(box(size=[1, 1, 1]), Lattice(cell, part, affine(wavelength=1.0), {"fraction": fraction}))
+    with warnings.catch_warnings():
+        # That a cell falls apart is said by its properties, in ``notes``.
+        warnings.simplefilter("ignore", DesignWarning)
+        return design.build()
 
 
 def _part(progress: Callable[[int, int], Any] | None, done: int, total: int) -> Callable[[int, int], Any] | None:
