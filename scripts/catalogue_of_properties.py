@@ -65,7 +65,7 @@ def compute(n, cells, parts, again):
 def page():
     """The page and its plots."""
     laws = json.loads(DATA.read_text(encoding="utf-8"))["laws"]
-    for part in PARTS:
+    for part in (part for part in PARTS if any(law["part"] == part for law in laws)):
         plots = []
         for column, title, log in SHOWN:
             curves = []
@@ -85,14 +85,14 @@ def page():
 def lines(laws):
     """The page's text."""
     yield "<!-- Made by scripts/catalogue_of_properties.py; do not edit. -->"
-    yield "# What the named cells do"
+    yield "# What the cells do"
     yield ""
     yield (
         "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three "
         "grids, by [`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
         "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through."
     )
-    for part in PARTS:
+    for part in (part for part in PARTS if any(law["part"] == part for law in laws)):
         yield from ("", f"## {part}", "", f"![Properties by fraction](../images/properties_{part}.svg)", "")
         yield "| cell | n | fraction | E | error of C | Zener | k | error of k | K / λ² | error of K | area λ / V |"
         yield "|" + "---|" * 11

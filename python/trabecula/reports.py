@@ -213,7 +213,8 @@ class ConductivityReport(Report):
     edges: list[list[float]]
     """Edges of the cell, mm, one row each."""
     error: float
-    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm)."""
+    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm); where the grids differ too much
+    for an extrapolation k is k_n, and this the distance of the extrapolated one."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
@@ -692,7 +693,8 @@ class PermeabilityReport(Report):
     """Edges of the cell, mm, one row each."""
     error: float
     """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not
-    whole numbers of steps adds."""
+    whole numbers of steps adds; where the grids differ too much for an extrapolation k is k_n, and this the distance of
+    the extrapolated one."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
@@ -959,7 +961,8 @@ class StiffnessReport(Report):
     edges: list[list[float]]
     """Edges of the cell, mm, one row each."""
     error: float
-    """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm)."""
+    """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much
+    for an extrapolation C is C_n, and this the distance of the extrapolated one."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
