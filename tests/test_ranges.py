@@ -458,12 +458,12 @@ def changed(cluster, code: str):
     from distributed import Client
 
     with Client(cluster.scheduler_address) as client:
-        client.run(exec, f"import trabecula.shared_file as it\n{code}", {})
+        client.run(exec, f"import trabecula.shared_file as it\nit.before = dict(vars(it))\n{code}", {})
         try:
             yield
-        finally:
-            client.run(exec, "import importlib, trabecula.ranges as to, trabecula.shared_file as it\nimportlib.reload(it)", {})
-            client.run(exec, "import trabecula.ranges as to, trabecula.shared_file as it\nto.write_at = it.write_at", {})
+        finally:  # a worker that was started in between is as it was
+            restored = "before = vars(it).get('before', dict(vars(it)))\nvars(it).clear()\nvars(it).update(before)"
+            client.run(exec, f"import trabecula.shared_file as it\n{restored}", {}, on_error="ignore")
 
 
 @pytest.fixture
