@@ -13,11 +13,13 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import trabecula as lt
-from trabecula import cli, clusters, ranges, unfinished
+from trabecula import cli, clusters, ranges, shared_file, unfinished
 from trabecula.errors import Refused
+from trabecula.shared_file import Written
 from trabecula.unfinished import Unfinished
 
 CORPUS = Path(__file__).parents[1] / "corpus" / "designs"
@@ -213,25 +215,31 @@ def test_killed_at_random_moments_it_goes_on_to_the_same_file(tmp_path: Path, wh
     assert again(path) == whole[1] and path.read_bytes() == whole[0]
 
 
+@pytest.mark.parametrize("room", [True, False])
 @pytest.mark.parametrize("at", [0, 1, 2, 5, 9])
-def test_killed_while_bytes_are_moved_it_goes_on_to_the_same_file(tmp_path: Path, whole, monkeypatch, at: int):
+def test_killed_while_bytes_are_copied_it_goes_on_to_the_same_file(tmp_path: Path, whole, monkeypatch, at: int, room: bool):
     monkeypatch.setattr(unfinished, "CHUNK", 300_000)
-    path, moved, put = tmp_path / "part.stl", 0, Unfinished._put
+    monkeypatch.setattr(unfinished.shutil, "disk_usage", lambda folder: SimpleNamespace(free=10**12 if room else 10**5))
+    path, copied, write = tmp_path / "part.stl", 0, unfinished.write
 
-    def torn(self, place, chunk):
-        nonlocal moved
-        moved += 1
-        if moved > at:  # half of it is written
-            put(self, place, chunk[: len(chunk) // 2])
-            raise KeyboardInterrupt
-        put(self, place, chunk)
+    def torn(file, place, chunk):
+        nonlocal copied
+        if str(file.name).isdigit():  # the file of what is kept
+            copied += 1
+            if copied > at:  # half of it is written
+                write(file, place, chunk[: len(chunk) // 2])
+                raise KeyboardInterrupt
+        write(file, place, chunk)
 
-    monkeypatch.setattr(Unfinished, "_put", torn)
+    monkeypatch.setattr(unfinished, "write", torn)
     with pytest.raises(KeyboardInterrupt):
         again(path, 5)
     assert not path.exists()
-    monkeypatch.setattr(Unfinished, "_put", put)
+    data = os.path.getsize(tmp_path / "part.stl.parts" / "data")
+    assert data > len(whole[0]) if room or not at else data < len(whole[0]) or at < 5
+    monkeypatch.setattr(unfinished, "write", write)
     assert again(path, 5) == whole[1] and path.read_bytes() == whole[0]
+    left_alone(path)
 
 
 def stopped(path: Path, after: int, size: int = 1) -> None:
@@ -444,6 +452,119 @@ def test_workers_that_are_killed_and_join_change_nothing(tmp_path: Path, whole, 
     assert path.read_bytes() == whole[0]
 
 
+@contextlib.contextmanager
+def changed(cluster, code: str):
+    """Workers in which the module ``shared_file`` is changed by this code."""
+    from distributed import Client
+
+    with Client(cluster.scheduler_address) as client:
+        client.run(exec, f"import trabecula.shared_file as it\nit.before = dict(vars(it))\n{code}", {})
+        try:
+            yield
+        finally:  # a worker that was started in between is as it was
+            restored = "before = vars(it).get('before', dict(vars(it)))\nvars(it).clear()\nvars(it).update(before)"
+            client.run(exec, f"import trabecula.shared_file as it\n{restored}", {}, on_error="ignore")
+
+
+@pytest.fixture
+def added(monkeypatch) -> list:
+    """What is added to a folder: bytes that are sent, or what stands there already."""
+    seen, add = [], Unfinished.add
+
+    def noted(self, number, data, partial):
+        seen.append(data)
+        add(self, number, data, partial)
+
+    monkeypatch.setattr(Unfinished, "add", noted)
+    return seen
+
+
+def test_workers_here_write_to_the_file_themselves(tmp_path: Path, whole, cluster, added: list):
+    path = tmp_path / "part.stl"
+    assert again(path, cluster=cluster.scheduler_address) == whole[1]
+    assert path.read_bytes() == whole[0] and added and all(isinstance(data, Written) for data in added)
+    left_alone(path)
+
+
+#: What a worker of another machine finds, and one of this machine in a container.
+ELSEWHERE = [
+    "import types\nit.platform = types.SimpleNamespace(node=lambda: 'elsewhere')",
+    "def none(*words, **more):\n raise FileNotFoundError\nit.open = none",
+]
+
+
+@pytest.mark.parametrize("code", ELSEWHERE)
+def test_workers_that_do_not_see_the_file_send_what_they_make(tmp_path: Path, whole, cluster, added: list, code: str):
+    path = tmp_path / "part.stl"
+    with changed(cluster, code):
+        assert again(path, cluster=cluster.scheduler_address) == whole[1]
+    assert path.read_bytes() == whole[0] and added and all(isinstance(data, bytes) for data in added)
+
+
+def test_a_file_system_without_second_names_has_ranges_sent(tmp_path: Path, whole, cluster, added: list, monkeypatch):
+    def none(*names):
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(shared_file.os, "link", none)
+    path = tmp_path / "part.stl"
+    assert again(path, cluster=cluster.scheduler_address) == whole[1]
+    assert path.read_bytes() == whole[0] and all(isinstance(data, bytes) for data in added)
+
+
+#: A worker writes half of a range and kills itself, unless one has done so before.
+KILLS_ITSELF = """
+import os, signal
+write = it.write
+def torn(file, place, piece):
+    write(file, place, piece[: len(piece) // 2])
+    try:
+        os.close(os.open({mark!r}, os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        return write(file, place, piece)
+    os.kill(os.getpid(), signal.SIGKILL)
+it.write = torn
+"""
+
+
+def test_a_worker_killed_while_it_writes_changes_nothing(tmp_path: Path, whole, cluster):
+    path, mark = tmp_path / "part.stl", tmp_path / "mark"
+    with changed(cluster, KILLS_ITSELF.format(mark=str(mark))):
+        assert again(path, cluster=cluster.scheduler_address) == whole[1]
+    assert mark.exists() and path.read_bytes() == whole[0]
+
+
+def test_a_disk_that_is_full_where_workers_write_keeps_what_is_done(tmp_path: Path, whole, cluster):
+    path = tmp_path / "part.stl"
+    code = "def full(*words):\n raise OSError(28, 'No space left on device')\nit.write = full"
+    with changed(cluster, code), pytest.raises(OSError, match=r"part.stl.parts: No space left on device; free some space"):
+        again(path, cluster=cluster.scheduler_address)
+    assert again(path, cluster=cluster.scheduler_address) == whole[1] and path.read_bytes() == whole[0]
+
+
+def test_a_file_is_written_to_for_as_long_as_it_is_shared(tmp_path: Path, monkeypatch):
+    path = tmp_path / "data"
+    path.write_bytes(bytes(8))
+    with shared_file.shared(str(path)) as to:
+        assert shared_file.write_at(to, 2, [b"ab", b"", b"cde"]) == [
+            Written(len(part), hashlib.sha256(part).hexdigest()) for part in (b"ab", b"", b"cde")
+        ]
+        assert shared_file.write_at(to | {"machine": "another"}, 0, [b"x"]) is None
+        assert shared_file.write_at(to | {"file": (0, 0)}, 0, [b"x"]) is None
+    assert shared_file.write_at(to, 0, [b"x"]) is None
+    with shared_file.shared(str(path)) as to:  # its owner is killed, and begins anew while another process writes
+        monkeypatch.setattr(shared_file, "PIECE", 2)
+        write = shared_file.write
+
+        def begin_anew(file, place, piece):
+            write(file, place, piece)
+            shared_file.withdraw(str(path))
+
+        monkeypatch.setattr(shared_file, "write", begin_anew)
+        assert shared_file.write_at(to, 0, [b"xyz"]) is None
+    assert path.read_bytes() == b"xyabcde\0"
+    left_alone(path)
+
+
 def test_killed_with_its_cluster_it_goes_on_without(tmp_path: Path, whole, cluster):
     path = tmp_path / "part.stl"
 
@@ -465,7 +586,7 @@ def test_workers_of_another_version_are_refused(tmp_path: Path, cluster, monkeyp
             again(tmp_path / "part.stl", cluster=cluster.scheduler_address)
     job = {"version": "9.9.9"}
     with pytest.raises(ValueError, match=r"a worker has version .*, the job is of 9\.9\.9"):
-        ranges.range_of(job, 0, 1, 1)
+        ranges.made_of(job, 0, 1, 1)
 
 
 def test_a_cluster_that_does_not_answer_is_named_in_bounded_time(tmp_path: Path, monkeypatch):

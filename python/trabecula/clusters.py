@@ -20,10 +20,20 @@ __all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
 
 #: Seconds that a cluster has to answer, and to have a worker again when it has lost the last one.
 PATIENCE = 30
-#: Tasks that wait at each thread of a worker: enough to keep it busy, few enough for the scheduler's memory.
+#: Tasks that wait at each thread of a worker: enough to keep it busy, few enough for the memory of both.
 WAITING = 2
 #: Environment of workers here: freed memory is used again rather than given back at once, which costs as much as the work.
-MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25, "OMP_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1}
+MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25, "MALLOC_ARENA_MAX": 1}
+MEMORY |= {"OMP_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1}
+#: Settings of Dask for workers here. It looks at itself many times a second, which takes time from the work.
+HERE = {
+    "distributed.scheduler.allowed-failures": 1000,  # a worker that is killed is started again: its task is not to blame
+    "distributed.nanny.pre-spawn-environ": MEMORY,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.scheduler.work-stealing-interval": "1s",
+}
 #: How often a task is tried that ends with its worker.
 TRIES = 20
 
@@ -56,8 +66,7 @@ def _client(dask: Any, cluster: str) -> Any:
         count = cluster.removeprefix("local:")
         if not count.isdigit() or not 1 <= int(count) <= 4096:
             raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
-        # A worker that is killed is started again: its task is not to blame.
-        with _settings({"distributed.scheduler.allowed-failures": 1000, "distributed.nanny.pre-spawn-environ": MEMORY}):
+        with _settings(HERE):
             local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
             # Results do not go by way of the scheduler, which is in this process.
             return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
@@ -106,35 +115,62 @@ def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, 
     return row_of(Job.of(job), number, values)
 
 
-def in_order(client: Any, work: Callable, inputs: dict[str, Any], tasks: Iterable[tuple]) -> Iterator[Any]:
-    """``work(inputs, *task)`` of each task, in the order of the tasks, which are begun ``WAITING`` a thread ahead: results wait
-    at the workers that made them, and come here one at a time. A task whose worker dies is given to another.
+def in_order(
+    client: Any,
+    work: Callable,
+    inputs: dict[str, Any],
+    tasks: Iterable[tuple],
+    about: Callable[[Any], Any],
+    then: Callable[[Any], tuple],
+) -> Iterator[Any]:
+    """Of each task, in order, what is wanted of its result: ``work(inputs, *task)``, which stays at the worker that made it.
 
-    ``inputs``, plain data, goes once to each worker. Raises what ``work`` raises, and ValueError for a cluster that has lost
+    There ``about(result)`` is asked first; what ``then`` gives for the answer here, a function and more arguments, is called
+    there with the result next, and what that returns comes here, one at a time. Tasks are begun ``WAITING`` a thread ahead.
+    A task whose worker dies is given to another.
+
+    ``inputs``, plain data, goes once to each worker. Raises what the functions do, and ValueError for a cluster that has lost
     its workers for longer than ``PATIENCE``.
     """
     given = client.submit(_same, inputs, pure=False)
-    waiting, begun = iter(tasks), deque()
+    waiting = iter(tasks)
+    asked: deque[list] = deque()
+    wanted: deque[list] = deque()
+
+    def ask(made: Any, question: tuple) -> Any:
+        return client.submit(question[0], made, *question[1:], pure=False, priority=1)  # before work that waits
 
     def begin() -> None:
         room = WAITING * max(sum(client.nthreads().values()), 1)
-        for task in islice(waiting, max(room - len(begun), 0)):
-            begun.append((task, client.submit(work, given, *task, pure=False)))
+        for task in islice(waiting, max(room - len(asked) - len(wanted), 0)):
+            made = client.submit(work, given, *task, pure=False)
+            asked.append([task, made, (about,), ask(made, (about,))])
 
-    begin()
-    while begun:
-        task, future = begun.popleft()
+    def answer(begun: list) -> Any:
+        """What a task is asked, waited for; it is begun again if its worker has died."""
+        nonlocal given
+        task, _, question, future = begun
         for attempt in range(TRIES):
             try:
-                made = _result(client, future)
-                break
+                return _result(client, future)
             except _lost() as error:
                 if attempt + 1 == TRIES:
                     raise ValueError(f"a task of the cluster ended {TRIES} workers; are they out of memory? {error}") from None
                 given = client.submit(_same, inputs, pure=False)
-                future = client.submit(work, given, *task, pure=False)
-        begin()
-        yield made
+                begun[1] = client.submit(work, given, *task, pure=False)
+                begun[3] = future = ask(begun[1], question)
+
+    begin()
+    while asked or wanted:
+        if asked:
+            begun = asked.popleft()
+            begun[2] = then(answer(begun))
+            begun[3] = ask(begun[1], begun[2])
+            wanted.append(begun)
+        if len(wanted) > 1 or not asked:  # while one is asked about, the one before it does what is wanted
+            made = answer(wanted.popleft())
+            begin()
+            yield made
 
 
 def _lost() -> tuple[type[BaseException], ...]:

@@ -19,6 +19,7 @@ from .clusters import connected, in_order
 from .design import _moved, parsed
 from .given import thread_count
 from .sent import digest_of, files_of, put_files
+from .shared_file import Written, write_at
 from .unfinished import Unfinished
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -31,8 +32,13 @@ if TYPE_CHECKING:
 
 __all__ = ["measure", "save", "save_voxels"]
 
-#: Bytes of a range, about: what a worker makes, and sends, at a time.
-WANTED = 1 << 25
+#: Bytes of a range, about: few enough that its memory is used again by the next one rather than given back to the system.
+WANTED = 1 << 23
+#: The most ranges that a worker makes at a time, when they stay on this machine and when they may be sent: a task costs Dask
+#: about as much time as a range, and one result at a time is in the memory of this process.
+AT_ONCE, SENT_AT_ONCE = 16, 4
+#: The fewest tasks of a part, so that all workers have some.
+TASKS = 16
 #: Bytes of the header and of a triangle of a binary STL, and the most triangles that it counts.
 HEADER, RECORD, MOST = 84, 50, 2**32 - 1
 
@@ -194,7 +200,7 @@ class _Work:
             again = f", {len(damaged)} of them damaged and made again" if damaged else ""
             terminal.say(f"{begun} of {self.count} ranges are there already ({folder.folder}){again}")
 
-        def put(number: int, data: bytes, partial: bytes) -> None:
+        def put(number: int, data: bytes | Written, partial: bytes) -> None:
             folder.add(number, data, partial)
             if self.limit and folder.length > self.limit:
                 raise ValueError("more than 2^32 triangles, the most an STL can count; use a larger edge")
@@ -209,15 +215,15 @@ class _Work:
         self._make(list(range(begun, self.count)), cluster, threads, put)
 
     def _make(
-        self, missing: list[int], cluster: str | None, threads: int | None, put: Callable[[int, bytes, bytes], None]
+        self,
+        missing: list[int],
+        cluster: str | None,
+        threads: int | None,
+        put: Callable[[int, bytes | Written, bytes], None],
     ) -> None:
         """Makes ranges by their numbers, and calls ``put`` with each, in order."""
         if missing and cluster:
-            with connected(cluster) as client:
-                tasks = [(n * self.size, min((n + 1) * self.size, self.ranges.count), self.size) for n in missing]
-                made = in_order(client, range_of, self.job, tasks)
-                for number, (data, partial) in zip(missing, made, strict=True):
-                    put(number, data, partial)
+            self._make_by(cluster, missing, put)
             return
         for first, end in _rows(missing):  # ranges in a row are made without a pause between them
             self.ranges.each(
@@ -227,6 +233,27 @@ class _Work:
                 lambda start, _, data, partial: put(start // self.size, data, partial),
                 thread_count(threads),
             )
+
+    def _make_by(self, cluster: str, missing: list[int], put: Callable[[int, bytes | Written, bytes], None]) -> None:
+        """As ``_make``, by a cluster. Workers on this machine write what follows the ranges so far to its place."""
+        last = self.ranges.count
+        most = AT_ONCE if cluster.startswith("local:") else SENT_AT_ONCE
+        most = min(most, max(len(missing) // TASKS, 1))
+        rows = [(n, min(n + most, end)) for first, end in _rows(missing) for n in range(first, end, most)]
+        tasks = [(first * self.size, min(end * self.size, last), self.size) for first, end in rows]
+        follow = missing[0] == len(self.folder.ranges)
+        place = self.folder.length
+        with connected(cluster) as client, self.folder.shared() as file:
+
+            def put_of(lengths: list[int]) -> tuple:
+                nonlocal place
+                at, place = place, place + sum(lengths)
+                return put_made, file if follow else None, at
+
+            made = in_order(client, made_of, self.job, tasks, lengths_of, put_of)
+            for (first, _), ranges in zip(rows, made, strict=True):
+                for number, (data, partial) in enumerate(ranges, first):
+                    put(number, data, partial)
 
 
 def _rows(numbers: list[int]) -> Iterator[tuple[int, int]]:
@@ -246,8 +273,8 @@ _last: tuple[str, Any] | None = None
 _lock = threading.Lock()
 
 
-def range_of(job: dict[str, Any], start: int, end: int, size: int) -> tuple[bytes, bytes]:
-    """A range of a job: its bytes and its partial result. Workers of clusters call it.
+def made_of(job: dict[str, Any], start: int, end: int, size: int) -> list[tuple[bytes, bytes]]:
+    """Ranges of a job: of each its bytes and its partial result. Workers of clusters call it.
 
     Raises ValueError for a job of another version.
     """
@@ -255,7 +282,20 @@ def range_of(job: dict[str, Any], start: int, end: int, size: int) -> tuple[byte
         raise ValueError(f"a worker has version {_core.__version__}, the job is of {job['version']}")
     made: list[tuple[bytes, bytes]] = []
     _ranges_of(job).each(start, end, size, lambda _, __, data, partial: made.append((data, partial)), 1)
-    return made[0]
+    return made
+
+
+def lengths_of(made: list[tuple[bytes, bytes]]) -> list[int]:
+    """The numbers of bytes of ranges."""
+    return [len(data) for data, _ in made]
+
+
+def put_made(made: list[tuple[bytes, bytes]], file: dict[str, Any] | None, place: int) -> list[tuple[bytes | Written, bytes]]:
+    """Ranges as they go to the process that asks: as what stands at their place in its file, if it is seen from here; else
+    themselves.
+    """
+    written = file and write_at(file, place, [data for data, _ in made])
+    return [(at, partial) for at, (_, partial) in zip(written, made, strict=True)] if written else list(made)
 
 
 def _ranges_of(job: dict[str, Any]) -> Any:

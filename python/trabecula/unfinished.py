@@ -9,18 +9,19 @@ import os
 import shutil
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from .errors import Refused
 from .files import replace_file
+from .shared_file import Written, shared, withdraw, write
 
 __all__ = ["Range", "Unfinished"]
 
-#: Bytes that are moved or checked at once.
-CHUNK = 1 << 25
-#: Bytes that are written at once.
+#: Bytes of which the disk holds two copies while the output is put together and has no room for more.
+CHUNK = 1 << 26
+#: Bytes that are read at once.
 PIECE = 1 << 20
 
 
@@ -60,12 +61,14 @@ class Unfinished:
     def opened(self, new: bool = False) -> Iterator[None]:
         """Makes the folder, or takes it up unless a ``new`` run is wanted; ``ranges`` are then those of an earlier run.
 
-        Raises Refused for a folder of another design or version, with what differs, and for one that another process works in.
+        Raises Refused for a folder of another design or version, with what differs, and for one that another process works in;
+        OSError for a disk that is full, here or where a worker writes.
         """
         os.makedirs(self.folder, exist_ok=True)
         name = self.name("lines")
         with open(name, "a+b") as self._lines:
             _alone(self._lines, self.folder)
+            withdraw(self.name("data"))
             self._lines.seek(0)
             raw = self._lines.read()
             read, length = _lines_of(raw)
@@ -75,7 +78,7 @@ class Unfinished:
             if new or not read:
                 self._lines.truncate(0)
                 read = []
-                for name in ("data", "partials", "moving"):
+                for name in ("data", "partials", "whole"):
                     with suppress(FileNotFoundError):
                         os.remove(self.name(name))
             else:
@@ -86,13 +89,20 @@ class Unfinished:
                 self._note(self.head)
             with open(self.name("partials"), "a+b"), open(self.name("data"), "a+b"):
                 pass
-            with open(self.name("data"), "r+b") as self._data, open(self.name("partials"), "r+b") as self._partials:
+            # Without buffers, which would hide what workers write.
+            with open(self.name("data"), "r+b", 0) as self._data, open(self.name("partials"), "r+b", 0) as self._partials:
                 if not self.stage:
                     self._data.truncate(self.place(len(self.ranges)))
                 self._partials.truncate(self.partial_place(len(self.ranges)))
                 #: Where the next range begins, in both.
                 self._end = self.place(len(self.ranges)), self.partial_place(len(self.ranges))
-                yield
+                try:
+                    yield
+                except OSError as error:
+                    if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                        raise
+                    again = "free some space, and the same command goes on"
+                    raise OSError(f"{self.folder}: {os.strerror(error.errno)}; {again}") from error
 
     def _same(self, old: dict[str, Any]) -> None:
         from .sweeps import differences
@@ -134,27 +144,25 @@ class Unfinished:
         for r in self.ranges:
             yield self._partials.read(r.partial)
 
-    def add(self, number: int, data: bytes, partial: bytes) -> None:
-        """Adds the next range, or writes one again that was damaged."""
-        made = Range(number, len(data), _sha256(data), len(partial), _sha256(partial))
+    def shared(self) -> AbstractContextManager[dict[str, Any] | None]:
+        """``data`` as other processes on this machine may write to it."""
+        return shared(self.name("data"))
+
+    def add(self, number: int, data: bytes | Written, partial: bytes) -> None:
+        """Adds the next range, or writes one again that was damaged. Its bytes may stand at their place already."""
+        written = data if isinstance(data, Written) else Written(len(data), _sha256(data))
+        made = Range(number, written.bytes, written.sha256, len(partial), _sha256(partial))
         if number < len(self.ranges):
             if made != self.ranges[number]:
                 raise Refused(f"{self.folder}: range {number} is made anew with other bytes than before; begin anew with --new")
         elif number != len(self.ranges):
             raise ValueError(f"range {number} does not follow {len(self.ranges)} ranges")
         places = self._end if number == len(self.ranges) else (self.place(number), self.partial_place(number))
-        try:
-            for file, place, content in zip((self._data, self._partials), places, (data, partial), strict=True):
-                file.seek(place)
-                _write(file, content)
-                file.flush()
-            if number == len(self.ranges):
-                self._note(asdict(made))
-        except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-                raise
-            raise OSError(f"{self.folder}: {error.strerror}; free some space, and the same command goes on") from error
+        if not isinstance(data, Written):
+            write(self._data, places[0], data)
+        write(self._partials, places[1], partial)
         if number == len(self.ranges):
+            self._note(asdict(made))
             self.ranges.append(made)
             self._end = (places[0] + made.bytes, places[1] + made.partial)
 
@@ -168,46 +176,44 @@ class Unfinished:
         self.stage.append(line)
 
     def keep(self, kept: list[tuple[int, int]], size: int, header: bytes, tail: bytes = b"") -> None:
-        """Takes all records of ``size`` bytes but the ``kept`` ranges of their numbers out of ``data``, in place, and writes
-        what comes before and after them.
+        """Makes the output of the ``kept`` ranges of records of ``size`` bytes, by their numbers, and of what comes before and
+        after them: of ``data`` itself if these are all, else in the file ``whole``.
 
-        Killed at any point, it goes on from there: what is moved stands in a file of its own while it is.
+        From the last one to the first: when the disk has no room for both files, what is written is cut off ``data``. Killed at
+        any point, it goes on from there.
         """
         if self.stage and "done" in self.stage[-1]:
             return
-        # The moves of an earlier run are gone on with as they were divided.
-        moves, to, most = [], self.first, self.stage[0]["most"] if self.stage else CHUNK
-        for start, end in kept:
-            at, last = self.first + start * size, self.first + end * size
-            while at < last and at != to:
-                length = min(last - at, most)
-                moves.append((at, to, length))
-                at, to = at + length, to + length
-            to += last - at
-        begin = 0
-        if self.stage:
-            last = self.stage[-1]
-            begin = last["move"] + 1
-            with open(self.name("moving"), "rb") as file:
-                chunk = file.read()
-            if _sha256(chunk) == last["sha256"]:  # else the next one was being put there
-                self._put(moves[last["move"]][1], chunk)
-        for n in range(begin, len(moves)):
-            at, place, length = moves[n]
-            self._data.seek(at)
-            chunk = self._data.read(length)
-            with open(self.name("moving"), "wb") as file:
-                _write(file, chunk)
-                file.flush()
-                os.fsync(file.fileno())
-            self._staged({"move": n, "most": most, "sha256": _sha256(chunk)})
-            self._put(place, chunk)
-        self._data.truncate(to)
-        for at, content in ((0, header), (to, tail)):
-            self._data.seek(at)
-            self._data.write(content)
-        self._data.flush()
-        self._staged({"done": True})
+        count = (self.length - self.first) // size
+        end = self.first + size * sum(b - a for a, b in kept)
+        name = "data" if end == self.length else "whole"
+        if name == "whole":
+            # The parts of an earlier run are gone on with as they were divided.
+            most = self.stage[0]["most"] if self.stage else max(CHUNK // size, 1)
+            bounds = [*range(0, count, most), count]
+            self._copy(_cut(kept, bounds), bounds, size, end)
+        with open(self.name(name), "r+b", 0) as file:
+            file.truncate(end)
+            write(file, 0, header)
+            write(file, end, tail)
+        self._staged({"done": name})
+
+    def _copy(self, parts: list[list[tuple[int, int]]], bounds: list[int], size: int, end: int) -> None:
+        """Writes records, those of each part between two bounds, to the file ``whole`` so that the last one is at its end."""
+        begin = self.stage[-1]["part"] if self.stage else len(parts)
+        with open(os.open(self.name("whole"), os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0) as whole:
+            for n in range(len(parts) - 1, -1, -1):
+                place = end = end - size * sum(b - a for a, b in parts[n])
+                if n >= begin:  # it is there
+                    continue
+                for a, b in parts[n]:
+                    for chunk in _chunks(self._data, self.first + a * size, (b - a) * size):
+                        write(whole, place, chunk)
+                        place += len(chunk)
+                if shutil.disk_usage(self.folder).free < end + 2 * CHUNK:
+                    os.fsync(whole.fileno())
+                    self._staged({"part": n, "most": bounds[1]})
+                    self._data.truncate(self.first + bounds[n] * size)
 
     def split(
         self, kept: list[tuple[int, int]], size: int, header: Callable[[int], bytes], most: int, about: dict[str, Any]
@@ -228,9 +234,9 @@ class Unfinished:
             if at - bounds[-1] >= most:
                 bounds.append(at)
         bounds += [at] if at > bounds[-1] else []
-        for n in range(len(bounds) - 2 - len(self.stage), -1, -1):
-            first, last = bounds[n] // size, bounds[n + 1] // size
-            own = [(max(a, first), min(b, last)) for a, b in kept if a < last and b > first]
+        parts = _cut(kept, [bound // size for bound in bounds])
+        for n in range(len(parts) - 1 - len(self.stage), -1, -1):
+            own = parts[n]
             count = sum(b - a for a, b in own)
             name = f"{n:05d}.stl"
             digest = hashlib.sha256(header(count))
@@ -248,22 +254,30 @@ class Unfinished:
         manifest = about | {"shards": self.stage[::-1]}
         with open(os.path.join(self.name("shards"), "manifest.json"), "w", encoding="utf-8", newline="\n") as file:
             file.write(json.dumps(manifest, indent=2) + "\n")
-        self._staged({"done": True})
-
-    def _put(self, place: int, chunk: bytes) -> None:
-        self._data.seek(place)
-        _write(self._data, chunk)
-        self._data.flush()
-        os.fsync(self._data.fileno())
+        self._staged({"done": "shards"})
 
     def finish(self) -> None:
-        """Gives ``data``, or the folder of its shards, the name of the output, and takes the folder away."""
-        if os.path.isdir(self.name("shards")):
-            os.replace(self.name("shards"), self.output)
-        elif os.path.getsize(self.name("data")) and not os.path.isdir(self.output):  # else it has its name already
-            replace_file(self.name("data"), os.path.realpath(self.output))
+        """Gives what is made the name of the output, and takes the folder away."""
+        made = self.name(self.stage[-1]["done"]) if self.stage else ""
+        if os.path.isdir(made):
+            os.replace(made, self.output)
+        elif os.path.isfile(made) and os.path.getsize(made):  # else it has its name already
+            replace_file(made, os.path.realpath(self.output))
         os.remove(self.name("lines"))  # without it there is nothing to go on from
         shutil.rmtree(self.folder)
+
+
+def _cut(ranges: list[tuple[int, int]], bounds: list[int]) -> list[list[tuple[int, int]]]:
+    """Ascending ranges of numbers as they are divided between bounds."""
+    parts: list[list[tuple[int, int]]] = [[] for _ in bounds[1:]]
+    n = 0
+    for at, end in ranges:
+        while at < end:
+            while bounds[n + 1] <= at:
+                n += 1
+            parts[n].append((at, min(end, bounds[n + 1])))
+            at = parts[n][-1][1]
+    return parts
 
 
 def _lines_of(raw: bytes) -> tuple[list[dict[str, Any]], int]:
@@ -289,18 +303,11 @@ def _digest(file: Any, place: int, length: int) -> str:
     return digest.hexdigest()
 
 
-def _write(file: Any, content: bytes) -> None:
-    """Writes bytes piece by piece: systems take several times as long for pieces that do not fit into the processor's cache."""
-    whole = memoryview(content)
-    for at in range(0, len(content), PIECE):
-        file.write(whole[at : at + PIECE])
-
-
 def _chunks(file: Any, place: int, length: int) -> Iterator[bytes]:
     """A part of a file, piece by piece; less if it ends before."""
     file.seek(place)
     while length > 0:
-        chunk = file.read(min(length, CHUNK))
+        chunk = file.read(min(length, PIECE))
         if not chunk:
             return
         yield chunk
