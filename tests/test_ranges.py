@@ -596,8 +596,9 @@ def test_a_cluster_that_does_not_answer_is_named_in_bounded_time(tmp_path: Path,
     with pytest.raises(ValueError, match=r"cluster tcp://127\.0\.0\.1:1 does not answer within 2 s"):
         again(tmp_path / "part.stl", cluster="tcp://127.0.0.1:1")
     assert time.monotonic() - start < 20
-    with pytest.raises(ValueError, match="expected local:N"):
-        again(tmp_path / "part.stl", cluster="local:none")
+    for address in ("local:none", "nowhere"):
+        with pytest.raises(ValueError, match="expected local:N"):
+            again(tmp_path / "part.stl", cluster=address)
 
 
 def test_a_cluster_that_loses_all_workers_is_told_of(tmp_path: Path, monkeypatch):

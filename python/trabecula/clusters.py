@@ -70,6 +70,8 @@ def _client(dask: Any, cluster: str) -> Any:
             local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
             # Results do not go by way of the scheduler, which is in this process.
             return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
+    if ":" not in cluster:
+        raise ValueError(f"cluster: expected local:N or an address such as tcp://head:8786, found {cluster}")
     try:
         client = dask.Client(cluster, timeout=PATIENCE)
         client.wait_for_workers(1, timeout=PATIENCE)
