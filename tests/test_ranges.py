@@ -220,12 +220,14 @@ def test_killed_at_random_moments_it_goes_on_to_the_same_file(tmp_path: Path, wh
 def test_killed_while_bytes_are_copied_it_goes_on_to_the_same_file(tmp_path: Path, whole, monkeypatch, at: int, room: bool):
     monkeypatch.setattr(unfinished, "CHUNK", 300_000)
     monkeypatch.setattr(unfinished.shutil, "disk_usage", lambda folder: SimpleNamespace(free=10**12 if room else 10**5))
-    path, copied, write = tmp_path / "part.stl", 0, unfinished.write
+    path, copied, write, full = tmp_path / "part.stl", 0, unfinished.write, 0
+    parts = tmp_path / "part.stl.parts"
 
     def torn(file, place, chunk):
-        nonlocal copied
+        nonlocal copied, full
         if str(file.name).isdigit():  # the file of what is kept
             copied += 1
+            full = full or os.path.getsize(parts / "data")
             if copied > at:  # half of it is written
                 write(file, place, chunk[: len(chunk) // 2])
                 raise KeyboardInterrupt
@@ -235,8 +237,12 @@ def test_killed_while_bytes_are_copied_it_goes_on_to_the_same_file(tmp_path: Pat
     with pytest.raises(KeyboardInterrupt):
         again(path, 5)
     assert not path.exists()
-    data = os.path.getsize(tmp_path / "part.stl.parts" / "data")
-    assert data > len(whole[0]) if room or not at else data < len(whole[0]) or at < 5
+    if room:
+        assert os.path.getsize(parts / "data") == full
+    elif hasattr(os.stat(parts), "st_blocks"):
+        # The disk holds a part twice at most; what is not written of a file takes no room but for its blocks.
+        held = sum(512 * os.stat(parts / name).st_blocks for name in ("data", "whole"))
+        assert held <= full + unfinished.CHUNK + 4 * 4096, held
     monkeypatch.setattr(unfinished, "write", write)
     assert again(path, 5) == whole[1] and path.read_bytes() == whole[0]
     left_alone(path)
@@ -595,7 +601,7 @@ def test_a_cluster_that_does_not_answer_is_named_in_bounded_time(tmp_path: Path,
     start = time.monotonic()
     with pytest.raises(ValueError, match=r"cluster tcp://127\.0\.0\.1:1 does not answer within 2 s"):
         again(tmp_path / "part.stl", cluster="tcp://127.0.0.1:1")
-    assert time.monotonic() - start < 20
+    assert time.monotonic() - start < 20 and not list(tmp_path.iterdir())
     for address in ("local:none", "nowhere"):
         with pytest.raises(ValueError, match="expected local:N"):
             again(tmp_path / "part.stl", cluster=address)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -181,10 +182,15 @@ class _Work:
 
     @contextmanager
     def opened(self, new: bool) -> Iterator[None]:
-        """The folder, while it is worked in; says after any other end what stands there."""
+        """The folder, while it is worked in. After any other end says what stands there; a folder without a range goes."""
         try:
             with self.folder.opened(new):
-                yield
+                try:
+                    yield
+                except BaseException:
+                    if not self.folder.ranges:
+                        shutil.rmtree(self.folder.folder, ignore_errors=True)
+                    raise
         except BaseException:
             if done := len(self.folder.ranges):
                 where = f"{done} of {self.count} ranges stand in {self.folder.folder}"

@@ -6,7 +6,7 @@ import hashlib
 import os
 import platform
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, NamedTuple
 
 __all__ = ["Written", "shared", "withdraw", "write", "write_at"]
@@ -57,11 +57,11 @@ def write_at(to: dict[str, Any], place: int, contents: list[bytes]) -> list[Writ
     """
     if to["machine"] != platform.node():
         return None
-    try:
-        file = open(to["name"], "r+b", buffering=0)  # noqa: SIM115
-    except OSError:
-        return None
-    with file:
+    with ExitStack() as opened:
+        try:
+            file = opened.enter_context(open(to["name"], "r+b", buffering=0))
+        except OSError:
+            return None
         found, made = os.fstat(file.fileno()), []
         if (found.st_dev, found.st_ino) != tuple(to["file"]):
             return None

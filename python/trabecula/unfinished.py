@@ -196,6 +196,7 @@ class Unfinished:
             file.truncate(end)
             write(file, 0, header)
             write(file, end, tail)
+            os.fsync(file.fileno())  # what it was made of goes next
         self._staged({"done": name})
 
     def _copy(self, parts: list[list[tuple[int, int]]], bounds: list[int], size: int, end: int) -> None:

@@ -141,13 +141,19 @@ mod tests {
     use crate::environment::NoFiles;
     use geometry::progress::Silent;
 
+    fn cell(name: &str, part: &str, fraction: f64) -> UnitCell {
+        let text = format!(
+            "schema = 1\nregion.box.size = [1, 1, 1]\n[lattice.a]\ncell = \"{name}\"\npart = \"{part}\"\n\
+             level.fraction = {fraction}\nmap.affine.wavelength = 1\n"
+        );
+        let design = Design::from_toml(&text).expect("a design");
+        design.build(&NoFiles).expect("built").unit_cell(&design, &NoFiles).expect("a cell")
+    }
+
     /// A network that is apart has necks of no width: it is said to be apart, and no number of voxels is advised.
     #[test]
     fn a_network_that_is_apart_is_said_to_be_once() {
-        let text = "schema = 1\n[region.box]\nsize = [1, 1, 1]\n[lattice.a]\ncell = \"primitive\"\npart = \"lower\"\n\
-                    level = { fraction = 0.1 }\n[lattice.a.map.affine]\nwavelength = 1\n";
-        let design = Design::from_toml(text).expect("a design");
-        let cell = design.build(&NoFiles).expect("built").unit_cell(&design, &NoFiles).expect("a cell");
+        let cell = cell("primitive", "lower", 0.1);
         assert_eq!(cell.wall, Some(0.0));
         let found = cell.conductivity(0.0, Resolution { n: 8, plain: false }, &Silent).expect("solved");
         let said: Vec<&str> = found.warnings.iter().map(|w| w.message.as_str()).collect();
@@ -157,10 +163,7 @@ mod tests {
     /// A gyroid is the same after a cyclic change of the axes, and two load cases of six are solved: the figures along all axes are one number.
     #[test]
     fn the_symmetry_of_a_cubic_cell_is_used() {
-        let text = "schema = 1\n[region.box]\nsize = [1, 1, 1]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\n\
-                    level = { fraction = 0.3 }\n[lattice.a.map.affine]\nwavelength = 1\n";
-        let design = Design::from_toml(text).expect("a design");
-        let cell = design.build(&NoFiles).expect("built").unit_cell(&design, &NoFiles).expect("a cell");
+        let cell = cell("gyroid", "sheet", 0.3);
         let material = homogenise::Material::isotropic(1.0, 0.3).expect("valid");
         let c = cell.stiffness(&material, Resolution { n: 16, plain: false }, &Silent).expect("solved").C_n;
         for (a, b) in [([0, 0], [1, 1]), ([0, 0], [2, 2]), ([3, 3], [4, 4]), ([0, 1], [1, 2]), ([0, 1], [2, 0])] {
