@@ -32,7 +32,7 @@ const state = { name: "design", stale: false, busy: false, meshing: false, cells
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 // What controls have changed and the text does not have yet: of each value the last change.
 const pending = new Map();
-const rays = screen_ && marcher(screen_.gl);
+const rays = screen_ && rayMarcher();
 const controls = new Controls((changes) => {
   for (const change of changes) {
     const place = change.path.join(".");
@@ -41,6 +41,16 @@ const controls = new Controls((changes) => {
   }
   changed();
 });
+
+// Null where the graphics card does not take the program; meshes are drawn then.
+function rayMarcher() {
+  try {
+    return marcher(screen_.gl);
+  } catch (error) {
+    console.error(error);
+    return null;
+  }
+}
 
 function write(words) {
   text.value = words;
@@ -132,7 +142,8 @@ async function marched(data) {
   if (lattices.length !== 1) return false;
   const [{ map, level, ...rest }] = lattices;
   const thick = level && "thickness" in level;
-  const cell = JSON.stringify([rest, thick && map]), region = JSON.stringify([data.region, state.files]);
+  // A wall's distances are those of a cell in the middle of the part.
+  const cell = JSON.stringify([rest, thick && [map, data.region]]), region = JSON.stringify([data.region, state.files]);
   const { head, body, ms } = await core.ask({ do: "rays", cell: cell !== state.cell, region: region !== state.region });
   if (head.error || head.none) return false;
   rays.take(head, body);
@@ -142,8 +153,7 @@ async function marched(data) {
   [thickOption.disabled, fractionOption.disabled] = [true, !span];
   if (span) legend(span, "");
   screen_.paint({ min, max, span }, rays.painter);
-  say(`picture by rays, ${Math.round(ms + rays.painter.ms)} ms`, false);
-  document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
+  drawn(`picture by rays, ${Math.round(ms + rays.painter.ms)} ms`);
   return true;
 }
 
@@ -154,7 +164,11 @@ async function picture(cells, moving) {
   [state.used, state.partly, state.ms] = [head.cells, head.part, ms];
   state.cells = Math.max(LEAST, Math.min(MOST / 6, (head.cells * MOVING) / Math.max(ms, 1)));
   const what = !head.part ? "picture" : moving ? "the middle, while it changes," : "the middle (the whole has too many triangles for a picture)";
-  say(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`, false);
+  drawn(`${what}${head.edge ? ` at ${head.edge.toPrecision(2)} mm` : ""}, ${head.triangles.toLocaleString()} triangles, ${Math.round(ms)} ms`);
+}
+
+function drawn(words) {
+  say(words, false);
   document.body.dataset.pictures = +(document.body.dataset.pictures || 0) + 1;
 }
 

@@ -20,6 +20,10 @@ from .given import number, positive, whole
 from .map import affine
 from .region import box
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .solid import Solid
+
 __all__ = ["PROPERTIES", "Law", "law", "monotone"]
 
 #: What a law may have, and the columns of each, with what they are. Lengths are in units of the wavelength.
@@ -201,7 +205,7 @@ def law(
     return Law(cell, part, n, nu, columns, fits, notes)
 
 
-def _solid(cell: str, part: str, fraction: float):
+def _solid(cell: str, part: str, fraction: float) -> Solid:
     """A cell of wavelength 1 at a fraction."""
     if part == "beams":
         shape = np.array(unit_cells.cell(cell)["aspect"])
