@@ -21,6 +21,7 @@ mod off;
 pub mod part21;
 mod picture;
 mod ply;
+mod scalar;
 pub mod stl;
 mod text;
 mod threemf;

@@ -47,7 +47,7 @@ fn solid(kind: u8) -> Option<Solid> {
 impl Elements {
     /// From the numbers of a file.
     ///
-    /// **Errors**: points that are not finite; cells of points that are not there.
+    /// **Errors**: points that are not finite; volumes with corners that are not there.
     pub(super) fn of_numbers(
         place: &[f64],
         connectivity: &[f64],
@@ -68,7 +68,7 @@ impl Elements {
         Ok(elements)
     }
 
-    /// Refuses points that are not finite and cells of points that are not there.
+    /// Refuses points that are not finite, cells beyond the connectivity, and volumes with corners that are not there.
     pub fn check(&self) -> Result<(), Fault> {
         let fault = |message: String| Err(Fault::new("", message));
         if let Some(p) = self.points.iter().find(|p| p.iter().any(|c| !c.is_finite())) {

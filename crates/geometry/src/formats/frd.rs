@@ -142,9 +142,8 @@ impl File<'_> {
 
     fn result(&mut self, lines: &mut Lines, wide: bool, step: u32) -> Result<(), Fault> {
         let digits = if wide { 10 } else { 5 };
-        let (mut array, mut node) =
-            (Array { name: String::new(), of_cells: false, components: 0, values: Vec::new() }, 0);
-        let mut component = 0;
+        let mut array = Array { name: String::new(), of_cells: false, components: 0, values: Vec::new() };
+        let (mut node, mut component) = (None, 0);
         for (at, line) in lines.take_while(|(_, l)| field(l, 0, 3) != b"-3") {
             match field(line, 0, 3) {
                 b"-4" => array.name = String::from_utf8_lossy(field(line, 5, 8)).into_owned(),
@@ -157,9 +156,11 @@ impl File<'_> {
                     if head == b"-1" {
                         let number = self.named(line, digits, at)?;
                         let found = self.index.get(&number).copied();
-                        node = found.ok_or_else(|| fault(format!("line {at}: {number} is no node")))? as usize;
-                        component = 0;
+                        let found = found.ok_or_else(|| fault(format!("line {at}: {number} is no node")))?;
+                        (node, component) = (Some(found as usize), 0);
                     }
+                    let node =
+                        node.ok_or_else(|| fault(format!("line {at}: values come before the number of their node")))?;
                     array.values.resize(array.components * self.elements.points.len(), f64::NAN);
                     for k in 0..6.min(array.components - component) {
                         array.values[array.components * node + component] = number(line, 3 + digits + 12 * k, at)?;
@@ -322,6 +323,11 @@ mod tests {
         let text = file(true);
         let refused = |text: &str| read(text.as_bytes(), "STRESS").expect_err("refused").message;
         assert!(refused("solid\n").contains("no nodes"));
+        let first = text.find("    1PSTEP").expect("a step");
+        let (mesh, steps) = text.split_at(first);
+        assert!(
+            refused(&(mesh.to_string() + &steps.replace(" -1", " -2"))).contains("before the number of their node")
+        );
         assert!(
             refused(&text.replace(
                 "    2C                            14                                     1",

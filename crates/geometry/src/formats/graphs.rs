@@ -4,7 +4,7 @@ use std::io;
 
 use rustc_hash::FxHashMap;
 
-use super::text::at_line;
+use super::text::{at_line, shown};
 use super::threemf::{self, BeamLattice};
 use super::without_mark;
 use crate::fault::{Fault, number};
@@ -246,6 +246,16 @@ impl From<&BeamLattice> for BeamGraph {
     }
 }
 
+/// A unit of length by its name in a graph, in mm. Errors name what there is.
+fn unit(name: &str) -> Result<f64, String> {
+    const UNITS: [(&str, f64); 6] =
+        [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("inch", 25.4), ("ft", 304.8)];
+    let known = UNITS.iter().find(|u| u.0.eq_ignore_ascii_case(name));
+    known.map(|u| u.1).ok_or_else(|| {
+        format!("units is {}; it must be one of {}", shown(name.as_bytes()), UNITS.map(|u| u.0).join(", "))
+    })
+}
+
 /// Numbers by which a file names nodes.
 #[derive(Default)]
 struct Ids(FxHashMap<i64, u32>);
@@ -270,11 +280,6 @@ fn positive(radius: f64, name: &str) -> Result<f64, String> {
         true => Ok(radius),
         false => Err(format!("{name} is {}; a radius is a finite number greater than 0", number(radius))),
     }
-}
-
-/// The line of a byte, for messages.
-fn line_of(bytes: &[u8], at: usize) -> usize {
-    1 + bytes[..at.min(bytes.len())].iter().filter(|b| **b == b'\n').count()
 }
 
 /// A fault at a line, for `map_err`.

@@ -5,6 +5,8 @@
 use std::io::{self, Write};
 
 use super::invalid;
+use super::scalar::Scalar;
+use super::text::shown;
 use crate::fault::Fault;
 
 /// The numbers of an array and its shape, the first index running fastest.
@@ -44,37 +46,27 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         .collect::<Result<Vec<usize>, Fault>>()?;
     let count = shape.iter().try_fold(1usize, |n, s| n.checked_mul(*s)).ok_or_else(malformed)?;
     let big = kind.starts_with('>');
-    let width = match &kind[kind.len().min(1)..] {
-        "f8" | "i8" | "u8" => 8,
-        "f4" | "i4" | "u4" => 4,
-        "i2" | "u2" | "f2" => 2,
-        "i1" | "u1" | "b1" => 1,
+    let scalar = match kind.get(1..).unwrap_or_default() {
+        "f8" => Scalar::Float(8),
+        "f4" => Scalar::Float(4),
+        "i8" => Scalar::Signed(8),
+        "i4" => Scalar::Signed(4),
+        "i2" => Scalar::Signed(2),
+        "i1" => Scalar::Signed(1),
+        "u8" => Scalar::Unsigned(8),
+        "u4" => Scalar::Unsigned(4),
+        "u2" => Scalar::Unsigned(2),
+        "u1" | "b1" => Scalar::Unsigned(1),
+        "f2" => return Err(fault("half precision is not read; save the array as float32 or float64".into())),
         _ => {
-            return Err(fault(format!("an array of type {kind} holds no plain numbers; save it as float64")));
+            let message =
+                format!("an array of type {} holds no plain numbers; save it as float64", shown(kind.as_bytes()));
+            return Err(fault(message));
         }
     };
-    if kind.ends_with("f2") {
-        return Err(fault("half precision is not read; save the array as float32 or float64".into()));
-    }
-    let need = count.checked_mul(width).ok_or_else(cut)?;
+    let need = count.checked_mul(scalar.width()).ok_or_else(cut)?;
     let data = bytes.get(end..).filter(|d| d.len() >= need).ok_or_else(cut)?;
-    let read = |b: &[u8]| {
-        let mut w = [0u8; 8];
-        for (i, v) in b.iter().enumerate() {
-            w[if big { width - 1 - i } else { i }] = *v;
-        }
-        let v = u64::from_le_bytes(w);
-        match &kind[1..] {
-            "f8" => f64::from_bits(v),
-            "f4" => f64::from(f32::from_bits(v as u32)),
-            "i8" => v as i64 as f64,
-            "i4" => f64::from(v as u32 as i32),
-            "i2" => f64::from(v as u16 as i16),
-            "i1" => f64::from(v as u8 as i8),
-            _ => v as f64,
-        }
-    };
-    let mut values: Vec<f64> = data[..need].chunks_exact(width).map(read).collect();
+    let mut values = scalar.decode(&data[..need], big);
     if !fortran && shape.len() > 1 {
         // The last index ran fastest.
         let source = values.clone();
@@ -140,12 +132,18 @@ mod tests {
         for n in 0..bytes.len() {
             assert!(read_npy(&bytes[..n]).is_err());
         }
-        let mut c = b"\x93NUMPY\x01\x00".to_vec();
-        let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n";
-        c.extend((header.len() as u16).to_le_bytes());
-        c.extend(header.as_bytes());
-        c.extend((0..6).flat_map(|v| (v as f32).to_le_bytes()));
-        assert_eq!(read_npy(&c).unwrap().1, [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]);
+        let of_kind = |kind: &[u8]| {
+            let header = [b"{'descr': '", kind, b"', 'fortran_order': False, 'shape': (2, 3), }\n"].concat();
+            let mut c = b"\x93NUMPY\x01\x00".to_vec();
+            c.extend((header.len() as u16).to_le_bytes());
+            c.extend(header);
+            c.extend((0..6).flat_map(|v| (v as f32).to_le_bytes()));
+            c
+        };
+        assert_eq!(read_npy(&of_kind(b"<f4")).unwrap().1, [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]);
+        for kind in [&b"\xe9f4"[..], b"", b"<", b"<f3"] {
+            assert!(read_npy(&of_kind(kind)).unwrap_err().message.contains("no plain numbers"));
+        }
     }
 
     #[test]

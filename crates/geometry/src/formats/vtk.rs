@@ -11,6 +11,7 @@ use std::io::Read;
 use quick_xml::events::{BytesStart, Event};
 
 use super::elements::Elements;
+use super::scalar::Scalar;
 use super::text::shown;
 use super::xml::{Scanner, attribute};
 use crate::fault::Fault;
@@ -322,44 +323,32 @@ fn decode(r: &Raw, layout: &Layout) -> Result<Vec<f64>, Fault> {
         }
         other => return Err(fault(format!("the format \"{other}\" is not known"))),
     };
-    numbers(&bytes, &r.kind, layout.big)
+    Ok(scalar(&r.kind)?.decode(&bytes, layout.big))
 }
 
-/// Numbers of a VTK type from bytes.
-pub(super) fn numbers(bytes: &[u8], kind: &str, big: bool) -> Result<Vec<f64>, Fault> {
-    let width = match kind {
-        "Float64" | "Int64" | "UInt64" => 8,
-        "Float32" | "Int32" | "UInt32" => 4,
-        "Int16" | "UInt16" => 2,
-        "Int8" | "UInt8" => 1,
+/// A type by its name.
+fn scalar(kind: &str) -> Result<Scalar, Fault> {
+    Ok(match kind {
+        "Float64" => Scalar::Float(8),
+        "Float32" => Scalar::Float(4),
+        "Int64" => Scalar::Signed(8),
+        "Int32" => Scalar::Signed(4),
+        "Int16" => Scalar::Signed(2),
+        "Int8" => Scalar::Signed(1),
+        "UInt64" => Scalar::Unsigned(8),
+        "UInt32" => Scalar::Unsigned(4),
+        "UInt16" => Scalar::Unsigned(2),
+        "UInt8" => Scalar::Unsigned(1),
         _ => return Err(fault(format!("the type \"{kind}\" is not a number"))),
-    };
-    let read = |b: &[u8]| {
-        let mut w = [0u8; 8];
-        for (i, v) in b.iter().enumerate() {
-            w[if big { width - 1 - i } else { i }] = *v;
-        }
-        let v = u64::from_le_bytes(w);
-        match kind {
-            "Float64" => f64::from_bits(v),
-            "Float32" => f64::from(f32::from_bits(v as u32)),
-            "Int64" => v as i64 as f64,
-            "Int32" => f64::from(v as u32 as i32),
-            "Int16" => f64::from(v as u16 as i16),
-            "Int8" => f64::from(v as u8 as i8),
-            _ => v as f64,
-        }
-    };
-    Ok(bytes.chunks_exact(width).map(read).collect())
+    })
 }
 
 /// A number of the header's width at `at`.
 fn header(bytes: &[u8], at: usize, layout: &Layout) -> Result<usize, Fault> {
     let width = if layout.wide { 8 } else { 4 };
-    let kind = if layout.wide { "UInt64" } else { "UInt32" };
     let cut = || fault("its data end early: truncated");
     let b = bytes.get(at * width..(at + 1) * width).ok_or_else(cut)?;
-    Ok(numbers(b, kind, layout.big)?[0] as usize)
+    Ok(Scalar::Unsigned(width).decode(b, layout.big)[0] as usize)
 }
 
 /// The bytes behind a header: their number, or the blocks that they are compressed in.

@@ -161,7 +161,7 @@ impl Reading {
                 if of.parameters.contains_key("GENERATE") {
                     let step = if row.len() > 2 { id(2)?.max(1) } else { 1 };
                     let (from, to) = (id(0)?, id(1)?);
-                    if (to - from) / step > 100_000_000 {
+                    if to.saturating_sub(from) / step > 10_000_000 {
                         return Err("the set has more elements than a file can hold".into());
                     }
                     set.0.extend((from..=to).step_by(step as usize));
@@ -245,6 +245,7 @@ mod tests {
             ("*NODE\n1, 0\n*ELEMENT, TYPE=B31\n1, 1, 2\n", "line 4: element 1: there is no node with id 2"),
             ("*NODE\n1, 0\n*ELEMENT, TYPE=B31\n1, 1\n", "line 4: 2 values found"),
             ("*BEAM SECTION, SECTION=CIRC\n0\n", "line 2: the radius of the section is 0"),
+            (&format!("*ELSET, ELSET=A, GENERATE\n{}, {}\n", i64::MIN, i64::MAX), "line 2: the set has more elements"),
         ] {
             let fault = read(text.as_bytes()).unwrap_err();
             assert!(fault.message.contains(expected), "{fault} ({expected})");

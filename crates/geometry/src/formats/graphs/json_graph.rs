@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use rustc_hash::FxHashMap;
 use serde_json::Value;
 
-use super::{BeamGraph, positive};
+use super::{BeamGraph, positive, unit};
 use crate::fault::Fault;
 
 /// Writes `{"units": "mm", "nodes": [[x, y, z, r], …], "beams": [[a, b, r1, r2], …]}`; radii that are not known are left out.
@@ -67,11 +67,9 @@ pub fn read(bytes: &[u8]) -> Result<BeamGraph, Fault> {
         let second = if row.len() == 4 { radius(3)? } else { first };
         graph.join(ends, [first, second], at)?;
     }
-    if let Some(unit) = text.get("units") {
-        let known = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("inch", 25.4), ("ft", 304.8)];
-        let found = known.iter().find(|u| Some(u.0) == unit.as_str());
-        let factor = found.ok_or_else(|| wrong(format!("units is {unit}; it must be mm, cm, m, in or ft")))?.1;
-        graph.scale(factor);
+    if let Some(name) = text.get("units") {
+        let name = name.as_str().ok_or_else(|| wrong("units must be the name of a unit, such as mm".into()))?;
+        graph.scale(unit(name).map_err(wrong)?);
         graph.in_mm = true;
     }
     Ok(graph)

@@ -7,13 +7,10 @@ use std::io::{self, Write};
 
 use quick_xml::events::{BytesStart, Event};
 
-use super::{BeamGraph, Ids, line_of, positive};
+use super::{BeamGraph, Ids, positive, unit};
 use crate::fault::{Fault, counted};
 use crate::formats::text::shown;
 use crate::formats::xml::{Scanner, attribute};
-
-/// Unit names and their lengths, mm.
-const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("ft", 304.8)];
 
 /// Writes nodes with radii, and beams.
 pub fn write(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
@@ -38,21 +35,20 @@ pub fn write(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
 pub fn read(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut buffer, mut s) = (Vec::new(), Scanner::new(bytes, "LTCX"));
     let (mut graph, mut ids, mut pairs) = (BeamGraph::default(), Ids::default(), Vec::new());
-    let (mut unit, mut root, mut faces) = (None, false, 0);
+    let (mut scale, mut root, mut faces) = (None, false, 0);
+    let (mut line, mut counted_to) = (1, 0);
     loop {
         let event = s.next(&mut buffer)?;
-        let line = line_of(bytes, s.at());
+        let end = s.at().clamp(counted_to, bytes.len());
+        line += bytes[counted_to..end].iter().filter(|b| **b == b'\n').count();
+        counted_to = end;
         let at = |element: &str, message: String| Fault::new("", format!("line {line}: <{element}>: {message}"));
         match &event {
             Event::Start(tag) | Event::Empty(tag) => match tag.name().into_inner() {
                 "graph" if !root => {
                     root = true;
                     if let Some(name) = attribute(tag, "units") {
-                        let known = UNITS.iter().find(|u| u.0.eq_ignore_ascii_case(&name));
-                        unit = Some(known.map(|u| u.1).ok_or_else(|| {
-                            let named = UNITS.map(|u| u.0).join(", ");
-                            at("graph", format!("units is {}; it must be one of {named}", shown(name.as_bytes())))
-                        })?);
+                        scale = Some(unit(&name).map_err(|m| at("graph", m))?);
                     }
                 }
                 name if !root => {
@@ -82,8 +78,8 @@ pub fn read(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     if faces > 0 {
         graph.remarks.push(format!("{} left out: only beams are read", counted(faces, "face")));
     }
-    if let Some(unit) = unit {
-        graph.scale(unit);
+    if let Some(scale) = scale {
+        graph.scale(scale);
         graph.in_mm = true;
     }
     Ok(graph)

@@ -61,8 +61,9 @@ pub(super) struct Object {
 }
 
 impl Object {
-    fn beams(&self) -> usize {
-        self.lattice.as_ref().map_or(0, |l| l.beams.len())
+    /// What one use of it costs: vertices, triangles and beams.
+    fn size(&self) -> usize {
+        self.vertices.len() + self.triangles.len() + self.lattice.as_ref().map_or(0, |l| l.beams.len())
     }
 
     fn is_support(&self) -> bool {
@@ -221,8 +222,7 @@ pub(super) fn place_all(
         }
     }
     // Instances multiply what the file holds; a small file that asks for billions is refused.
-    let held: usize = files.values().flat_map(|f| f.objects.values()).map(|o| o.triangles.len()).sum();
-    let held = held + files.values().flat_map(|f| f.objects.values()).map(Object::beams).sum::<usize>();
+    let held: usize = files.values().flat_map(|f| f.objects.values()).map(Object::size).sum();
     let mut placing = Placing { files: &files, unit, take, left: 10_000_000 + 64 * held, uses: 0 };
     for i in 0..items {
         placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
@@ -271,7 +271,7 @@ impl Placing<'_> {
             return Err(Fault::new("", format!("object {} holds itself, or nests deeper than {DEPTH}", of.id)));
         }
         self.uses += 1;
-        let size = object.triangles.len() + object.beams();
+        let size = object.size();
         if size > self.left || self.uses > 1_000_000 {
             return Err(Fault::new("", "the components multiply to more triangles than the file can mean"));
         }

@@ -1,6 +1,6 @@
 //! The legacy format (versions 1 to 5.1): a header of text, then sections of text or big-endian numbers.
 
-use super::{Array, Data, Elements, Shape, check, fault, numbers};
+use super::{Array, Data, Elements, Scalar, Shape, check, fault};
 use crate::fault::Fault;
 use crate::formats::text::{parse, shown};
 use crate::math::Vec3;
@@ -72,7 +72,10 @@ impl<'a> Reader<'a> {
         self.line();
         while let Some(line) = self.line().filter(|l| !l.is_empty()) {
             if line == "COMPONENT_NAMES" {
-                (0..components).for_each(|_| drop(self.line()));
+                let named = (0..components).all(|_| self.line().is_some());
+                if !named {
+                    return;
+                }
             }
         }
     }
@@ -88,34 +91,34 @@ impl<'a> Reader<'a> {
             }
             return Ok(out);
         }
-        let (kind, width) = binary_type(kind)?;
+        let scalar = scalar(kind)?;
         // One line end, then the bytes.
         while self.bytes.get(self.at).is_some_and(|b| *b == b' ' || *b == b'\r') {
             self.at += 1;
         }
         self.at += 1;
-        let end = count.checked_mul(width).and_then(|n| n.checked_add(self.at)).ok_or_else(cut)?;
-        let out = numbers(self.bytes.get(self.at..end).ok_or_else(cut)?, kind, true);
+        let end = count.checked_mul(scalar.width()).and_then(|n| n.checked_add(self.at)).ok_or_else(cut)?;
+        let out = scalar.decode(self.bytes.get(self.at..end).ok_or_else(cut)?, true);
         self.at = end;
-        out
+        Ok(out)
     }
 }
 
-/// A type of the legacy format as one of XML files, and its bytes in a binary file.
-fn binary_type(kind: &str) -> Result<(&'static str, usize), Fault> {
+/// A type of the legacy format.
+fn scalar(kind: &str) -> Result<Scalar, Fault> {
     Ok(match kind.to_ascii_lowercase().as_str() {
-        "double" => ("Float64", 8),
-        "float" => ("Float32", 4),
-        "long" | "vtktypeint64" => ("Int64", 8),
-        "unsigned_long" | "vtktypeuint64" => ("UInt64", 8),
+        "double" => Scalar::Float(8),
+        "float" => Scalar::Float(4),
+        "long" | "vtktypeint64" => Scalar::Signed(8),
+        "unsigned_long" | "vtktypeuint64" => Scalar::Unsigned(8),
         // VTK writes its index type as an int, whatever its width in memory.
-        "int" | "vtktypeint32" | "vtkidtype" => ("Int32", 4),
-        "unsigned_int" | "vtktypeuint32" => ("UInt32", 4),
-        "short" | "vtktypeint16" => ("Int16", 2),
-        "unsigned_short" | "vtktypeuint16" => ("UInt16", 2),
-        "char" | "signed_char" | "vtktypeint8" => ("Int8", 1),
-        "unsigned_char" | "vtktypeuint8" => ("UInt8", 1),
-        other => return Err(fault(format!("the type \"{other}\" is not a number"))),
+        "int" | "vtktypeint32" | "vtkidtype" => Scalar::Signed(4),
+        "unsigned_int" | "vtktypeuint32" => Scalar::Unsigned(4),
+        "short" | "vtktypeint16" => Scalar::Signed(2),
+        "unsigned_short" | "vtktypeuint16" => Scalar::Unsigned(2),
+        "char" | "signed_char" | "vtktypeint8" => Scalar::Signed(1),
+        "unsigned_char" | "vtktypeuint8" => Scalar::Unsigned(1),
+        other => return Err(fault(format!("the type {} is not a number", shown(other.as_bytes())))),
     })
 }
 
@@ -460,5 +463,12 @@ mod tests {
             assert_eq!(data.shape, Shape::Image { origin, step, nodes });
             assert_eq!((data.arrays.len(), data.arrays[1].values.as_slice()), (2, &[1.0, 2.0, 3.0, 4.0][..]));
         }
+    }
+
+    #[test]
+    fn names_of_more_components_than_the_file_has_lines_end_with_it() {
+        let layout = "DATASET STRUCTURED_POINTS\nDIMENSIONS 0 0 0\nSPACING 1 1 1\nORIGIN 0 0 0\nPOINT_DATA 0\n\
+            SCALARS S double 18446744073709551615\nLOOKUP_TABLE default\nMETADATA\nCOMPONENT_NAMES\nx\n";
+        drop(read(&file("5.1", false, layout)));
     }
 }
