@@ -236,8 +236,18 @@ fn divide(boxes: &[Aabb], order: &mut [u32]) -> Option<usize> {
     // The first and last bins hold the extremes, so neither side is empty.
     let cost = |cut: usize| left[cut - 1] + right[cut];
     let cut = (2..BINS).fold(1, |best, i| if cost(i) < cost(best) { i } else { best });
-    order.sort_by_key(|i| bin(*i) >= cut);
-    Some(order.partition_point(|i| bin(*i) < cut))
+    let (mut first, mut second) = (0, Vec::with_capacity(order.len()));
+    for n in 0..order.len() {
+        let item = order[n];
+        if bin(item) < cut {
+            order[first] = item;
+            first += 1;
+        } else {
+            second.push(item);
+        }
+    }
+    order[first..].copy_from_slice(&second);
+    Some(first)
 }
 
 #[cfg(test)]
