@@ -31,6 +31,11 @@ from .reports import (
 )
 
 __version__: str
+TILE: int
+MOST_STEPS: float
+MOST_CELLS: float
+STL_HEADER: int
+STL_RECORD: int
 
 Progress = Callable[[int, int], Any]
 

@@ -41,7 +41,7 @@ AT_ONCE, SENT_AT_ONCE = 16, 4
 #: The fewest tasks of a part, so that all workers have some.
 TASKS = 16
 #: Bytes of the header and of a triangle of a binary STL, and the most triangles that it counts.
-HEADER, RECORD, MOST = 84, 50, 2**32 - 1
+HEADER, RECORD, MOST = _core.STL_HEADER, _core.STL_RECORD, 2**32 - 1
 
 #: For each kind of work what gives its ranges, of a solid and a step in mm.
 KINDS: dict[str, Callable[[_core.Solid, float], Any]] = {
@@ -152,7 +152,7 @@ def _tiles_at_once(solid: Solid, spacing: float) -> int:
     made = solid._core.estimate(spacing, spacing)
     tiles = 1.0
     for n in made.cells:
-        tiles *= -(-n // 61)
+        tiles *= -(-n // _core.TILE)
     return int(min(max(WANTED * tiles / made.stl, 1), 4096))
 
 
@@ -169,7 +169,7 @@ class _Work:
             "of": kind,
             "version": _core.__version__,
             "design": hashlib.sha256(text.encode()).hexdigest(),
-            "files": {name: digest_of(content) for name, content in files.items()},
+            "files": {name: digest_of(content.items()) for name, content in files.items()},
             "edge": step,
             **more,
             "count": self.ranges.count,

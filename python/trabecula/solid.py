@@ -52,8 +52,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Solid"]
 
-#: Most steps of a grid along an axis, and most cells, as in the core.
-MOST_STEPS, MOST_CELLS = 4e6, 2e12
 #: Why beams alone are not made in ranges.
 OF_BEAMS = (
     "beams alone are meshed by their own patches, not on a grid whose tiles can be made apart; leave resume and cluster out, "
@@ -186,11 +184,11 @@ class Solid(Seen, Simulated):
         edge = self._default if edge is None else positive("edge", edge)
         low, high = self.bounds
         extents = [b - a for a, b in zip(low, high, strict=True)]
-        least = max(max(extents) / MOST_STEPS, (math.prod(extents) / MOST_CELLS) ** (1 / 3))
-        if max(extents) / MOST_STEPS > edge:
+        least = max(max(extents) / _core.MOST_STEPS, (math.prod(extents) / _core.MOST_CELLS) ** (1 / 3))
+        if max(extents) / _core.MOST_STEPS > edge:
             raise ValueError(
-                f"grid spacing {edge:g} mm cuts the region's {max(extents):.6g} mm into more than {MOST_STEPS:g} steps; use "
-                f"{rounded_up(least):g} mm or more; without a spacing {self._default:.3g} mm is used"
+                f"grid spacing {edge:g} mm cuts the region's {max(extents):.6g} mm into more than {_core.MOST_STEPS:g} steps; "
+                f"use {rounded_up(least):g} mm or more; without a spacing {self._default:.3g} mm is used"
             )
         if edge > self.wavelength / 2:
             raise ValueError(

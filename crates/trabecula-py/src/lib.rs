@@ -51,6 +51,19 @@ mod _core {
 
     use crate::{BeamCell, Connected, Operations};
 
+    /// Cells of a grid along a tile's edge, and the most steps and cells of a grid.
+    #[pymodule_export]
+    const TILE: usize = trabecula::extract::TILE;
+    #[pymodule_export]
+    const MOST_STEPS: f64 = trabecula::extract::MOST_STEPS;
+    #[pymodule_export]
+    const MOST_CELLS: f64 = trabecula::extract::MOST_CELLS;
+    /// Bytes of the header and of a triangle of a binary STL.
+    #[pymodule_export]
+    const STL_HEADER: usize = geometry::formats::stl::HEADER;
+    #[pymodule_export]
+    const STL_RECORD: usize = geometry::formats::stl::RECORD;
+
     #[pymodule_export]
     use crate::beam_files::{graph_formats, read_graph, write_beam_lattice, write_graph};
     #[pymodule_export]

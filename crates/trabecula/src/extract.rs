@@ -37,6 +37,7 @@ mod voxelize;
 
 pub use joined_ranges::{JoinedRanges, WholeSurface};
 use sampling_grid::Grid;
+pub use sampling_grid::{MOST_CELLS, MOST_STEPS, TILE};
 pub use spaces::{SpaceMade, spaces};
 use stitched::Stitched;
 use tile::{Scratch, View};
@@ -101,11 +102,7 @@ impl SurfaceMaker for GridSurface<'_> {
         let spare = Mutex::new(Vec::<Vec<u8>>::new());
         let map = |view: View| {
             let mut records = borrow(&spare);
-            let positions = view.positions();
-            let components = TileComponents::each_triangle(&view, 0, middle, |t, _| {
-                let corners = t.map(|v| positions[v as usize].map(|x| x as f32));
-                stl::push_record(&mut records, corners);
-            });
+            let components = TileComponents::with_records(&view, middle, &mut records);
             (components, records)
         };
         let scaled = stream.progress();

@@ -13,14 +13,14 @@ use geometry::math::Aabb;
 use super::feature_edges;
 
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
-pub(super) const TILE: usize = 61;
+pub const TILE: usize = 61;
 
-/// Most node planes along an axis.
-const MOST: f64 = 4e6;
+/// Most steps along an axis.
+pub const MOST_STEPS: f64 = 4e6;
 
 /// Most grid cells: those of 9 million tiles. Bounds dismiss a tile in some hundredths of a millisecond to a millisecond, so what
 /// is empty takes minutes to some hours.
-const MOST_CELLS: f64 = 2e12;
+pub const MOST_CELLS: f64 = 2e12;
 
 /// The solid on its grid.
 pub(super) struct Grid {
@@ -369,11 +369,11 @@ fn node_planes(
 ) -> Result<Vec<f64>, Fault> {
     let bounds = solid.region.bounds();
     let (lo, hi) = (bounds.min[axis], bounds.max[axis]);
-    if (hi - lo) / edge > MOST {
+    if (hi - lo) / edge > MOST_STEPS {
         return Err(Fault::new(
             "edge",
             format!(
-                "{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible",
+                "{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST_STEPS:.0e} are possible",
                 hi - lo,
                 (hi - lo) / edge
             ),

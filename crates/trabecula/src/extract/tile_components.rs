@@ -7,6 +7,7 @@
 //! through solid to the outer boundary, or to another cavity that reaches still farther.
 
 use geometry::fault::Fault;
+use geometry::formats::stl;
 use geometry::math::{Vec3, cross, dot, norm, sub};
 use geometry::union_find::{find, unite};
 
@@ -50,6 +51,14 @@ pub(super) struct TileComponents {
 pub(super) type Gap = (f64, Vec3);
 
 impl TileComponents {
+    /// As `each_triangle`, of the whole solid; its triangles go to the end of `records`, as those of a binary STL.
+    pub fn with_records(view: &View, middle: Vec3, records: &mut Vec<u8>) -> TileComponents {
+        let positions = view.positions();
+        TileComponents::each_triangle(view, 0, middle, |t, _| {
+            stl::push_record(records, t.map(|v| positions[v as usize].map(|x| x as f32)));
+        })
+    }
+
     /// Finds the components of the surface of a part of the solid in a tile and calls `take` for its triangles, component by component, so that what is
     /// removed later is contiguous: with the numbers of the vertices, and whether the triangle is a cut. `middle` is the
     /// apex of the cones by which volumes are summed.

@@ -5,7 +5,6 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use geometry::fault::Fault;
-use geometry::formats::stl;
 use geometry::math::Vec3;
 use geometry::progress::{Progress, Stopped};
 
@@ -64,21 +63,7 @@ impl TileRanges {
         progress: &dyn Progress,
         take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        let map = |view: View| {
-            let mut records = borrow(&self.spare);
-            let positions = view.positions();
-            let components = TileComponents::each_triangle(&view, 0, self.middle, |t, _| {
-                stl::push_record(&mut records, t.map(|v| positions[v as usize].map(|x| x as f32)));
-            });
-            (components, records)
-        };
-        let add = |open: &mut Open, (components, mut records): (TileComponents, Vec<u8>)| {
-            open.records.extend_from_slice(&records);
-            records.clear();
-            give_back(&self.spare, records);
-            components
-        };
-        self.each([tiles.start, tiles.end, size], None, progress, (map, |c| c.0.tile, add), take)
+        self.each(&Triangles { middle: self.middle, spare: &self.spare }, tiles, size, progress, take)
     }
 
     /// What is measured of the surface in some tiles, as `surface` takes them; there are no triangles.
@@ -92,45 +77,40 @@ impl TileRanges {
         progress: &dyn Progress,
         take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        let map = |view: View| TileFigures::of(&view, self.middle);
-        let add = |open: &mut Open, tile: TileFigures| match &mut open.figures {
-            Some(sums) => sums.add(tile),
-            None => tile.components,
-        };
-        let none = Some(FigureSums::default());
-        self.each([tiles.start, tiles.end, size], none, progress, (map, |t| t.components.tile, add), take)
+        self.each(&Figures { middle: self.middle }, tiles, size, progress, take)
     }
 
-    /// Takes tiles from a first to before a last one in ranges of a size, of which nothing is measured or `none` yet: by a function of a tile, which tile a result is of, and how it
-    /// is added to the range that is open.
-    fn each<T: Send>(
+    /// Does some work in tiles, in ranges that end at multiples of `size` and at the last tile.
+    fn each<W: RangeWork>(
         &self,
-        [start, end, size]: [usize; 3],
-        none: Option<FigureSums>,
+        work: &W,
+        tiles: Range<usize>,
+        size: usize,
         progress: &dyn Progress,
-        (map, tile_of, add): (
-            impl Fn(View) -> T + Sync,
-            impl Fn(&T) -> [usize; 3] + Sync,
-            impl Fn(&mut Open, T) -> TileComponents + Sync,
-        ),
         mut take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        let (end, size) = (end.min(self.tiles()), size.max(1));
-        let start = start.min(end);
+        let (end, size) = (tiles.end.min(self.tiles()), size.max(1));
+        let start = tiles.start.min(end);
         let begin = |start: usize| {
             let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
-            Open { sweep: RangeSweep::new(tiles.clone()), records: Vec::new(), figures: none.clone(), tiles }
+            Open::<W> { sweep: RangeSweep::new(tiles.clone()), sum: W::Sum::default(), tiles }
         };
         let mut open = begin(start);
-        each_tile((&self.grid, &self.scratch), start..end, progress, map, |made| {
-            let tile = self.grid.number(tile_of(&made));
-            while tile >= open.tiles.end {
-                let next = begin(open.tiles.end);
-                take(std::mem::replace(&mut open, next).close(&self.grid))?;
-            }
-            let components = add(&mut open, made);
-            open.sweep.add(&self.grid, components).map_err(Stopped::Refused)
-        })?;
+        each_tile(
+            (&self.grid, &self.scratch),
+            start..end,
+            progress,
+            |view| work.of_tile(&view),
+            |made| {
+                let tile = self.grid.number(W::tile(&made));
+                while tile >= open.tiles.end {
+                    let next = begin(open.tiles.end);
+                    take(std::mem::replace(&mut open, next).close(&self.grid))?;
+                }
+                let components = work.add(&mut open.sum, made);
+                open.sweep.add(&self.grid, components).map_err(Stopped::Refused)
+            },
+        )?;
         while !open.tiles.is_empty() {
             let next = begin(open.tiles.end);
             take(std::mem::replace(&mut open, next).close(&self.grid))?;
@@ -139,16 +119,91 @@ impl TileRanges {
     }
 }
 
-/// A range whose tiles come in.
-struct Open {
-    tiles: Range<usize>,
-    records: Vec<u8>,
-    sweep: RangeSweep,
-    figures: Option<FigureSums>,
+/// What is done in each tile of a range, and how tiles are put together.
+trait RangeWork: Sync {
+    /// What is made of a tile.
+    type Made: Send;
+    /// What the tiles of a range so far add up to.
+    type Sum: Default + Send;
+
+    fn of_tile(&self, view: &View) -> Self::Made;
+
+    /// Which tile it is of.
+    fn tile(made: &Self::Made) -> [usize; 3];
+
+    /// Adds the next tile, and gives its components.
+    fn add(&self, sum: &mut Self::Sum, made: Self::Made) -> TileComponents;
+
+    /// The bytes of a range, and what is measured of it besides its components.
+    fn finish(sum: Self::Sum) -> (Vec<u8>, Option<FigureSums>);
 }
 
-impl Open {
+/// Triangles, as records of a binary STL.
+struct Triangles<'a> {
+    middle: Vec3,
+    spare: &'a Mutex<Vec<Vec<u8>>>,
+}
+
+impl RangeWork for Triangles<'_> {
+    type Made = (TileComponents, Vec<u8>);
+    type Sum = Vec<u8>;
+
+    fn of_tile(&self, view: &View) -> Self::Made {
+        let mut records = borrow(self.spare);
+        (TileComponents::with_records(view, self.middle, &mut records), records)
+    }
+
+    fn tile((components, _): &Self::Made) -> [usize; 3] {
+        components.tile
+    }
+
+    fn add(&self, all: &mut Vec<u8>, (components, mut records): Self::Made) -> TileComponents {
+        all.append(&mut records);
+        give_back(self.spare, records);
+        components
+    }
+
+    fn finish(all: Vec<u8>) -> (Vec<u8>, Option<FigureSums>) {
+        (all, None)
+    }
+}
+
+/// What is measured of a surface.
+struct Figures {
+    middle: Vec3,
+}
+
+impl RangeWork for Figures {
+    type Made = TileFigures;
+    type Sum = FigureSums;
+
+    fn of_tile(&self, view: &View) -> TileFigures {
+        TileFigures::of(view, self.middle)
+    }
+
+    fn tile(made: &TileFigures) -> [usize; 3] {
+        made.components.tile
+    }
+
+    fn add(&self, sums: &mut FigureSums, made: TileFigures) -> TileComponents {
+        sums.add(made)
+    }
+
+    fn finish(sums: FigureSums) -> (Vec<u8>, Option<FigureSums>) {
+        (Vec::new(), Some(sums))
+    }
+}
+
+/// A range whose tiles come in.
+struct Open<W: RangeWork> {
+    tiles: Range<usize>,
+    sweep: RangeSweep,
+    sum: W::Sum,
+}
+
+impl<W: RangeWork> Open<W> {
     fn close(self, grid: &Grid) -> RangeMade {
-        RangeMade { tiles: self.tiles, records: self.records, partial: self.sweep.finish(grid, self.figures).pack() }
+        let (records, figures) = W::finish(self.sum);
+        RangeMade { tiles: self.tiles, records, partial: self.sweep.finish(grid, figures).pack() }
     }
 }
