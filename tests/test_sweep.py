@@ -23,6 +23,7 @@ from trabecula.conditions import condition
 from trabecula.rows import Job, row_of
 from trabecula.sampling import DIMENSIONS, latin, sobol
 from trabecula.scatter import front_of
+from trabecula.sent import digests
 from trabecula.study import Study
 from trabecula.sweeps import Journal
 
@@ -268,8 +269,21 @@ def test_rows_that_are_there_are_taken_up_unless_the_study_has_changed(tmp_path:
     done = command(*words, "--json")
     assert done.returncode == 0 and json.loads(done.stdout)["resumed"] == 1
     assert [row["pieces"] for row in table(out)] == ["77", "1"]
+
     assert command(*words, "--new").returncode == 0
     assert [row["pieces"] for row in table(out)] == ["1", "1"]
+
+
+def test_files_are_known_by_their_own_paths_and_folders_by_all_they_hold(tmp_path: Path):
+    for name in ("a/x.csv", "b/x.csv", "scan/1.png", "scan/2.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    data = {"grade": [{"path": "a/x.csv"}, {"path": "b/x.csv"}], "cell": {"path": "scan/*.png"}, "zone": {"path": "scan/"}}
+    before = digests(data, str(tmp_path))
+    assert list(before) == ["a/x.csv", "b/x.csv", "scan/*.png", "scan/"] and before["a/x.csv"] != before["b/x.csv"]
+    (tmp_path / "scan/2.png").write_text("another")
+    after = digests(data, str(tmp_path))
+    assert [name for name in before if before[name] != after[name]] == ["scan/*.png", "scan/"]
 
 
 def test_a_worker_that_is_killed_costs_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -296,7 +310,8 @@ def test_a_row_whose_process_dies_each_time_is_a_row_with_that(tmp_path: Path, m
 def test_an_interrupt_says_where_the_rows_are(tmp_path: Path):
     study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 200 }')
     process = started(study, tmp_path / "out.csv", 2, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "out.csv.rows").exists() or (tmp_path / "out.csv.rows").read_text().count("\n") < 3:
+    rows = tmp_path / "out.csv.rows"
+    while process.poll() is None and (not rows.exists() or rows.read_text().count("\n") < 3):
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     said = process.communicate()[1]

@@ -175,7 +175,7 @@ class Design:
     def files(self) -> list[str]:
         """The files that the design reads, as absolute paths."""
         folder = self.folder or os.getcwd()
-        return [os.path.join(folder, name) for name in _files(self.to_dict())]
+        return [os.path.join(folder, name) for name in files_in(self.to_dict())]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right.
@@ -256,12 +256,12 @@ def spartan(
     return Design(region=box, lattice={name: lattice})
 
 
-def _files(data: Any) -> list[str]:
+def files_in(data: Any) -> list[str]:
     """The files that plain data names: what stands under ``path``, or as a table of beams."""
     if isinstance(data, dict):
         own = [data[key] for key in PATHS if isinstance(data.get(key), str)]
-        return own + [name for item in data.values() for name in _files(item)]
-    return [name for item in data for name in _files(item)] if isinstance(data, list) else []
+        return own + [name for item in data.values() for name in files_in(item)]
+    return [name for item in data for name in files_in(item)] if isinstance(data, list) else []
 
 
 def _moved(data: Any, turn: Callable[[str], str]) -> Any:

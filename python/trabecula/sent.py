@@ -5,34 +5,34 @@ from __future__ import annotations
 import glob
 import hashlib
 import os
+from collections.abc import Iterable
 
-from .design import _files, parsed
+from .design import files_in, parsed
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from typing import Any
+
     from .solid import Solid
 
-__all__ = ["digest_of", "files_of", "put_files"]
+__all__ = ["digest_of", "digests", "files_of", "put_files"]
 
 
 def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
     """The files of a design by its names for them; a name stands for one file, or for all of a pattern or a folder."""
-    made = {}
-    for name in _files(parsed(solid._core.design, False, "<design>", solid._folder).to_dict()):
-        path = os.path.join(solid._folder, name)
-        if os.path.isdir(path):
-            found = [os.path.join(at, one) for at, _, files in os.walk(path) for one in files]
-        else:
-            found = glob.glob(glob.escape(path).replace("[*]", "*"))
-        base = os.path.dirname(path.rstrip("/"))
-        made[name] = {os.path.relpath(one, base).replace(os.sep, "/"): _content(one) for one in sorted(found)}
-    return made
+    names = files_in(parsed(solid._core.design, False, "<design>", solid._folder).to_dict())
+    return {name: {inner: _content(path) for inner, path in _paths(name, solid._folder)} for name in names}
 
 
-def digest_of(files: dict[str, bytes]) -> str:
+def digests(data: Any, folder: str) -> dict[str, str]:
+    """The SHA-256 of each file that a design's ``data`` names; of a pattern or a folder, that of all its files."""
+    return {name: digest_of((inner, _content(path)) for inner, path in _paths(name, folder)) for name in files_in(data)}
+
+
+def digest_of(files: Iterable[tuple[str, bytes]]) -> str:
     """The SHA-256 of files with their names."""
     digest = hashlib.sha256()
-    for name, content in files.items():
+    for name, content in files:
         digest.update(f"{name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 
@@ -48,6 +48,17 @@ def put_files(given: dict[str, dict[str, bytes]], folder: str) -> dict[str, str]
             with open(at, "wb") as file:
                 file.write(content)
     return places
+
+
+def _paths(name: str, folder: str) -> list[tuple[str, str]]:
+    """The files behind a name in a design: their names, with / between folders, and their paths."""
+    path = os.path.join(folder, name)
+    if os.path.isdir(path):
+        found = [os.path.join(at, one) for at, _, files in os.walk(path) for one in files]
+    else:
+        found = glob.glob(glob.escape(path).replace("[*]", "*"))
+    base = os.path.dirname(path.rstrip("/"))
+    return [(os.path.relpath(one, base).replace(os.sep, "/"), one) for one in sorted(found)]
 
 
 def _content(path: str) -> bytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import itertools
 import json
 import os
@@ -20,6 +19,7 @@ from .files import check_place, extension, whole_file
 from .formats import MESH_WRITES, SWEEP_WRITES
 from .given import whole
 from .rows import PROPERTIES, UNITS, Job, named
+from .sent import digests
 from .study import Study
 from .workers import rows_by_processes, rows_here
 
@@ -160,7 +160,8 @@ class Journal:
 
     def __init__(self, output: str, job: Job):
         self.path = f"{output}.rows"
-        self.head = job.to_dict() | {"version": _core.__version__, "inputs": digests(job.design)}
+        inputs = digests(job.design.to_dict(), job.design.folder or os.getcwd())
+        self.head = job.to_dict() | {"version": _core.__version__, "inputs": inputs}
         for changing in ("folder", "threads"):
             self.head.pop(changing)
         self.rows: dict[int, dict[str, Any]] = {}
@@ -205,20 +206,6 @@ class Journal:
     def end(self) -> None:
         """Takes the file away: its rows stand in the output."""
         os.remove(self.path)
-
-
-def digests(design: Design) -> dict[str, str]:
-    """The SHA-256 of each file that a design reads."""
-    made = {}
-    for name in design.files():
-        if os.path.isfile(name):
-            with open(name, "rb") as file:
-                made[os.path.basename(name)] = (
-                    hashlib.file_digest(file, "sha256").hexdigest()
-                    if hasattr(hashlib, "file_digest")
-                    else hashlib.sha256(file.read()).hexdigest()
-                )
-    return made
 
 
 def differences(old: Any, new: Any, path: str = "") -> list[str]:
