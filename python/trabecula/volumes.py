@@ -6,9 +6,10 @@ import copy
 import math
 import os
 import re
-import shutil
+import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
@@ -249,17 +250,20 @@ class VolumeMesh(FiniteElements):
     def _write_case(self, path: str) -> None:
         """The mesh of an OpenFOAM case, which has another name until it is whole, and the file that stands for it."""
         constant = os.path.join(os.path.dirname(os.path.abspath(path)), "constant")
-        whole, made = os.path.join(constant, "polyMesh"), os.path.join(constant, f".polyMesh-{os.getpid()}")
-        os.makedirs(made)
-        try:
-            self._core.write_poly(made)
-            shutil.rmtree(whole, ignore_errors=True)
-            os.replace(made, whole)
-        except BaseException:
-            shutil.rmtree(made, ignore_errors=True)
-            raise
+        whole = os.path.join(constant, "polyMesh")
         with whole_file(path) as temporary, open(temporary, "w", encoding="ascii"):
-            pass
+            os.makedirs(constant, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".polyMesh-", dir=constant) as scratch:
+                made, old = os.path.join(scratch, "new"), os.path.join(scratch, "old")
+                os.mkdir(made)
+                self._core.write_poly(made)
+                with suppress(FileNotFoundError):
+                    os.replace(whole, old)
+                try:
+                    os.replace(made, whole)
+                except OSError:
+                    os.replace(old, whole)
+                    raise
 
 
 class VoxelElements(FiniteElements):
