@@ -216,8 +216,10 @@ def layers(held: list[Picture]) -> Iterator[NDArray]:
     import pydicom
     from pydicom.pixels import pixel_array
 
+    file, data = None, pydicom.Dataset()
     for p in held:
-        data = pydicom.dcmread(p.file, stop_before_pixels=True)
+        if p.file != file:  # pictures of one file follow each other
+            file, data = p.file, pydicom.dcmread(p.file, stop_before_pixels=True)
         if int(data.get("SamplesPerPixel") or 1) != 1:
             raise Refused(f"{os.path.basename(p.file)} is in colour; grey pictures are needed")
         several = int(data.get("NumberOfFrames") or 1) > 1

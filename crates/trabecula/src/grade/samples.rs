@@ -173,16 +173,19 @@ impl Samples {
             let mut near: Vec<(f64, usize)> = Vec::new();
             let far = *counts.iter().max().unwrap_or(&1);
             for ring in 0..=far {
-                let span = |a: usize| (c[a].saturating_sub(ring), (c[a] + ring).min(counts[a] - 1));
-                for k in span(2).0..=span(2).1 {
-                    for j in span(1).0..=span(1).1 {
-                        for i in span(0).0..=span(0).1 {
-                            let off = [i, j, k].iter().zip(&c).map(|(a, b)| a.abs_diff(*b)).max();
-                            if off == Some(ring) {
-                                let of = &buckets[(k * counts[1] + j) * counts[0] + i];
-                                near.extend(of.iter().map(|&n| (dot(sub(points[n], p), sub(points[n], p)), n)));
-                            }
-                        }
+                let span = |a: usize| c[a].saturating_sub(ring)..=(c[a] + ring).min(counts[a] - 1);
+                let mut take = |i: usize, row: usize| {
+                    let of = &buckets[row * counts[0] + i];
+                    near.extend(of.iter().map(|&n| (dot(sub(points[n], p), sub(points[n], p)), n)));
+                };
+                for (k, j) in span(2).flat_map(|k| span(1).map(move |j| (k, j))) {
+                    let row = k * counts[1] + j;
+                    if k.abs_diff(c[2]).max(j.abs_diff(c[1])) == ring {
+                        span(0).for_each(|i| take(i, row));
+                    } else {
+                        // A row through the inside of the ring is in it at its ends.
+                        let ends = [c[0].checked_sub(ring), Some(c[0] + ring).filter(|i| *i < counts[0])];
+                        ends.into_iter().flatten().for_each(|i| take(i, row));
                     }
                 }
                 // Points outside the rings so far are at least this distance (squared) from p, which may lie outside the buckets.
