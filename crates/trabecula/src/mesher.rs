@@ -23,6 +23,8 @@ pub use region_fit::{Fit, Uncovered, fit};
 
 /// Maximum number of tetrahedra.
 const MOST: usize = 20_000_000;
+/// Sample points of the least sizes whose tetrahedra are not counted in advance: they may stand for less than their share of the volume.
+const RARE: usize = 20;
 /// Where more than this fraction of the volume is left out, the region is cut in less exact ways too, and the mesh that covers most of it
 /// is kept.
 const LOSS: f64 = 1e-3;
@@ -49,6 +51,9 @@ pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3])
         return Err(Fault::new("size", message));
     }
     let largest = sizes.iter().copied().fold(0.0, f64::max);
+    if region.volume().is_some_and(|volume| surely_more(sizes, volume)) {
+        return Err(bcc_grid::too_many(MOST));
+    }
     let extent = bounds.size().into_iter().fold(0.0, f64::max);
     // A cube holds twelve tetrahedra: ∛√2 times the edge of the regular tetrahedron of a twelfth of its volume.
     let cube = 2f64.powf(1.0 / 6.0) * largest.min(extent);
@@ -81,6 +86,14 @@ pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3])
         return Err(Fault::new("size", message));
     }
     Ok(best)
+}
+
+/// Whether tetrahedra of these sizes, at points that are uniformly spread in a volume, are more than `MOST`, curvature left out.
+fn surely_more(mut sizes: Vec<f64>, volume: f64) -> bool {
+    sizes.sort_by(f64::total_cmp);
+    let count = |size: &f64| 72f64.sqrt() / (needs::SPREAD * size).powi(3);
+    let share = volume / sizes.len().max(1) as f64;
+    share * sizes.iter().skip(RARE).map(count).sum::<f64>() > MOST as f64
 }
 
 /// What the lattice is cut along.

@@ -93,7 +93,19 @@ impl<'a> Finish<'a> {
         };
         let (points, _) = sample::inside(&self.region, POINTS);
         let lattice = sample::values(&points, |p, out| tiling.values(p, out));
-        let kept: Vec<bool> = if whole { self.kept(&points) } else { vec![false; points.len()] };
+        let mut kept = vec![false; points.len()];
+        let bodies = self.environment.filled.iter().filter(|_| whole);
+        bodies.for_each(|body| fill(&mut kept, &points, |p, out| body.values(p, out)));
+        // A net of a given radius is the same at every level.
+        let fixed = net.as_ref().zip(self.radius);
+        if let Some((net, radius)) = fixed {
+            let rods = self.rods(net, radius)?;
+            fill(&mut kept, &points, |p, out| rods.values(p, out));
+        }
+        let share_of = |solid: &[bool]| solid.iter().filter(|s| **s).count() as f64 / points.len() as f64;
+        if share_of(&kept) > asked + OFF {
+            return Err(self.too_full(asked, share_of(&kept)));
+        }
         let mut sorted = lattice.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = points.len() as f64;
@@ -104,8 +116,12 @@ impl<'a> Finish<'a> {
             checkpoint();
             let by = sorted[((share * count) as usize).min(points.len() - 1)];
             let made = self.finished(Arc::new(tiling.clone().moved(by)), net.as_ref())?;
-            let solid = self.solid(&made, &points);
-            let found = solid.iter().zip(&kept).filter(|(s, k)| **s || **k).count() as f64 / count;
+            let mut solid = kept.clone();
+            fill(&mut solid, &points, |p, out| made.field.values(p, out));
+            if let (Some(rods), None) = (&made.net, fixed) {
+                fill(&mut solid, &points, |p, out| rods.values(p, out));
+            }
+            let found = share_of(&solid);
             if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
                 best = Some((found, Finished { fraction: Some(found), ..made }));
             }
@@ -183,6 +199,10 @@ impl<'a> Finish<'a> {
         })
     }
 
+    fn rods(&self, net: &Net, radius: f64) -> Result<CsgSolid, DesignError> {
+        net.solid(radius).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))
+    }
+
     /// The lattice with its ends at its own level.
     fn finished(&self, tiling: Arc<Tiling>, net: Option<&Net>) -> Result<Finished, DesignError> {
         let sheet = || tiling.thickness().map(|w| w.mean);
@@ -194,8 +214,7 @@ impl<'a> Finish<'a> {
                     if tiling.part == Part::Sheet { sheet() } else { None }.unwrap_or(2f64.sqrt() * tiling.ports().1)
                 };
                 let radius = self.radius.unwrap_or_else(own);
-                let solid = net.solid(radius).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))?;
-                Ok(Finished { net: Some(solid), radius: Some(radius), ..plain })
+                Ok(Finished { net: Some(self.rods(net, radius)?), radius: Some(radius), ..plain })
             }
             (Ends::Rounded, _) => {
                 let own = if tiling.part == Part::Sheet { sheet().map(|w| 0.5 * w) } else { None };
@@ -206,25 +225,10 @@ impl<'a> Finish<'a> {
             _ => Ok(plain),
         }
     }
+}
 
-    /// Which points the skin and the keep zones fill.
-    fn kept(&self, points: &[Vec3]) -> Vec<bool> {
-        let mut kept = vec![false; points.len()];
-        for body in self.environment.filled {
-            let values = sample::values(points, |p, out| body.values(p, out));
-            kept.iter_mut().zip(values).for_each(|(k, v)| *k |= v <= 0.0);
-        }
-        kept
-    }
-
-    /// Which points the lattice and its net fill.
-    fn solid(&self, made: &Finished, points: &[Vec3]) -> Vec<bool> {
-        let values = sample::values(points, |p, out| made.field.values(p, out));
-        let mut solid: Vec<bool> = values.into_iter().map(|v| v <= 0.0).collect();
-        if let Some(net) = &made.net {
-            let values = sample::values(points, |p, out| net.values(p, out));
-            solid.iter_mut().zip(values).for_each(|(s, v)| *s |= v <= 0.0);
-        }
-        solid
-    }
+/// Marks the points at which a field is not positive.
+fn fill(solid: &mut [bool], points: &[Vec3], values: impl Fn(&[Vec3], &mut [f64]) + Sync) {
+    let values = sample::values(points, values);
+    solid.iter_mut().zip(values).for_each(|(s, v)| *s |= v <= 0.0);
 }

@@ -229,7 +229,8 @@ fn named(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-fn too_many(most: usize) -> Fault {
+/// The refusal of a mesh of more tetrahedra than `most`.
+pub(super) fn too_many(most: usize) -> Fault {
     let message = format!("a mesh of this size would have more than {most} tetrahedra; use a greater one");
     Fault::new("size", message)
 }

@@ -9,7 +9,7 @@ use geometry::math::{Vec3, add, norm, scale, sub};
 use geometry::tetmesh::{EDGES, conformity, tet_quality::size_of, volume};
 
 /// Tetrahedra are this much larger than asked for at most: bisections halve the volume.
-const SPREAD: f64 = 1.122_462_048_309_373;
+pub(super) const SPREAD: f64 = 1.122_462_048_309_373;
 /// Greatest distance between chord and surface, as a fraction of the chord: of a circle, chords shorter than its radius.
 const SAGITTA: f64 = 0.12;
 /// Tetrahedra are not made smaller for curvature than this fraction of the size asked for.
