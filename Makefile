@@ -171,7 +171,7 @@ tidy: $(VENV)/.ruff
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 
-smoke: $(VENV)/.release
+smoke: $(VENV)/.$(PROFILE)
 	$(BIN)/python bench/smoke.py --trabecula $(BIN)/trabecula
 
 bench: $(VENV)/.release

@@ -37,8 +37,8 @@ def ball():
 
 def torus():
     """A ring of 22 mm, so round that nothing on it counts as an edge: those of united bodies are not kept."""
-    ring = manifold3d.CrossSection.circle(4, 48).translate((7, 0))
-    return arrays(ring.revolve(96).rotate(ANGLES))
+    ring = manifold3d.CrossSection.circle(4, 36).translate((7, 0))
+    return arrays(ring.revolve(72).rotate(ANGLES))
 
 
 PARTS = {"box": box, "bracket": bracket, "ball": ball, "torus": torus}

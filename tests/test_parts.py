@@ -61,7 +61,7 @@ def test_parts_are_filled(tmp_path, name):
     part = parts.PARTS[name]()
     whole = judges.volume(*part)
     # One place in each cell of a grid: the count errs by the cells that the surface passes, each by half of one at most.
-    side = (whole / 4_000) ** (1 / 3)
+    side = (whole / 2_000) ** (1 / 3)
     low, high = part[0].min(axis=0), part[0].max(axis=0)
     axes = [np.arange(a, b, side) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
