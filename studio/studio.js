@@ -381,7 +381,7 @@ const packed = async (words, way) => new Uint8Array(await new Response(new Blob(
 
 async function link() {
   const bytes = await packed(text.value, new CompressionStream("deflate-raw"));
-  const letters = btoa(String.fromCharCode(...bytes)).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
+  const letters = btoa(Array.from(bytes, (b) => String.fromCharCode(b)).join("")).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
   return `#d=${letters}`;
 }
 
