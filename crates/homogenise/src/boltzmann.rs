@@ -1,16 +1,25 @@
 //! One step of a lattice Boltzmann scheme for creeping flow: D3Q19, two relaxation times, interpolated bounce-back.
 //!
-//! Each node has nineteen populations f_q, deviations from those at rest. A step collides and streams them:
-//! f̃_q = f_q − ω⁺(f⁺ − e⁺) − ω⁻(f⁻ − e⁻) + (1 − ω⁻/2) t_q c_q·F, where e⁺ = t_q ρ / 3, e⁻ = t_q c_q·j, j = Σ f_q c_q + F/2: linear, hence Stokes.
-//! Both rates are tied by (1/ω⁺ − ½)(1/ω⁻ − ½) = Λ = 3/16; steady velocities times the viscosity then depend on Λ alone. Walls cut the links at
-//! a distance δ of a node, and the population that comes back from there is the multireflection of Ginzburg and d'Humières (Phys. Rev. E 68 (2003)
-//! 066614), f_q̄ = f̃_q + κ₀(f_q − f̃_q̄) + κ₁(f̃_q − f̃_q̄ a node further back) + F: it is zero velocity at the wall of the parabola along the
-//! link, so that plane channels are exact, and keeps that property. With p = f̃⁻ − f⁻ and Λ⁻ = 1/ω⁻ − ½, along a link in a steady flow f_q − f̃_q̄ = 2e − e' − 2Λ⁻p,
-//! the same a node further back, and f̃_q − f_q̄ = 2e + e' − 2Λ⁻p at the node, where e is e⁻ + Λ⁻t_q c_q·F, hence the weights: together they are
-//! S(e + δ e' + ½δ² e'' − Λ⁻p), S = 4/(1 + δ)², and F = SΛ⁻(p − t_q c_q·F) takes what does not belong away. With one node behind alone the
-//! interpolation is linear (κ₀ = (1 − 2δ)/(1 + 2δ), S = 4/(1 + 2δ)), and e'' is taken from p as if the wall were across the link: p − t_q c_q·F = −⅔Λ⁺e''.
+//! **Collision.** Each node has nineteen populations f_q, deviations from those at rest, stored eight nodes at a time. A step collides them,
 //!
-//! Populations are stored eight nodes at a time; `from` says where each comes from, a wall being its own node's opposite population.
+//! f̃_q = f_q − ω⁺(f⁺ − e⁺) − ω⁻(f⁻ − e⁻) + (1 − ω⁻/2) t_q c_q·F, with e⁺ = t_q ρ / 3, e⁻ = t_q c_q·j, j = Σ f_q c_q + F/2,
+//!
+//! which is linear, hence Stokes flow, and streams them: `from` says where each comes from, at a wall from the node's own opposite one. The rates are tied by
+//! (1/ω⁺ − ½)(1/ω⁻ − ½) = Λ; steady velocities times the viscosity then depend on Λ alone. Λ = 3/16 puts half-way walls of plane channels
+//! exactly where they are (Ginzburg, d'Humières, Phys. Rev. E 68 (2003) 066614).
+//!
+//! **Walls** cut a link at the distance δ from a node, in units of the link. What comes back is the multireflection of the same paper,
+//!
+//! f_q̄ = f̃_q + κ₀(f_q − f̃_q̄) + κ₁(f̃_q − f̃_q̄ a node further back) + F, with F = SΛ⁻(p − t_q c_q·F), p = f̃⁻ − f⁻, Λ⁻ = 1/ω⁻ − ½:
+//!
+//! | nodes behind | κ₀ | κ₁ | S | velocity that is zero at the wall |
+//! |---|---|---|---|---|
+//! | two | (1 − 2δ − 2δ²)/(1 + δ)² | δ²/(1 + δ)² | 4/(1 + δ)² | of the parabola along the link: plane channels are exact |
+//! | one | (1 − 2δ)/(1 + 2δ) | 0 | 4/(1 + 2δ) | of the line, with e'' as if the wall were across the link: p − t_q c_q·F = −⅔Λ⁺e'' |
+//!
+//! **Why these weights.** With e = e⁻ + Λ⁻t_q c_q·F, in a steady flow f_q − f̃_q̄ = 2e − e' − 2Λ⁻p along a link, the same a node further back,
+//! and f̃_q − f_q̄ = 2e + e' − 2Λ⁻p at the node. The κ make the sum S(e + δe' + ½δ²e'' − Λ⁻p), and F takes −SΛ⁻p away: what is left is
+//! the velocity at the wall.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -25,7 +34,7 @@ pub const Q: usize = 19;
 const BLOCK: usize = Q * LANES;
 /// Blocks done by a thread at a time.
 const PIECE: usize = 64;
-/// The product Λ of the relaxation times less a half: walls of plane channels are exactly half-way for it.
+/// The product Λ of the relaxation times less a half.
 const MAGIC: f64 = 3.0 / 16.0;
 
 /// The weight t_q of a velocity: Σ t c c = 1.

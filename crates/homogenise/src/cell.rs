@@ -32,6 +32,15 @@ pub struct Homogenised<T> {
     pub cases: usize,
 }
 
+/// The second and third columns of a tensor that a cyclic change of the axes leaves as it is, from the first.
+pub(crate) fn fill_cyclic(tensor: &mut Mat3) {
+    for from in [0, 1] {
+        for i in 0..3 {
+            tensor[(i + 1) % 3][from + 1] = tensor[i][from];
+        }
+    }
+}
+
 /// Weights that differ by no more are the same: what rounding leaves of a symmetry.
 const SAME: f64 = 1e-7;
 
@@ -103,7 +112,7 @@ impl VoxelCell {
             gradient_modes(&product(&strain, &voxel))
         };
         let cases: &[usize] = if cyclic { &[0, 3] } else { &[0, 1, 2, 3, 4, 5] };
-        let mut made = self.solve::<3>(&element, &self.fractions, cases, &modes, tolerance, progress)?;
+        let made = self.solve::<3>(&element, &self.fractions, cases, &modes, tolerance, progress)?;
         let mut c = [[0.0; 6]; 6];
         for (case, column) in cases.iter().zip(&made.tensor) {
             for i in 0..6 {
@@ -119,7 +128,6 @@ impl VoxelCell {
             }
         }
         let c = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])));
-        made.tensor.clear();
         Ok(Homogenised {
             tensor: turned(&c, &frame),
             residual: made.residual,
@@ -156,11 +164,7 @@ impl VoxelCell {
             }
         }
         if cyclic {
-            for from in [0, 1] {
-                for i in 0..3 {
-                    k[(i + 1) % 3][from + 1] = k[i][from];
-                }
-            }
+            fill_cyclic(&mut k);
         }
         let k: Mat3 = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (k[i][j] + k[j][i])));
         let k = product(&product(&frame, &k), &transpose(&frame));

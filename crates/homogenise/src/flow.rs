@@ -8,7 +8,7 @@ use geometry::math::Mat3;
 use geometry::progress::{Progress, Stage, Stopped};
 
 use crate::boltzmann::Nodes;
-use crate::cell::Homogenised;
+use crate::cell::{Homogenised, fill_cyclic};
 use crate::dense::solved;
 use crate::fields::{combine, dot};
 use crate::pore::PoreGrid;
@@ -23,7 +23,8 @@ const MOST: usize = 40_000;
 impl PoreGrid {
     /// The permeability k of the cell in steps of the grid squared, in the axes of the grid: mean flux = −k ∇p / viscosity.
     ///
-    /// The result depends on the `viscosity` (in steps of the grid and of time) within rounding and `tolerance` only; the number of steps does.
+    /// The `viscosity` (in steps of the grid and of time) changes the number of steps, and the result only within rounding and
+    /// `tolerance`.
     /// Where nothing connects the pore with its translates there is no flow. `cyclic` says that a cyclic change of the axes changes nothing.
     ///
     /// # Errors
@@ -78,11 +79,7 @@ impl PoreGrid {
             made.iterations = made.iterations.max(steps);
         }
         if cyclic {
-            for from in [0, 1] {
-                for i in 0..3 {
-                    k[(i + 1) % 3][from + 1] = k[i][from];
-                }
-            }
+            fill_cyclic(&mut k);
         }
         Ok(Homogenised { tensor: k, ..made })
     }

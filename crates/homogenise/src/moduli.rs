@@ -23,7 +23,7 @@ pub struct Moduli {
 }
 
 impl Moduli {
-    /// The figures of a stiffness; `None` of one that resists some strain not at all.
+    /// The figures of a stiffness; `None` if it is singular: some strain meets no resistance.
     pub fn of(c: &Voigt) -> Option<Moduli> {
         let s = inverse6(c)?;
         let sum = |m: &Voigt, of: [(usize, usize); 3]| of.iter().map(|(i, j)| m[*i][*j]).sum::<f64>();
@@ -61,11 +61,7 @@ pub fn conductivity_bounds(fraction: f64, pore: f64) -> [f64; 2] {
         // Of a matrix k with the rest in inclusions.
         if share <= 0.0 { other } else { k + (1.0 - share) / (1.0 / (other - k) + share / (3.0 * k)) }
     };
-    let bound = |k: f64, other: f64, share: f64| match () {
-        () if k == other => k,
-        () if k == 0.0 => 0.0,
-        () => one(k, other, share),
-    };
+    let bound = |k: f64, other: f64, share: f64| if k == other || k == 0.0 { k } else { one(k, other, share) };
     let (a, b) = (bound(1.0, pore, fraction), bound(pore, 1.0, 1.0 - fraction));
     [a.min(b), a.max(b)]
 }

@@ -16,7 +16,7 @@
 //! level_offset                                                          LO and HI at a point, with gradients
 //! sum                                                                   F, and the blend's data
 //! evaluated · grid_row                                                  summands at points, on a row of a block
-//! points · mixed_rows                                                   the blend at points, on rows with several lattices
+//! point_values · mixed_rows                                             the blend at points, on rows with several lattices
 //! fill_block                                                            the blend on a block
 //! ```
 

@@ -122,10 +122,12 @@ impl Block<'_> {
 fn known(surfaces: &[Surface], tree: &CsgTree, bounds: &Aabb) -> CsgTree {
     tree.simplified(&|i| {
         let b = surfaces[i].field.bound(bounds);
-        match () {
-            () if b.hi <= 0.0 => Sign::Negative,
-            () if b.lo >= 0.0 => Sign::Positive,
-            () => Sign::Varies(i),
+        if b.hi <= 0.0 {
+            Sign::Negative
+        } else if b.lo >= 0.0 {
+            Sign::Positive
+        } else {
+            Sign::Varies(i)
         }
     })
 }

@@ -136,10 +136,12 @@ impl Pencil {
                 let b = 4.0 * (self.power() + r * r) - e * e;
                 let root = (b * b - 4.0 * e * e * l2).sqrt();
                 let least = 2.0 * l2 / (b + root);
-                match () {
-                    () if !(r > 0.0 && b > 0.0) => f64::NAN,
-                    () if least > self.lambda_range().0 || e == 0.0 => least,
-                    () => (b + root) / (2.0 * e * e),
+                if !(r > 0.0 && b > 0.0) {
+                    f64::NAN
+                } else if least > self.lambda_range().0 || e == 0.0 {
+                    least
+                } else {
+                    (b + root) / (2.0 * e * e)
                 }
             }
             // 4pλ² − (L² + 4p − e²)λ + L² = 0 with p = P + w², the larger root.
@@ -168,10 +170,12 @@ impl Pencil {
         // ρ² at mid length decreases with λ up to L/|e| and then increases.
         let at = |lambda: f64| Pencil { lambda, ..*self }.radius_squared(self.length / 2.0).max(0.0).sqrt();
         let turn = self.length / e.abs();
-        let end = match () {
-            () if hi.is_finite() => at(hi),
-            () if e == 0.0 => 0.0,
-            () => f64::INFINITY,
+        let end = if hi.is_finite() {
+            at(hi)
+        } else if e == 0.0 {
+            0.0
+        } else {
+            f64::INFINITY
         };
         let least = if turn > lo && turn < hi { at(turn) } else { at(lo).min(end) };
         (least, at(lo).max(end))

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::{TetMesh, volume};
 use crate::fault::{Fault, counted, number};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::{Mesh, meet, near_pairs, self_intersections};
+use crate::mesh::{Mesh, near_pairs, self_intersections};
 
 /// A volume below this share of the cube of the longest edge is none: coordinates in single precision leave no more.
 const FLAT: f64 = 1e-9;
@@ -223,20 +223,6 @@ fn longest_edge(boundary: &Mesh) -> f64 {
         norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)))
     });
     sides.fold(0.0, f64::max)
-}
-
-/// Balls about the triangles of a boundary that meet others, or have nodes of others on them.
-pub fn clashes(boundary: &Mesh) -> Vec<(Vec3, f64)> {
-    let found = near_pairs(boundary, ON * longest_edge(boundary), |i, j| {
-        (meet(boundary, i, j) || hung(boundary, i, j).is_some()).then_some([i, j])
-    });
-    let ball = |i: usize| {
-        let corners = boundary.corners(i);
-        let center = middle(&corners);
-        let reach = corners.iter().map(|p| norm(sub(*p, center)));
-        (center, 2.0 * reach.fold(0.0, f64::max))
-    };
-    found.into_iter().flatten().map(ball).collect()
 }
 
 /// Whether a place is on a triangle, its edges included, to within a small share of its longest edge.

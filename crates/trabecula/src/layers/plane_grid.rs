@@ -140,10 +140,12 @@ impl LiveBlock {
         let bounds = nodes.bounds();
         let sign = |f: usize| {
             let r = surfaces[f].field.bound(&bounds);
-            match () {
-                _ if r.hi <= 0.0 => Sign::Negative,
-                _ if r.lo > 0.0 => Sign::Positive,
-                _ => Sign::Varies(f),
+            if r.hi <= 0.0 {
+                Sign::Negative
+            } else if r.lo > 0.0 {
+                Sign::Positive
+            } else {
+                Sign::Varies(f)
             }
         };
         let signs: Vec<Sign> = (0..surfaces.len()).map(sign).collect();

@@ -94,10 +94,12 @@ impl Stretch {
     /// In words where cells of a map are stretched beyond the range; `None` if nowhere.
     pub(super) fn exceeded(&self, d: &Distortion) -> Option<String> {
         let [low, high] = d.stretch;
-        let (found, at) = match () {
-            () if low < self.least => (low, d.stretch_at[0]),
-            () if high > self.most => (high, d.stretch_at[1]),
-            () => return None,
+        let (found, at) = if low < self.least {
+            (low, d.stretch_at[0])
+        } else if high > self.most {
+            (high, d.stretch_at[1])
+        } else {
+            return None;
         };
         let [least, most] = self.range().map(number);
         Some(format!(
