@@ -225,7 +225,7 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
             at(d.turn_at)
         ));
     }
-    if let Some(longest) = d.singular.first() {
+    if let (Some(longest), None) = (d.singular.first(), phase.cores()) {
         let all: f64 = d.singular.iter().map(|l| l.length).sum();
         say(format!(
             "axes do not come back to themselves round {}, {all:.1} mm in all: no lattice is without a flaw there",

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::phase_grid::Grid;
 use super::pierced_faces::{Pierced, length, matched, polylines};
-use geometry::math::{Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
+use geometry::math::{IDENTITY, Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
 
 /// What counts as the same axes.
 pub(super) enum Alike {
@@ -121,6 +121,14 @@ fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
 }
 
 impl Alike {
+    /// The rotations that change nothing; of a line alone none but none at all.
+    pub fn turns(&self) -> Vec<Mat3> {
+        match self {
+            Alike::Line => vec![IDENTITY],
+            Alike::Turned(all) => all.clone(),
+        }
+    }
+
     /// Whether the axes of two frames differ by so little that once round a face of four such edges they come back.
     fn is_near(&self, a: &Mat3, b: &Mat3) -> bool {
         match self {
@@ -204,7 +212,7 @@ fn times([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::math::{Aabb, IDENTITY, rotation};
+    use geometry::math::{Aabb, rotation};
 
     fn equal() -> Alike {
         Alike::Turned(vec![IDENTITY])
