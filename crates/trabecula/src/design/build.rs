@@ -6,8 +6,8 @@ use super::build_cell::cell;
 use super::data::*;
 use super::finish_tiling::Finished;
 use super::{
-    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin, build_tets, build_tiling,
-    sample, warn,
+    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin, build_tets,
+    build_tiling, sample, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;

@@ -40,13 +40,18 @@ pub(super) fn centred(map: Map, cell: &Cell, path: &str) -> Result<Map, DesignEr
 /// The solid cores of lattices, with the names of their lattices.
 pub(super) fn solid(lattices: &[(String, Arc<Lattice>)]) -> (Vec<String>, Vec<CsgSolid>) {
     let cores = lattices.iter().filter_map(|(name, l)| Some((name, l.map.solved()?.cores()?)));
-    cores.filter(|(_, c)| c.fill == CoreFill::Solid).map(|(name, c)| (format!("CORE_{name}"), c.tube.clone().solid())).unzip()
+    cores
+        .filter(|(_, c)| c.fill == CoreFill::Solid)
+        .map(|(name, c)| (format!("CORE_{name}"), c.tube.clone().solid()))
+        .unzip()
 }
 
 /// A field without the void cores of lattices.
 pub(super) fn hollowed(field: Arc<dyn Implicit>, lattices: &[(String, Arc<Lattice>)]) -> Arc<dyn Implicit> {
     let cores = lattices.iter().filter_map(|(_, l)| l.map.solved()?.cores());
-    cores.filter(|c| c.fill == CoreFill::Void).fold(field, |of, c| Arc::new(Hollowed { of, tube: Arc::new(c.tube.clone()) }))
+    cores
+        .filter(|c| c.fill == CoreFill::Void)
+        .fold(field, |of, c| Arc::new(Hollowed { of, tube: Arc::new(c.tube.clone()) }))
 }
 
 /// Refuses covered lines in the map of beams.

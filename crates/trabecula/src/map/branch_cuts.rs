@@ -7,7 +7,9 @@
 
 use super::phase_grid::Grid;
 use super::winding::{Filament, to_segment};
-use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, cross, dot, norm, product, scale, sin_cos_turns, sub, transpose, unit};
+use geometry::math::{
+    IDENTITY, Mat3, Vec3, add, apply, cross, dot, norm, product, scale, sin_cos_turns, sub, transpose, unit,
+};
 
 /// Directions of the cuts that are tried.
 const DIRECTIONS: usize = 48;
@@ -77,7 +79,8 @@ impl BranchCuts {
             jump(1.0) + jump(-1.0)
         };
         let filaments: Vec<Filament> = lines.iter().map(filament).collect();
-        let cut = |f: &Filament| Cut { angle: (0..grid.len()).map(|n| f.angle(grid.node(n))).collect(), step: Move::NONE };
+        let cut =
+            |f: &Filament| Cut { angle: (0..grid.len()).map(|n| f.angle(grid.node(n))).collect(), step: Move::NONE };
         BranchCuts { sense: filaments.first().map_or(1.0, sense), cuts: filaments.iter().map(cut).collect() }
     }
 
@@ -151,7 +154,9 @@ fn aside(lines: &[Vec<Vec3>], along: Vec3) -> Vec3 {
         for (i, from) in lines.iter().enumerate() {
             for (_, other) in lines.iter().enumerate().filter(|(j, _)| *j != i) {
                 let reach = 2.0 * norm(sub(from[0], other[0])) + 1.0;
-                let near = |p: &Vec3| from.iter().map(|q| to_segment(*p, *q, add(*q, scale(*d, reach)))).fold(f64::INFINITY, f64::min);
+                let near = |p: &Vec3| {
+                    from.iter().map(|q| to_segment(*p, *q, add(*q, scale(*d, reach)))).fold(f64::INFINITY, f64::min)
+                };
                 least = other.iter().map(near).fold(least, f64::min);
             }
         }

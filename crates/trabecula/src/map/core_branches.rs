@@ -60,8 +60,10 @@ pub(super) fn rotations(
     let crossed = |n: usize, m: usize| -> Vec<(usize, i32)> {
         (0..cuts.len()).map(|line| (line, cuts.crossed(line, [n, m]))).filter(|(_, sense)| *sense != 0).collect()
     };
-    let some: Vec<(usize, usize, Mat3, Vec<(usize, i32)>)> =
-        edges.map(|(n, m, turn)| (n, m, turn, crossed(n, m))).filter(|(.., turn, cut)| *turn != IDENTITY || !cut.is_empty()).collect();
+    let some: Vec<(usize, usize, Mat3, Vec<(usize, i32)>)> = edges
+        .map(|(n, m, turn)| (n, m, turn, crossed(n, m)))
+        .filter(|(.., turn, cut)| *turn != IDENTITY || !cut.is_empty())
+        .collect();
     let mut found: Vec<Option<Mat3>> = vec![None; cuts.len()];
     for (n, _, turn, cut) in &some {
         let at = grid.node(*n);
@@ -90,7 +92,9 @@ pub(super) fn rotations(
 
 /// Refuses cells of unequal edges where axes change places.
 fn check_lengths(laid: &Laid, target: &Target, turns: &[Mat3]) -> Result<(), Fault> {
-    let swapped = |t: &Mat3| (0..3).find(|a| t[*a][*a] == 0.0).map(|a| (a, (0..3).fold(a, |m, b| if t[a][b] != 0.0 { b } else { m })));
+    let swapped = |t: &Mat3| {
+        (0..3).find(|a| t[*a][*a] == 0.0).map(|a| (a, (0..3).fold(a, |m, b| if t[a][b] != 0.0 { b } else { m })))
+    };
     let Some((a, b)) = turns.iter().find_map(swapped) else { return Ok(()) };
     let unequal = laid.given.iter().any(|w| (w[a] / w[b] - 1.0).abs() > 1e-9);
     if target.lengths.is_some() || unequal {
@@ -126,7 +130,10 @@ impl Target {
     pub fn relabel(&mut self, labels: &[Mat3], given: &[Vec3]) {
         let lengths = self.lengths.as_mut();
         if let Some(lengths) = lengths {
-            lengths.iter_mut().zip(labels).for_each(|(w, q)| *w = [0, 1, 2].map(|i| (0..3).map(|j| w[j] * q[j][i].abs()).sum()));
+            lengths
+                .iter_mut()
+                .zip(labels)
+                .for_each(|(w, q)| *w = [0, 1, 2].map(|i| (0..3).map(|j| w[j] * q[j][i].abs()).sum()));
         }
         self.frames.iter_mut().zip(labels).for_each(|(f, q)| *f = product(f, q));
         let lengths = self.lengths.as_deref().unwrap_or(given);

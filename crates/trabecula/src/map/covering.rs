@@ -85,7 +85,7 @@ impl Covering {
         let mut target = Target::new(&laid, wanted, None)?;
         checkpoint();
         let least_length = 0.5 * shortest(&laid);
-        let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length);
+        let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
         let mut paths = lines.iter().map(|l| path(l, &laid, settings, radius)).collect::<Result<Vec<_>, Fault>>()?;
         if paths.len() > MOST {
             let message = format!(
@@ -98,7 +98,8 @@ impl Covering {
         }
         let mut cuts = BranchCuts::new(&laid.grid, &mut paths);
         let tube = Tube::new(&paths, radius);
-        let outside: Vec<bool> = (laid.nodes.iter().zip(&laid.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
+        let outside: Vec<bool> =
+            (laid.nodes.iter().zip(&laid.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
         let alike = wanted.alike();
         let labels = labels(&laid, &target, &outside, &cuts, &alike);
         target.relabel(&labels, &laid.given);
@@ -145,7 +146,9 @@ fn refuse(wanted: &Wanted) -> Result<(), Fault> {
         }
         () if wanted.stretch.is_some() => clash("stretch", "cells round them are not held within a range"),
         () if !wanted.fix.is_empty() => clash("fix", "phases are fixed by the lines"),
-        () if wanted.angle_weight != 1.0 => clash("angle_weight", "errors of angle and of spacing count alike round them"),
+        () if wanted.angle_weight != 1.0 => {
+            clash("angle_weight", "errors of angle and of spacing count alike round them")
+        }
         () if wanted.offset != [0.0; 3] => clash("offset", "phases are fixed by the lines"),
         () => Ok(()),
     }

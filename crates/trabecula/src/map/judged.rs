@@ -59,11 +59,10 @@ impl Judged {
         let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
         let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
         // Differences across cuts say nothing.
-        let whole = |n: usize| cuts.is_none_or(|c| !c.is_near(n));
-        let curl: Vec<f64> = (compared.par_iter()).filter(|n| whole(**n)).map(|&n| distortion::curl(grid, k, n)).collect();
+        let whole = |n: &&usize| cuts.is_none_or(|c| !c.is_near(**n));
+        let curl: Vec<f64> = (compared.par_iter()).filter(whole).map(|&n| distortion::curl(grid, k, n)).collect();
         let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
-        let in_branch: Vec<bool> = inside.iter().enumerate().map(|(n, inside)| *inside && whole(n)).collect();
-        let turn = distortion::turning(grid, &target.frames, &in_branch, longest);
+        let turn = distortion::turning(grid, &target.frames, cuts, inside, longest);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);

@@ -113,7 +113,8 @@ impl Angles {
             hole.lines.iter().map(move |line| (line.clone(), n))
         });
         let core = CORE * grid.step.into_iter().fold(f64::INFINITY, f64::min);
-        let solution = Solution { spline: Spline::through(*grid, values), winding: Winding::new(lines, core), branches: None };
+        let solution =
+            Solution { spline: Spline::through(*grid, values), winding: Winding::new(lines, core), branches: None };
         let periods = self.holes.iter().enumerate().map(|(h, hole)| {
             let (at, along) = hole.lines[0].place();
             Period { at, along, cells: round(h), asked: [0, 1, 2].map(|i| self.asked[i][h]) }

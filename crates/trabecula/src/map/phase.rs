@@ -181,7 +181,8 @@ impl Phase {
         let problem = Problem::new(laid.grid, &target.k, roots, ratio);
         let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
         checkpoint();
-        let solution = Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
+        let solution =
+            Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
         if let Some(core) = wanted.core {
             let lines = lines(&laid, wanted, &target);
             if !lines.is_empty() {
@@ -240,10 +241,8 @@ impl Phase {
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = solution.jacobian(bounds.center());
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
-        let keep = wanted.averaged().is_some()
-            || wanted.by_principal
-            || !periods.is_empty()
-            || solution.branches.is_some();
+        let keep =
+            wanted.averaged().is_some() || wanted.by_principal || !periods.is_empty() || solution.branches.is_some();
         let Target { frames, lengths, .. } = target;
         Ok(Phase {
             solution,
@@ -407,7 +406,7 @@ impl Mapping for Phase {
 /// The singular lines of a target, but for short ones.
 fn lines(laid: &Laid, wanted: &Wanted, target: &Target) -> Vec<SingularLine> {
     let least = 0.5 * target.wavelength(laid).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
-    singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least)
+    singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
 }
 
 /// The mean of lengths at the nodes in a region; those of the first node if none is.

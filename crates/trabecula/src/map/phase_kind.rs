@@ -2,7 +2,8 @@
 
 use super::stress_kind::StressKind;
 use super::{
-    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared,
+    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted,
+    given_twice, shared,
 };
 use crate::environment::{self, Environment};
 use crate::field::Field;
@@ -299,7 +300,8 @@ impl PhaseKind {
     fn covering(&self) -> Result<Option<Covering>, Fault> {
         match (self.core, self.core_radius) {
             (None, Some(radius)) => {
-                let message = "core_radius is how far core reaches; give core = \"solid\" or \"void\" as well, or leave it out";
+                let message =
+                    "core_radius is how far core reaches; give core = \"solid\" or \"void\" as well, or leave it out";
                 Err(Fault::new("core_radius", message).found(number(radius)))
             }
             (fill, radius) => Ok(fill.map(|fill| Covering { fill, radius })),

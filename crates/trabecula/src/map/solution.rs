@@ -80,7 +80,14 @@ impl Solution {
     /// The phases along the rows of a block, moved by `shift`.
     pub fn rows<'a>(&'a self, block: &Block<'a>, shift: Vec3) -> Box<dyn Rows + 'a> {
         let Solution { spline, winding, branches } = self;
-        Box::new(SolutionRows { rows: spline.rows(block), winding, branches: branches.as_ref(), block: *block, layer: 0, shift })
+        Box::new(SolutionRows {
+            rows: spline.rows(block),
+            winding,
+            branches: branches.as_ref(),
+            block: *block,
+            layer: 0,
+            shift,
+        })
     }
 
     /// Moves phases that were found at `p` so that they continue those at a near point.

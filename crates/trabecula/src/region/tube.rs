@@ -153,7 +153,8 @@ mod tests {
 
     #[test]
     fn a_tube_has_known_distances_and_bounds_that_hold() {
-        let tube = Tube::new(&[vec![[0.0; 3], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0]], vec![[0.0, 9.0, 0.0], [1.0, 9.0, 0.0]]], 1.0);
+        let tube =
+            Tube::new(&[vec![[0.0; 3], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0]], vec![[0.0, 9.0, 0.0], [1.0, 9.0, 0.0]]], 1.0);
         let at = [[2.0, 0.0, 3.0], [4.0, 5.0, 0.0], [0.5, 7.0, 0.0], [2.0, 0.0, 0.0]];
         assert_eq!(at.map(|p| tube.value(p)), [2.0, 1.0, 1.0, -1.0]);
         let mut seed = 4;
@@ -175,7 +176,12 @@ mod tests {
         assert!(line.len() <= 4, "{line:?}");
         let off = |p: &Vec3| (p[1] - 0.3 * p[0]).abs();
         assert!(line.iter().all(|p| off(p) < 0.6), "{line:?}");
-        let ring: Vec<Vec3> = (0..=60).map(|i| { let a = f64::from(i % 60) / 60.0 * core::f64::consts::TAU; [9.0 * a.cos(), 9.0 * a.sin(), 0.0] }).collect();
+        let ring: Vec<Vec3> = (0..=60)
+            .map(|i| {
+                let a = f64::from(i % 60) / 60.0 * core::f64::consts::TAU;
+                [9.0 * a.cos(), 9.0 * a.sin(), 0.0]
+            })
+            .collect();
         let line = smoothed(&ring, 0.5);
         assert_eq!(line[0], line[line.len() - 1]);
         assert!(line.iter().all(|[x, y, _]| (x.hypot(*y) - 9.0).abs() < 0.2), "{line:?}");
