@@ -11,7 +11,7 @@ use super::frame::in_mm;
 use super::phase_target::{Laid, Target};
 use super::singular_lines::Alike;
 use geometry::fault::Fault;
-use geometry::math::{IDENTITY, Mat3, Vec3, product, scale, transpose};
+use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};
 
 /// The rotations of the axes at the nodes after which they agree from node to node where no cut is, first of all at the nodes that
 /// `count`.
@@ -40,6 +40,13 @@ pub(super) fn labels(laid: &Laid, target: &Target, count: &[bool], cuts: &Branch
     labels.into_iter().map(|l| l.unwrap_or(IDENTITY)).collect()
 }
 
+/// An edge of the grid along which axes change, or across cuts: its lower node, the rotation, and the cuts with the sense of each.
+struct Turned {
+    node: usize,
+    turn: Mat3,
+    cuts: Vec<(usize, i32)>,
+}
+
 /// Finds the rotation at each cut.
 ///
 /// # Errors
@@ -60,14 +67,14 @@ pub(super) fn rotations(
     let crossed = |n: usize, m: usize| -> Vec<(usize, i32)> {
         (0..cuts.len()).map(|line| (line, cuts.crossed(line, [n, m]))).filter(|(_, sense)| *sense != 0).collect()
     };
-    let some: Vec<(usize, usize, Mat3, Vec<(usize, i32)>)> = edges
-        .map(|(n, m, turn)| (n, m, turn, crossed(n, m)))
-        .filter(|(.., turn, cut)| *turn != IDENTITY || !cut.is_empty())
+    let some: Vec<Turned> = edges
+        .map(|(node, m, turn)| Turned { node, turn, cuts: crossed(node, m) })
+        .filter(|e| e.turn != IDENTITY || !e.cuts.is_empty())
         .collect();
     let mut found: Vec<Option<Mat3>> = vec![None; cuts.len()];
-    for (n, _, turn, cut) in &some {
-        let at = grid.node(*n);
-        match cut[..] {
+    for Turned { node, turn, cuts } in &some {
+        let at = grid.node(*node);
+        match cuts[..] {
             [] => return Err(unlike(at)),
             [(line, sense)] => {
                 let turn = if sense > 0 { *turn } else { transpose(turn) };
@@ -143,9 +150,10 @@ impl Target {
         });
     }
 
-    /// The mean of the gradients that are asked for.
-    pub fn mean(&self) -> Mat3 {
-        let share = 1.0 / self.frames.len() as f64;
-        self.k.each_ref().map(|k| k.iter().fold([0.0; 3], |m, k| geometry::math::add(m, scale(*k, share))))
+    /// The mean of the gradients that are asked for, by the roots of the weights of nodes.
+    pub fn mean(&self, roots: &[f64]) -> Mat3 {
+        let share = 1.0 / roots.iter().map(|r| r * r).sum::<f64>();
+        let sum = |k: &Vec<Vec3>| k.iter().zip(roots).fold([0.0; 3], |m, (k, r)| add(m, scale(*k, r * r * share)));
+        self.k.each_ref().map(sum)
     }
 }

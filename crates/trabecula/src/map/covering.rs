@@ -18,7 +18,7 @@ use crate::field::Field;
 use crate::kind::Kind;
 use crate::region::{OutsideTube, Tube, smoothed};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Vec3, add, scale, sub, unit};
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, scale, sub, unit};
 use geometry::progress::checkpoint;
 
 /// Steps of the grid in the radius of a core: cells are torn within 2 √2 steps of a line, which is known to most of a step.
@@ -196,13 +196,15 @@ fn found(
         *root = (*root * near).max(LEAST_ROOT);
     }
     let edges = weights(laid.grid, &roots, None);
+    let mean = target.mean(&roots);
     let fits = Fits::new(&laid.grid, &target.k, &edges, &mut cuts);
     let asked = least(&fits.form, fits.free.len());
     let part = OutsideTube { region: settings.region, tube };
     let (mut first, mut cuts) = (None, cuts);
     for (_, numbers) in nearest(&fits.form, &asked) {
         checkpoint();
-        let values = fits.phases(&numbers, &mut cuts);
+        let mut values = fits.phases(&numbers, &mut cuts);
+        anchor(&mut values, &laid, &cuts, &mean, &roots);
         let (spline, branches) = cut_cells::through(laid.grid, &values, cuts.clone());
         torn(&branches, &part, tube.radius)?;
         let solution = Solution { spline, winding: Winding::default(), branches: Some(branches) };
@@ -216,8 +218,19 @@ fn found(
     }
     let Some(solution) = first else { return Err(Fault::new("core", "no map was found")) };
     let judged = Judged::of(&laid, wanted, Some(&part), &target, &solution)?;
-    let (mean, steps) = (target.mean(), fits.steps);
+    let steps = fits.steps;
     Ok((laid, Found { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
+}
+
+/// Moves phases that no rotation fixes so that their mean is that of K̄ x, as where there are no lines.
+fn anchor(values: &mut [Vec3], laid: &Laid, cuts: &BranchCuts, mean: &Mat3, roots: &[f64]) {
+    let free = |a: &usize| (0..cuts.len()).all(|line| cuts.step(line).turn[*a] == IDENTITY[*a]);
+    let whole: f64 = roots.iter().map(|r| r * r).sum();
+    for a in (0..3).filter(free) {
+        let off = |n: usize| roots[n] * roots[n] * (values[n][a] - dot(mean[a], laid.nodes[n]));
+        let off = (0..values.len()).map(off).sum::<f64>() / whole;
+        values.iter_mut().for_each(|u| u[a] -= off);
+    }
 }
 
 /// Refuses cells of the part that are torn: those next to lines that are not in the cores.

@@ -73,7 +73,7 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
     cells.keys().for_each(|n| rows[n / grid.shape[0]] = true);
     let mut torn = vec![false; grid.len()];
     let strides = grid.strides();
-    for (n, _) in &cells {
+    for n in cells.keys() {
         for (a, stride) in strides.into_iter().enumerate() {
             for (one, other) in [(*n, n + stride), (n - stride, *n)] {
                 if inner(&one) && inner(&other) && !agree(&coefficients, &cuts, near(one, -1..=2), a, [one, other]) {

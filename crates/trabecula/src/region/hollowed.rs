@@ -27,8 +27,10 @@ impl Field for Hollowed {
         let (mut d, mut slopes) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
         self.of.gradients(points, values, gradients);
         self.tube.gradients(points, &mut d, &mut slopes);
-        for i in (0..points.len()).filter(|i| -d[*i] > values[*i]).collect::<Vec<usize>>() {
-            (values[i], gradients[i]) = (-d[i], scale(slopes[i], -1.0));
+        for i in 0..points.len() {
+            if -d[i] > values[i] {
+                (values[i], gradients[i]) = (-d[i], scale(slopes[i], -1.0));
+            }
         }
     }
 

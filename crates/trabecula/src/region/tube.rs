@@ -107,16 +107,10 @@ impl Field for OutsideTube<'_> {
 /// A polyline through points that keep to a grid, without its steps: closed where the points are. `step` (mm) is the grid's.
 pub fn smoothed(points: &[Vec3], step: f64) -> Vec<Vec3> {
     let (n, closed) = (points.len(), points[0] == points[points.len() - 1]);
-    let mut line = points.to_vec();
-    for _ in 0..PASSES {
-        let old = line.clone();
-        let mean = |a: Vec3, b: Vec3, c: Vec3| add(scale(b, 0.5), scale(add(a, c), 0.25));
-        (1..n - 1).for_each(|i| line[i] = mean(old[i - 1], old[i], old[i + 1]));
-        if closed && n > 3 {
-            line[0] = mean(old[n - 2], old[0], old[1]);
-            line[n - 1] = line[0];
-        }
-    }
+    // What averages take off bends is averaged and put back (Tukey's twicing).
+    let even = averaged(points, closed);
+    let off: Vec<Vec3> = points.iter().zip(&even).map(|(p, q)| sub(*p, *q)).collect();
+    let line: Vec<Vec3> = even.iter().zip(averaged(&off, closed)).map(|(p, d)| add(*p, d)).collect();
     if closed {
         let half = n / 2;
         let mut first = thinned(&line[..=half], TOLERANCE * step);
@@ -131,6 +125,21 @@ pub fn smoothed(points: &[Vec3], step: f64) -> Vec<Vec3> {
 const PASSES: usize = 12;
 /// How near a polyline with fewer points is to the one that it stands for, in steps.
 const TOLERANCE: f64 = 0.25;
+
+/// Points averaged with adjacent ones; ends stay.
+fn averaged(points: &[Vec3], closed: bool) -> Vec<Vec3> {
+    let (n, mut line) = (points.len(), points.to_vec());
+    for _ in 0..PASSES {
+        let old = line.clone();
+        let mean = |a: Vec3, b: Vec3, c: Vec3| add(scale(b, 0.5), scale(add(a, c), 0.25));
+        (1..n - 1).for_each(|i| line[i] = mean(old[i - 1], old[i], old[i + 1]));
+        if closed && n > 3 {
+            line[0] = mean(old[n - 2], old[0], old[1]);
+            line[n - 1] = line[0];
+        }
+    }
+    line
+}
 
 /// A polyline with fewer points (Ramer, Douglas and Peucker).
 fn thinned(points: &[Vec3], tolerance: f64) -> Vec<Vec3> {
