@@ -67,14 +67,14 @@ pub(super) struct Covered {
 }
 
 impl Covering {
-    /// The map outside the cores of `lines`, which are those on a coarser grid.
+    /// The map outside the cores of `lines`, which are those on a coarser grid; `None` where a finer one has none.
     pub(super) fn solve(
         &self,
         bounds: &Aabb,
         wanted: &Wanted,
         settings: &Settings,
         (coarse, lines): (f64, &[SingularLine]),
-    ) -> Result<Covered, Fault> {
+    ) -> Result<Option<Covered>, Fault> {
         refuse(wanted)?;
         let radius = self.radius(wanted, lines)?;
         let step = settings.step.unwrap_or(coarse).min(radius / FINE);
@@ -87,6 +87,9 @@ impl Covering {
         let least_length = 0.5 * shortest(&laid);
         let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
         let mut paths = lines.iter().map(|l| path(l, &laid, settings, radius)).collect::<Result<Vec<_>, Fault>>()?;
+        if paths.is_empty() {
+            return Ok(None);
+        }
         if paths.len() > MOST {
             let message = format!(
                 "axes do not come back to themselves round {} lines; {MOST} at most are covered. Smooth the {} over more than a wavelength, \
@@ -106,7 +109,7 @@ impl Covering {
         rotations(&laid, &target, &outside, &mut cuts, &alike)?;
         let cores = Cores { fill: self.fill, tube };
         let found = found(Laid { inside: outside, ..laid }, wanted, settings, target, cuts, &cores)?;
-        Ok(Covered { laid: found.0, found: found.1, lines, cores })
+        Ok(Some(Covered { laid: found.0, found: found.1, lines, cores }))
     }
 
     /// The radius of cores, mm.

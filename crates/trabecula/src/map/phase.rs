@@ -185,9 +185,12 @@ impl Phase {
             Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
         if let Some(core) = wanted.core {
             let lines = lines(&laid, wanted, &target);
-            if !lines.is_empty() {
-                let step = laid.grid.step.into_iter().fold(f64::INFINITY, f64::min);
-                let Covered { laid, mut found, lines, cores } = core.solve(bounds, wanted, settings, (step, &lines))?;
+            let step = laid.grid.step.into_iter().fold(f64::INFINITY, f64::min);
+            let covered = match lines.is_empty() {
+                true => None,
+                false => core.solve(bounds, wanted, settings, (step, &lines))?,
+            };
+            if let Some(Covered { laid, mut found, lines, cores }) = covered {
                 found.judged.distortion.singular = lines;
                 let made = Phase::of(bounds, wanted, settings, (laid, found), (chosen.hasty, String::new()))?;
                 return Ok(Phase { cores: Some(cores), ..made });
