@@ -1,7 +1,7 @@
 """Stresses of an L-bracket and a tee joint that are loaded in their plane, for the examples with covered singular lines.
 
-Plane stress on bilinear squares of one material (E = 1, ν = 0.3), solved directly; the stress at a node is the mean of those in the middles
-of the elements about it. Written to examples/results/ell_stress.csv and tee_stress.csv.
+Plane stress on bilinear squares of one material (E = 1, ν = 0.3), solved directly; the stress at a node is the mean of those in
+the middles of the elements about it. Written to examples/results/ell_stress.csv and tee_stress.csv.
 """
 
 from pathlib import Path
@@ -74,7 +74,8 @@ def main():
         stress = stress / np.abs(stress).max()
         rows = ["x,y,z,s11,s22,s33,s23,s13,s12"]
         for z in (0.0, DEPTH):
-            rows += [f"{x:g},{y:g},{z:g},{a:.4g},{b:.4g},0,0,0,{c:.4g}" for (x, y), (a, b, c) in zip(nodes, stress, strict=True)]
+            for (x, y), (a, b, c) in zip(nodes, stress, strict=True):
+                rows.append(f"{x:g},{y:g},{z:g},{a:.4g},{b:.4g},0,0,0,{c:.4g}")
         (RESULTS / f"{name}_stress.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 
