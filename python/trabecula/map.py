@@ -58,6 +58,8 @@ def phase(
     align_depth: float | None = None,
     stretch: Sequence[float] | None = None,
     fix: Sequence[dict] | None = None,
+    core: Literal["solid", "void"] | None = None,
+    core_radius: float | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: Literal["region", "box"] | None = None,
@@ -91,6 +93,10 @@ def phase(
         [optional]
     fix: Regions: on the parts of the surface in each of them the phase along the normal is a whole number, so that the
         lattice ends there with whole cells, as many as fit best, and parts that meet there fit. [default []]
+    core: What covers singular lines, round which the stress's or the frame's axes do not come back to themselves:
+        "solid" or "void". Outside these cores cells are whole. A cell has to be the same after the turn of the axes;
+        singular lines stay bare unless given. [optional]
+    core_radius: The radius of the cores; half the wavelength at the lines unless given. [mm, above 0, optional]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     step: Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given. [mm, above
         0, optional]
@@ -114,6 +120,8 @@ def phase(
         align_depth=align_depth,
         stretch=stretch,
         fix=fix,
+        core=core,
+        core_radius=core_radius,
         offset=offset,
         step=step,
         domain=domain,

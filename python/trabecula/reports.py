@@ -866,8 +866,13 @@ class SimplifyReport(Report):
 
 
 class SingularLineReport(Report):
-    """A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there."""
+    """A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there,
+    and a core covers it if the map has one."""
 
+    core: str | None
+    """What covers it, "solid" or "void"; null where nothing does."""
+    core_radius: float | None
+    """How far that reaches from the line, mm; null where nothing does."""
     length: float
     """Its length within the region, mm, to about a tenth."""
     points: list[list[float]]

@@ -186,7 +186,8 @@ def _singular(lines: list[Report]) -> Iterator[str]:
     for line in lines[:3]:
         a, b = line.points[0], line.points[-1]
         place = f"from {point(a)} to {point(b)} mm" if a != b else f"closed, through {point(a)} mm"
-        yield f"  singular   {line.length:.1f} mm, axes turned by {line.turn:.0f}° once round it, {place}"
+        core = f", in a {line.core} core of {line.core_radius:.4g} mm" if line.core else ""
+        yield f"  singular   {line.length:.1f} mm, axes turned by {line.turn:.0f}° once round it, {place}{core}"
     if more := lines[3:]:
         yield f"             and {counted(len(more), 'shorter one')}"
 

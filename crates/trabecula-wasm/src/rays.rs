@@ -35,7 +35,8 @@ const FRACTIONS: usize = 33;
 fn marched(built: &Built) -> Option<&Arc<Lattice>> {
     let [(_, lattice)] = &built.lattices[..] else { return None };
     let alone = built.tilings.is_empty() && built.beams.is_empty() && built.blend.is_none();
-    (alone && built.solid.filled.is_empty()).then_some(lattice)
+    let bare = lattice.map.solved().is_none_or(|map| map.cores().is_none());
+    (alone && bare && built.solid.filled.is_empty()).then_some(lattice)
 }
 
 /// Textures and numbers for the card; `None` for a solid through which it cannot march. The cell's and the region's are left out

@@ -15,6 +15,7 @@ mod series;
 pub mod tet;
 mod thickness;
 mod throat;
+mod turned;
 
 pub(crate) use cut::Cut;
 pub use distance::Distance;

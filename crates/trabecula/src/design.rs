@@ -8,6 +8,7 @@ mod build;
 mod build_beams;
 mod build_blend;
 mod build_cell;
+mod build_core;
 mod build_level;
 mod build_pattern;
 mod build_property;

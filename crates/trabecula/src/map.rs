@@ -2,8 +2,13 @@
 
 mod affine;
 mod affine_kind;
+mod branch_cuts;
+mod branched_solve;
 mod cohomology;
+mod core_branches;
+mod covering;
 pub(crate) mod curved_tets;
+mod cut_cells;
 mod distortion;
 mod edge_squares;
 mod fixed_faces;
@@ -44,6 +49,7 @@ mod winding;
 
 pub use affine::{Affine, Skew};
 pub use affine_kind::AffineKind;
+pub use covering::{CoreFill, Cores, Covering};
 pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::{Axis, Orientation};
 pub use load_cases::{CasesBy, Stress};
@@ -183,6 +189,9 @@ pub trait Mapping: Send + Sync {
     fn solved(&self) -> Option<&Phase> {
         None
     }
+
+    /// Moves phases (turns) of a solved map, in which one place is as good as another.
+    fn move_phases(&mut self, _by: Vec3) {}
 
     /// The wrapped map that this is, if it is one: cells shrink towards its axis or centre.
     fn round(&self) -> Option<&Round> {

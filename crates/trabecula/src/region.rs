@@ -21,12 +21,14 @@ mod faces;
 mod file;
 mod halfspace;
 mod halving;
+mod hollowed;
 mod mesh;
 mod meshes;
 mod offset;
 mod primitive;
 mod sphere;
 mod tetrahedron;
+mod tube;
 
 pub use cad::{CAD, CadMesh, FaceLabel, Tessellation};
 pub use csg::{Difference, Intersection, Union};
@@ -36,10 +38,12 @@ pub use distance_table::DistanceTable;
 pub use faces::{FaceSet, FacesKind};
 pub use file::MeshFile;
 pub use halfspace::{HalfSpace, HalfSpaceKind};
+pub use hollowed::Hollowed;
 pub use mesh::MeshRegion;
 pub use offset::Offset;
 pub use sphere::Sphere;
 pub use tetrahedron::Tetrahedron;
+pub use tube::{OutsideTube, Tube, smoothed};
 
 /// Where the part may be. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Kind)]

@@ -6,8 +6,8 @@ use super::build_cell::cell;
 use super::data::*;
 use super::finish_tiling::Finished;
 use super::{
-    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_level, build_skin, build_tets, build_tiling,
-    sample, warn,
+    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin, build_tets,
+    build_tiling, sample, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
@@ -102,12 +102,14 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         Some(made) => made.blend.clone(),
         None => only(&lattices, &tilings, &graphs)?,
     };
+    let field = build_core::hollowed(field, &lattices);
+    let (core_names, cores) = build_core::solid(&lattices);
     let mut solid = Solid::new(region.clone(), Some(field), wavelength);
     solid.transition = blend.as_ref().and_then(|b| b.width);
     let skins = d.skin.iter().map(|_| "SKIN".to_string());
     let keeps = d.keep.0.keys().map(|name| format!("KEEP_{name}"));
-    let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).collect();
-    let solid = filled.into_iter().chain(nets).fold(solid, Solid::with);
+    let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).chain(core_names).collect();
+    let solid = filled.into_iter().chain(nets).chain(cores).fold(solid, Solid::with);
     let figures = OnceLock::new();
     Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures })
 }
@@ -239,6 +241,7 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
         None => spec.map.build(&here)?,
         Some(length) => build_level::solved_map(spec, length, &cell, &here, &level)?,
     };
+    let map = build_core::centred(map, &cell, &below("cell"))?;
     let here = level;
     let level = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::build_core;
 use super::build_pattern;
 use super::data::*;
 use super::sample;
@@ -239,6 +240,7 @@ fn frame(
     let net = unit.graph().map_err(|f| DesignError::fault(&environment.path, f))?;
     let at = Environment { path: below("map"), ..*environment };
     let made = map.build(&at)?;
+    build_core::not_of_beams(&made, map, &at.path)?;
     solved_map(&made, map, &environment.path, warnings);
     if let Some(fraction) = spec.fraction {
         let radius = radius_for_fraction::of_cell(fraction, &net, &made, spec, environment)?;

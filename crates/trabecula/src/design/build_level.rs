@@ -10,7 +10,7 @@ use crate::field::Field;
 use crate::grade::{Grade, Product, Quantity, Remapped, Stops, key_of};
 use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
-use crate::map::Map;
+use crate::map::{CoreFill, Cores, Map};
 use geometry::fault::{Fault, number};
 use geometry::math::{Interval, Vec3};
 use rayon::prelude::*;
@@ -414,7 +414,23 @@ fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, environment: &Env
             *v = f64::NEG_INFINITY;
         }
     }
+    let mut open = 0;
+    if let Some(Cores { fill, tube }) = map.solved().and_then(|m| m.cores()) {
+        tube.values(&points, &mut filled);
+        for (v, _) in values.iter_mut().zip(&filled).filter(|(v, f)| **f <= 0.0 && **v != f64::NEG_INFINITY) {
+            let solid = *fill == CoreFill::Solid;
+            *v = if solid { f64::NEG_INFINITY } else { f64::INFINITY };
+            *(if solid { &mut count } else { &mut open }) += 1;
+        }
+    }
     let k = ((target * values.len() as f64) as usize).min(values.len() - 1);
+    if k + open >= values.len() {
+        return Err(format!(
+            "the void cores of singular lines leave {:.4} of the part; ask for less than that, {} is too much",
+            1.0 - open as f64 / values.len() as f64,
+            number(target)
+        ));
+    }
     if k <= count && count > 0 {
         return Err(format!(
             "the skin and what is kept solid make up {:.4} of the part already; ask for more than that, {} is too little",

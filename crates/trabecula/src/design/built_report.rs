@@ -11,7 +11,7 @@ use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
-use crate::map::{Distortion, Period, SingularLine, Spread};
+use crate::map::{CoreFill, Distortion, Period, Phase, SingularLine, Spread};
 use crate::region::{CadMesh, Region};
 use crate::report::*;
 use crate::truss::Beams;
@@ -166,7 +166,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
         distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
-        singular: lattice.map.solved().map(|map| singular(&map.distortion().singular)),
+        singular: lattice.map.solved().map(singular),
         periods: lattice.map.solved().map(|map| periods(map.periods())).filter(|p| !p.is_empty()),
         fit: None,
         tets: None,
@@ -376,13 +376,18 @@ fn distortion(d: &Distortion) -> DistortionReport {
 }
 
 /// Singular lines; positions to a millionth of a millimetre.
-fn singular(of: &[SingularLine]) -> Vec<SingularLineReport> {
+fn singular(map: &Phase) -> Vec<SingularLineReport> {
     let one = |l: &SingularLine| SingularLineReport {
         points: l.points.iter().map(|p| rounded(*p)).collect(),
         length: l.length,
         turn: l.turn,
+        core: map.cores().map(|c| match c.fill {
+            CoreFill::Solid => "solid",
+            CoreFill::Void => "void",
+        }),
+        core_radius: map.cores().map(|c| c.tube.radius),
     };
-    of.iter().map(one).collect()
+    map.distortion().singular.iter().map(one).collect()
 }
 
 /// The cells round holes; positions to a millionth of a millimetre.

@@ -218,14 +218,16 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         say(hasty.to_string());
     }
     if d.turn > TURN {
+        let remedy =
+            if phase.cores().is_some() { "give a larger core_radius there" } else { "let it turn more slowly" };
         say(format!(
             "the orientation turns by {:.0} degrees a cell at {}: above {TURN} neighbouring cells no longer fit \
-             together without being torn out of shape; let it turn more slowly, or use smaller cells",
+             together without being torn out of shape; {remedy}, or use smaller cells",
             d.turn,
             at(d.turn_at)
         ));
     }
-    if let Some(longest) = d.singular.first() {
+    if let (Some(longest), None) = (d.singular.first(), phase.cores()) {
         let all: f64 = d.singular.iter().map(|l| l.length).sum();
         say(format!(
             "axes do not come back to themselves round {}, {all:.1} mm in all: no lattice is without a flaw there",

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
+use super::cut_cells::CutCells;
 use super::phase_grid::Grid;
 use super::singular_lines::SingularLine;
 use geometry::math::{Aabb, Mat3, Vec3, cross, determinant, dot, norm, product, spectral_norm, transpose};
@@ -188,18 +189,32 @@ pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
     most
 }
 
-/// The most that frames turn within one cell of edge `length`, or twice what they turn within half of one or less, and where.
-pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64) -> (f64, Vec3) {
+/// The most that frames turn within one cell of edge `length`, or twice what they turn within half of one or less, and where. Across cuts
+/// they turn by what is left after the rotation there.
+pub(super) fn turning(
+    grid: &Grid,
+    frames: &[Mat3],
+    cuts: Option<&CutCells>,
+    inside: &[bool],
+    length: f64,
+) -> (f64, Vec3) {
     let mut most = (0.0, grid.origin);
     for cells in [1.0, 0.5, 0.25, 0.125] {
-        let found = (0..3).map(|a| turning_along(a, cells, grid, frames, inside, length));
+        let found = (0..3).map(|a| turning_along((a, cells), grid, frames, cuts, inside, length));
         most = found.fold(most, |m, f| if f.0 > m.0 { f } else { m });
     }
     most
 }
 
 /// The same along an axis between nodes `cells` cells apart.
-fn turning_along(a: usize, cells: f64, grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64) -> (f64, Vec3) {
+fn turning_along(
+    (a, cells): (usize, f64),
+    grid: &Grid,
+    frames: &[Mat3],
+    cuts: Option<&CutCells>,
+    inside: &[bool],
+    length: f64,
+) -> (f64, Vec3) {
     let strides = grid.strides();
     // Nodes nearly that far apart; where that is less than a step, what a step turns is shared out.
     let apart = ((cells * length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
@@ -209,7 +224,13 @@ fn turning_along(a: usize, cells: f64, grid: &Grid, frames: &[Mat3], inside: &[b
         if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
             return (0.0, n);
         }
-        let pairs = frames[n].as_flattened().iter().zip(frames[m].as_flattened());
+        let there = match cuts {
+            None => frames[m],
+            // Not from one side of a core to the other.
+            Some(_) if !inside[n + apart / 2 * strides[a]] => return (0.0, n),
+            Some(cuts) => product(&frames[m], &cuts.between([n, m]).turn),
+        };
+        let pairs = frames[n].as_flattened().iter().zip(there.as_flattened());
         let trace: f64 = pairs.map(|(a, b)| a * b).sum();
         let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
         (angle * share, n)

@@ -41,17 +41,7 @@ impl EdgeSquares {
     /// Edges that count as the product of `roots` at their ends and by their share of the grid's box, and, if the `depth` of nodes below
     /// the surface of a region is given (mm, positive outside), of the region.
     pub fn new(grid: Grid, roots: &[f64], depth: Option<&[f64]>) -> EdgeSquares {
-        let strides = grid.strides();
-        let weight = |a: usize, n: usize| {
-            let at = grid.index(n);
-            if at[a] + 1 == grid.shape[a] {
-                return 0.0;
-            }
-            let share = depth.map_or(1.0, |d| share(&grid, d, a, n).max(BEYOND));
-            let faces = (0..3).filter(|&b| b != a && (at[b] == 0 || at[b] + 1 == grid.shape[b]));
-            faces.fold(share, |w, _| 0.5 * w) * roots[n] * roots[n + strides[a]] / (grid.step[a] * grid.step[a])
-        };
-        let edges = core::array::from_fn(|a| (0..grid.len()).into_par_iter().map(|n| weight(a, n)).collect());
+        let edges = weights(grid, roots, depth);
         EdgeSquares { grid, multigrid: Multigrid::new(grid.shape, grid.step, edges, Vec::new()) }
     }
 
@@ -129,6 +119,21 @@ impl EdgeSquares {
         }
         Fit { values: x, steps, left }
     }
+}
+
+/// What the square of a difference along each edge counts, as in `EdgeSquares::new`.
+pub(super) fn weights(grid: Grid, roots: &[f64], depth: Option<&[f64]>) -> [Vec<f64>; 3] {
+    let strides = grid.strides();
+    let weight = |a: usize, n: usize| {
+        let at = grid.index(n);
+        if at[a] + 1 == grid.shape[a] {
+            return 0.0;
+        }
+        let share = depth.map_or(1.0, |d| share(&grid, d, a, n).max(BEYOND));
+        let faces = (0..3).filter(|&b| b != a && (at[b] == 0 || at[b] + 1 == grid.shape[b]));
+        faces.fold(share, |w, _| 0.5 * w) * roots[n] * roots[n + strides[a]] / (grid.step[a] * grid.step[a])
+    };
+    core::array::from_fn(|a| (0..grid.len()).into_par_iter().map(|n| weight(a, n)).collect())
 }
 
 /// What slopes along edges give of the right-hand side: for each node those of the edges below less those of the edges above.

@@ -85,7 +85,7 @@ pub(super) fn fixed(
                 values.iter_mut().zip(change).for_each(|(v, d)| *v += d);
             }
         }
-        solution = Solution { spline: Spline::through(laid.grid, values), winding: solution.winding };
+        solution = Solution { spline: Spline::through(laid.grid, values), winding: solution.winding, branches: None };
     }
     Ok(solution)
 }

@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
+use super::cut_cells::CutCells;
 use super::load_cases::Stress;
 use super::phase_grid::Grid;
 use super::principal::{Principal, range};
@@ -316,15 +317,18 @@ fn no_direction(key: &str, p: Vec3) -> Fault {
     Fault::new(key, format!("the vector is zero at {}; it needs a direction all over the region's bounds", in_mm(p)))
 }
 
-/// The frame between those at the nodes about a point: their mean, made orthonormal; of the nearest node where they are too far
-/// apart for a mean.
-pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], p: Vec3) -> Mat3 {
+/// The frame between those at the nodes about a point, in the branch of the first of them: their mean, made orthonormal; of the nearest
+/// node where they are too far apart for a mean.
+pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], cuts: Option<&CutCells>, p: Vec3) -> Mat3 {
     let (mut mean, mut nearest) = ([[0.0; 3]; 3], (0.0, IDENTITY));
-    for (n, weight) in grid.around(p) {
+    let around = grid.around(p);
+    for (n, weight) in around {
+        // What phases become on the way from the first node to this, its axes undergo from here to there.
+        let frame = cuts.map_or(frames[n], |c| product(&frames[n], &c.between([around[0].0, n]).turn));
         if weight > nearest.0 {
-            nearest = (weight, frames[n]);
+            nearest = (weight, frame);
         }
-        mean = core::array::from_fn(|i| core::array::from_fn(|j| mean[i][j] + weight * frames[n][i][j]));
+        mean = core::array::from_fn(|i| core::array::from_fn(|j| mean[i][j] + weight * frame[i][j]));
     }
     if determinant(&mean) < 0.25 {
         return nearest.1;

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::cut_cells::CutCells;
 use super::distortion::{self, Distortion};
 use super::frame;
 use super::phase::Wanted;
@@ -51,14 +52,17 @@ impl Judged {
         let (compared, between) = compared(grid, inside, region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
         let jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
-        let off_nodes = targets(wanted, target.range, grid, &target.frames, target.lengths.as_deref(), &between)?;
+        let cuts = solution.branches.as_ref();
+        let off_nodes = targets(wanted, target.range, grid, &target.frames, target.lengths.as_deref(), cuts, &between)?;
         let k = &target.k;
         let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
         let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
         let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
-        let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(grid, k, n)).collect();
+        // Differences across cuts say nothing.
+        let whole = |n: &&usize| cuts.is_none_or(|c| !c.is_near(**n));
+        let curl: Vec<f64> = (compared.par_iter()).filter(whole).map(|&n| distortion::curl(grid, k, n)).collect();
         let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
-        let turn = distortion::turning(grid, &target.frames, inside, longest);
+        let turn = distortion::turning(grid, &target.frames, cuts, inside, longest);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);
@@ -119,19 +123,21 @@ pub(super) fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>)
     (some(COMPARED).filter(|n| inside[*n]).collect(), between)
 }
 
-/// The target gradients at points; `lengths` are the wavelengths at the nodes, where they are not those that are given; `frames` are those of the nodes, from which points have their signs and axes, or, if they are
-/// smoothed, their frames.
+/// The target gradients at points; `lengths` are the wavelengths at the nodes, where they are not those that are given; `frames` are
+/// those of the nodes, from which points have their signs and axes, or, if they are smoothed, their frames. Across cuts they are those of
+/// the branch of the first node about the point.
 pub(super) fn targets(
     wanted: &Wanted,
     range: f64,
     grid: &Grid,
     frames: &[Mat3],
     lengths: Option<&[Vec3]>,
+    cuts: Option<&CutCells>,
     points: &[Vec3],
 ) -> Result<Vec<Mat3>, Fault> {
     let smooth = wanted.averaged().is_some();
     let like: Vec<Mat3> = match smooth || wanted.orientation.is_combed() {
-        true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
+        true => points.par_iter().map(|p| frame::interpolated(grid, frames, cuts, *p)).collect(),
         false => Vec::new(),
     };
     let frames = if smooth { like } else { wanted.orientation.frames_near(points, &like, range)? };

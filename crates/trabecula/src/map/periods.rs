@@ -113,7 +113,8 @@ impl Angles {
             hole.lines.iter().map(move |line| (line.clone(), n))
         });
         let core = CORE * grid.step.into_iter().fold(f64::INFINITY, f64::min);
-        let solution = Solution { spline: Spline::through(*grid, values), winding: Winding::new(lines, core) };
+        let solution =
+            Solution { spline: Spline::through(*grid, values), winding: Winding::new(lines, core), branches: None };
         let periods = self.holes.iter().enumerate().map(|(h, hole)| {
             let (at, along) = hole.lines[0].place();
             Period { at, along, cells: round(h), asked: [0, 1, 2].map(|i| self.asked[i][h]) }
@@ -161,7 +162,7 @@ fn error(form: &[f64], n: &[i64]) -> f64 {
 }
 
 /// Where a quadratic form in (1, n) is least: Gauss' elimination with pivots on the diagonal, zero where nothing counts.
-fn least(form: &[f64], holes: usize) -> Vec<f64> {
+pub(super) fn least(form: &[f64], holes: usize) -> Vec<f64> {
     let m = holes + 1;
     let mut a: Vec<Vec<f64>> =
         (1..m).map(|i| (1..m).map(|j| form[i * m + j]).chain([-form[i * m]]).collect()).collect();
@@ -182,7 +183,7 @@ fn least(form: &[f64], holes: usize) -> Vec<f64> {
 
 /// Whole numbers near the least of a form, the least error first: the rounded ones, improved by single steps, and what single steps and
 /// pairs of steps lead to from there.
-fn nearest(form: &[f64], asked: &[f64]) -> Vec<(f64, Vec<i64>)> {
+pub(super) fn nearest(form: &[f64], asked: &[f64]) -> Vec<(f64, Vec<i64>)> {
     let holes = asked.len();
     let mut best: Vec<i64> = asked.iter().map(|v| v.round() as i64).collect();
     let moves: Vec<(usize, i64)> = (0..holes).flat_map(|h| [(h, 1), (h, -1)]).collect();

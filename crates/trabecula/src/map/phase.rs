@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
+use super::covering::{Cores, Covered, Covering};
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
@@ -17,7 +18,7 @@ use super::pace;
 use super::periods::{Angles, Period, tried};
 use super::phase_target::{Laid, Target};
 use super::region_holes::{MOST, Sought};
-use super::singular_lines::{Alike, singular_lines};
+use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
 use super::stretch::{Stretch, bounded};
@@ -67,6 +68,8 @@ pub struct Wanted {
     pub fix: Vec<Region>,
     /// Moves the lattice (mm).
     pub offset: Vec3,
+    /// How singular lines are covered, if they are.
+    pub core: Option<Covering>,
 }
 
 impl Wanted {
@@ -83,6 +86,7 @@ impl Wanted {
             stretch: None,
             fix: Vec::new(),
             offset: [0.0; 3],
+            core: None,
         }
     }
 
@@ -97,7 +101,7 @@ impl Wanted {
     }
 
     /// What counts as the same axes.
-    fn alike(&self) -> Alike {
+    pub(super) fn alike(&self) -> Alike {
         if self.align.is_some() { Alike::Turned(cube()) } else { self.orientation.alike() }
     }
 
@@ -148,6 +152,8 @@ pub struct Phase {
     frames: OnceLock<Arc<[Mat3]>>,
     /// The wavelengths at the nodes along the axes of the frames, where they are given along others.
     lengths: Option<Vec<Vec3>>,
+    /// The cores of singular lines.
+    cores: Option<Cores>,
 }
 
 impl Phase {
@@ -175,7 +181,21 @@ impl Phase {
         let problem = Problem::new(laid.grid, &target.k, roots, ratio);
         let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
         checkpoint();
-        let solution = Solution { spline: Spline::through(laid.grid, values), winding: Winding::default() };
+        let solution =
+            Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
+        if let Some(core) = wanted.core {
+            let lines = lines(&laid, wanted, &target);
+            let step = laid.grid.step.into_iter().fold(f64::INFINITY, f64::min);
+            let covered = match lines.is_empty() {
+                true => None,
+                false => core.solve(bounds, wanted, settings, (step, &lines))?,
+            };
+            if let Some(Covered { laid, mut found, lines, cores }) = covered {
+                found.judged.distortion.singular = lines;
+                let made = Phase::of(bounds, wanted, settings, (laid, found), (chosen.hasty, String::new()))?;
+                return Ok(Phase { cores: Some(cores), ..made });
+            }
+        }
         let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
         let mut found = Found { target, weights, solution, periods: Vec::new(), mean, steps, judged };
         let mut tried = String::new();
@@ -192,14 +212,26 @@ impl Phase {
         if let (false, Some(region)) = (wanted.fix.is_empty(), settings.region) {
             found = found.fixed(&laid, wanted, region)?;
         }
+        found.judged.distortion.singular = lines(&laid, wanted, &found.target);
+        Phase::of(bounds, wanted, settings, (laid, found), (chosen.hasty, tried))
+    }
+
+    /// The map of what was found, if it does not fold.
+    fn of(
+        bounds: &Aabb,
+        wanted: &Wanted,
+        settings: &Settings,
+        (laid, found): (Laid, Found),
+        (hasty, mut tried): (Option<String>, String),
+    ) -> Result<Phase, Fault> {
         let wavelength = found.target.wavelength(&laid);
         let mean_length = mean_within(&laid.inside, wavelength);
         let lengths_range =
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
-        let axes = &found.target.frames;
-        let lines = singular_lines(&laid.grid, axes, &laid.inside, &wanted.alike(), 0.5 * lengths_range[0]);
-        found.judged.distortion.singular = lines;
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
+            if found.solution.branches.is_some() {
+                return Err(folded(p, &remedy(wanted, lengths_range[1]), ", outside the cores of its singular lines"));
+            }
             tried += &found.judged.distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1]), &tried));
         }
@@ -212,7 +244,8 @@ impl Phase {
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = solution.jacobian(bounds.center());
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
-        let keep = wanted.averaged().is_some() || wanted.by_principal || !periods.is_empty();
+        let keep =
+            wanted.averaged().is_some() || wanted.by_principal || !periods.is_empty() || solution.branches.is_some();
         let Target { frames, lengths, .. } = target;
         Ok(Phase {
             solution,
@@ -226,10 +259,21 @@ impl Phase {
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
-            hasty: chosen.hasty,
+            hasty,
             frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
             lengths,
+            cores: None,
         })
+    }
+
+    /// The cores of singular lines, where they are covered.
+    pub fn cores(&self) -> Option<&Cores> {
+        self.cores.as_ref()
+    }
+
+    /// The rotations of phases that a cell has to be the same after, about an axis that has phase zero.
+    pub fn turns(&self) -> Vec<Mat3> {
+        self.solution.branches.as_ref().map_or_else(Vec::new, |b| b.turns())
     }
 
     /// Deviation of the map from the target.
@@ -259,7 +303,8 @@ impl Phase {
     /// Numbers that are not finite, vectors without a direction.
     pub fn asked(&self, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
         let (grid, frames) = (self.solution.grid(), self.combed()?);
-        targets(&self.wanted, self.stress_range, grid, &frames, self.lengths.as_deref(), points)
+        let cuts = self.solution.branches.as_ref();
+        targets(&self.wanted, self.stress_range, grid, &frames, self.lengths.as_deref(), cuts, points)
     }
 
     /// Deviation of the map from what is asked for at points (mm) within the box.
@@ -316,6 +361,10 @@ impl Mapping for Phase {
         self.solution.jacobian(at)
     }
 
+    fn move_phases(&mut self, by: Vec3) {
+        self.shift = add(self.shift, by);
+    }
+
     fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
         self.solution.jacobians(points, u, j);
         u.iter_mut().for_each(|u| *u = add(*u, self.shift));
@@ -357,6 +406,12 @@ impl Mapping for Phase {
     }
 }
 
+/// The singular lines of a target, but for short ones.
+fn lines(laid: &Laid, wanted: &Wanted, target: &Target) -> Vec<SingularLine> {
+    let least = 0.5 * target.wavelength(laid).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
+    singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
+}
+
 /// The mean of lengths at the nodes in a region; those of the first node if none is.
 fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
@@ -380,16 +435,16 @@ fn remedy(wanted: &Wanted, longest: f64) -> String {
 }
 
 /// A solution, and what it was found for.
-struct Found {
-    target: Target,
+pub(super) struct Found {
+    pub target: Target,
     /// What errors count.
-    weights: Weights,
-    solution: Solution,
-    periods: Vec<Period>,
+    pub weights: Weights,
+    pub solution: Solution,
+    pub periods: Vec<Period>,
     /// The mean of the rows of K.
-    mean: Mat3,
-    steps: usize,
-    judged: Judged,
+    pub mean: Mat3,
+    pub steps: usize,
+    pub judged: Judged,
 }
 
 impl Found {

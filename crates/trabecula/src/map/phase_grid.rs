@@ -43,6 +43,16 @@ impl Grid {
         [1, self.shape[0], self.shape[0] * self.shape[1]]
     }
 
+    /// The adjacent nodes along the axes.
+    pub fn neighbours(&self, n: usize) -> impl Iterator<Item = usize> + use<> {
+        let (at, strides, shape) = (self.index(n), self.strides(), self.shape);
+        (0..3).flat_map(move |a| {
+            let below = (at[a] > 0).then(|| n - strides[a]);
+            let above = (at[a] + 1 < shape[a]).then(|| n + strides[a]);
+            below.into_iter().chain(above)
+        })
+    }
+
     /// The nodes about a point, or about the nearest point of the grid's box, and their shares in a value there, linear between them.
     pub fn around(&self, p: Vec3) -> [(usize, f64); 8] {
         let along = |a: usize| ((p[a] - self.origin[a]) / self.step[a]).clamp(0.0, (self.shape[a] - 1) as f64);

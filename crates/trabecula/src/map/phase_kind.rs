@@ -2,7 +2,8 @@
 
 use super::stress_kind::StressKind;
 use super::{
-    Aligned, Axis, BuildMap, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted, given_twice, shared,
+    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted,
+    given_twice, shared,
 };
 use crate::environment::{self, Environment};
 use crate::field::Field;
@@ -50,6 +51,12 @@ pub struct PhaseKind {
     /// with whole cells, as many as fit best, and parts that meet there fit.
     #[kind(default)]
     fix: Vec<RegionKind>,
+    /// What covers singular lines, round which the stress's or the frame's axes do not come back to themselves: "solid" or "void". Outside
+    /// these cores cells are whole. A cell has to be the same after the turn of the axes; singular lines stay bare unless given.
+    core: Option<CoreFill>,
+    /// The radius of the cores; half the wavelength at the lines unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    core_radius: Option<f64>,
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
@@ -289,6 +296,18 @@ impl PhaseKind {
         }
     }
 
+    /// How singular lines are covered.
+    fn covering(&self) -> Result<Option<Covering>, Fault> {
+        match (self.core, self.core_radius) {
+            (None, Some(radius)) => {
+                let message =
+                    "core_radius is how far core reaches; give core = \"solid\" or \"void\" as well, or leave it out";
+                Err(Fault::new("core_radius", message).found(number(radius)))
+            }
+            (fill, radius) => Ok(fill.map(|fill| Covering { fill, radius })),
+        }
+    }
+
     /// The regions of the faces that are fixed.
     fn fixed(&self, path: &str, environment: &Environment) -> Result<Vec<Region>, DesignError> {
         if !self.fix.is_empty() && self.domain == Domain::Box {
@@ -327,6 +346,7 @@ impl PhaseKind {
             stretch: self.stretch.map(Stretch::new).transpose().map_err(|f| DesignError::fault(path, f))?,
             fix: self.fixed(path, environment)?,
             offset: self.offset,
+            core: self.covering().map_err(|f| DesignError::fault(path, f))?,
         };
         let region: &dyn Field = &**environment.region;
         let settings =

@@ -17,7 +17,7 @@ use geometry::progress::checkpoint;
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
 /// Least root of a weight.
-const LEAST_ROOT: f64 = 1e-3;
+pub(super) const LEAST_ROOT: f64 = 1e-3;
 
 /// A grid over a region, and the wavelengths at its nodes.
 pub(super) struct Laid {
@@ -25,7 +25,7 @@ pub(super) struct Laid {
     pub grid: Grid,
     pub nodes: Vec<Vec3>,
     /// The points of the bounds nearest to nodes, where nodes are beyond them: what is asked for is known there.
-    clamped: Option<Vec<Vec3>>,
+    pub clamped: Option<Vec<Vec3>>,
     /// The signed distance of each node from the region, mm.
     pub depth: Vec<f64>,
     /// Whether nodes are in the region.

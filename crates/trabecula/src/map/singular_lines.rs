@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::phase_grid::Grid;
 use super::pierced_faces::{Pierced, length, matched, polylines};
-use geometry::math::{Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
+use geometry::math::{IDENTITY, Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
 
 /// What counts as the same axes.
 pub(super) enum Alike {
@@ -51,13 +51,15 @@ impl SingularLine {
     }
 }
 
-/// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid.
+/// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid; those that
+/// run within `near` mm of each other, or two steps, are one.
 pub(super) fn singular_lines(
     grid: &Grid,
     frames: &[Mat3],
     inside: &[bool],
     alike: &Alike,
     least: f64,
+    near: f64,
 ) -> Vec<SingularLine> {
     let strides = grid.strides();
     let last = |n: usize, a: usize| grid.index(n)[a] + 1 == grid.shape[a];
@@ -87,7 +89,7 @@ pub(super) fn singular_lines(
     let mut found: Vec<SingularLine> = polylines(grid, &faces).into_iter().map(line).collect();
     found.retain(|l| l.points.len() > 1 && l.length >= least);
     longest_first(&mut found);
-    apart(found, 2.0 * norm(grid.step))
+    apart(found, near.max(2.0 * norm(grid.step)))
 }
 
 fn longest_first(lines: &mut [SingularLine]) {
@@ -121,6 +123,14 @@ fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
 }
 
 impl Alike {
+    /// The rotations that change nothing; of a line alone none but none at all.
+    pub fn turns(&self) -> Vec<Mat3> {
+        match self {
+            Alike::Line => vec![IDENTITY],
+            Alike::Turned(all) => all.clone(),
+        }
+    }
+
     /// Whether the axes of two frames differ by so little that once round a face of four such edges they come back.
     fn is_near(&self, a: &Mat3, b: &Mat3) -> bool {
         match self {
@@ -204,7 +214,7 @@ fn times([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::math::{Aabb, IDENTITY, rotation};
+    use geometry::math::{Aabb, rotation};
 
     fn equal() -> Alike {
         Alike::Turned(vec![IDENTITY])
@@ -219,7 +229,7 @@ mod tests {
         let nodes: Vec<Vec3> = (0..g.len()).map(|n| g.node(n)).collect();
         let frames: Vec<Mat3> = nodes.iter().map(|p| frame(*p)).collect();
         let inside: Vec<bool> = nodes.iter().map(|p| solid(*p)).collect();
-        singular_lines(&g, &frames, &inside, alike, 0.0)
+        singular_lines(&g, &frames, &inside, alike, 0.0, 0.0)
     }
 
     /// Frames turned about y, so that their third axes lie in the plane of x and z, by `index` turns once round a line along y, and

@@ -1,8 +1,9 @@
-//! Solved phases: single-valued ones by splines, and whole numbers of cells round the holes of the region.
+//! Solved phases: single-valued ones by splines, whole numbers of cells round the holes of the region, and branches round lines.
 
 use rayon::prelude::*;
 
 use super::Rows;
+use super::cut_cells::CutCells;
 use super::phase_grid::Grid;
 use super::spline::{self, Spline};
 use super::winding::Winding;
@@ -13,6 +14,8 @@ use geometry::math::{Aabb, Mat3, Vec3, add};
 pub(super) struct Solution {
     pub spline: Spline,
     pub winding: Winding,
+    /// The cells in which phases have branches of their own, where lines are covered.
+    pub branches: Option<CutCells>,
 }
 
 impl Solution {
@@ -24,6 +27,9 @@ impl Solution {
     pub fn phases(&self, points: &[Vec3], u: &mut [Vec3]) {
         self.spline.values(points, u);
         self.winding.add_phases(points, u);
+        if let Some(of) = &self.branches {
+            u.iter_mut().zip(points).for_each(|(u, p)| *u = of.phase(*p).unwrap_or(*u));
+        }
     }
 
     /// Fills phases and Jacobians of points.
@@ -31,17 +37,25 @@ impl Solution {
         self.spline.jacobians(points, u, j);
         self.winding.add_phases(points, u);
         self.winding.add_jacobians(points, j);
+        if let Some(of) = &self.branches {
+            for ((u, j), p) in u.iter_mut().zip(j).zip(points) {
+                (*u, *j) = of.phase(*p).zip(of.jacobian(*p)).unwrap_or((*u, *j));
+            }
+        }
     }
 
     /// The Jacobian at a point.
     pub fn jacobian(&self, p: Vec3) -> Mat3 {
         let mut j = [self.spline.jacobian(p).1];
         self.winding.add_jacobians(&[p], &mut j);
-        j[0]
+        self.branches.as_ref().and_then(|of| of.jacobian(p)).unwrap_or(j[0])
     }
 
     /// A bound of |J| (spectral norm) in a box.
     pub fn lipschitz(&self, b: &Aabb) -> f64 {
+        if self.branches.as_ref().is_some_and(|of| of.is_torn(b)) {
+            return f64::INFINITY;
+        }
         if self.winding.is_empty() {
             return self.spline.lipschitz(b);
         }
@@ -65,7 +79,15 @@ impl Solution {
 
     /// The phases along the rows of a block, moved by `shift`.
     pub fn rows<'a>(&'a self, block: &Block<'a>, shift: Vec3) -> Box<dyn Rows + 'a> {
-        Box::new(SolutionRows { rows: self.spline.rows(block), winding: &self.winding, block: *block, layer: 0, shift })
+        let Solution { spline, winding, branches } = self;
+        Box::new(SolutionRows {
+            rows: spline.rows(block),
+            winding,
+            branches: branches.as_ref(),
+            block: *block,
+            layer: 0,
+            shift,
+        })
     }
 
     /// Moves phases that were found at `p` so that they continue those at a near point.
@@ -78,6 +100,7 @@ impl Solution {
 struct SolutionRows<'a> {
     rows: spline::Rows<'a>,
     winding: &'a Winding,
+    branches: Option<&'a CutCells>,
     block: Block<'a>,
     layer: usize,
     shift: Vec3,
@@ -92,6 +115,14 @@ impl Rows for SolutionRows<'_> {
     fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
         self.rows.fill(j, out);
         self.winding.add_row(&self.block, [j, self.layer], out);
+        let [xs, y, z] = [self.block.axes[0], &self.block.axes[1][j..=j], &self.block.axes[2][self.layer..=self.layer]];
+        if let Some(of) = self.branches.filter(|of| of.in_row(y[0], z[0])) {
+            for (i, x) in xs.iter().enumerate() {
+                if let Some(u) = of.phase([*x, y[0], z[0]]) {
+                    out.iter_mut().zip(u).for_each(|(out, u)| out[i] = u);
+                }
+            }
+        }
         for (out, shift) in out.iter_mut().zip(self.shift) {
             if shift != 0.0 {
                 out.iter_mut().for_each(|u| *u += shift);

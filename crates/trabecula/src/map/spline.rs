@@ -6,6 +6,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::cut_cells::steepest;
 use super::phase_grid::Grid;
 use crate::field::Block;
 use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
@@ -54,6 +55,62 @@ impl Spline {
         (spline.lipschitz, spline.middles) =
             (0..nx * ny * nz).into_par_iter().map(|i| spline.lipschitz_of([i % nx, i / nx % ny, i / nx / ny])).unzip();
         spline
+    }
+
+    /// From coefficients at the nodes; beyond the grid they go on in straight lines. Some cells, by their first nodes, are evaluated with
+    /// others, x fastest: bounds hold for these.
+    pub fn of<'a>(grid: Grid, at_nodes: &[Vec3], other: impl Fn(usize) -> Option<&'a [Vec3; 64]> + Sync) -> Spline {
+        let shape = grid.shape.map(|n| n + 2);
+        let at = |m: usize, i: usize| {
+            let index = [m % shape[0], m / shape[0] % shape[1], m / shape[0] / shape[1]];
+            // The two nodes of the straight line along each axis, and what each counts.
+            let line = |a: usize| match index[a] {
+                0 => [(0, 2.0), (1, -1.0)],
+                j if j > grid.shape[a] => [(j - 2, 2.0), (j - 3, -1.0)],
+                j => [(j - 1, 1.0), (j - 1, 0.0)],
+            };
+            let [x, y, z] = [line(0), line(1), line(2)];
+            let mut sum = 0.0;
+            for (k, wz) in z {
+                for (j, wy) in y {
+                    for (l, wx) in x.iter().filter(|(_, w)| w * wy * wz != 0.0) {
+                        sum += wx * wy * wz * at_nodes[l + grid.shape[0] * (j + grid.shape[1] * k)][i];
+                    }
+                }
+            }
+            sum
+        };
+        let all: usize = shape.iter().product();
+        let coefficients = core::array::from_fn(|i| (0..all).into_par_iter().map(|m| at(m, i)).collect());
+        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
+        let [nx, ny, nz] = spline.blocks();
+        let of_block = |i: usize| {
+            let at = [i % nx, i / nx % ny, i / nx / ny];
+            let cells = (0..BLOCK.pow(3)).filter_map(|c| {
+                let n = [c % BLOCK, c / BLOCK % BLOCK, c / BLOCK / BLOCK];
+                let [x, y, z]: [usize; 3] = core::array::from_fn(|a| BLOCK * at[a] + n[a]);
+                let within = [x, y, z].iter().zip(grid.shape).all(|(i, n)| i + 1 < n);
+                within.then_some(x + grid.shape[0] * (y + grid.shape[1] * z))
+            });
+            let (plain, middle) = spline.lipschitz_of(at);
+            if !cells.clone().any(|n| other(n).is_some()) {
+                return (plain, middle);
+            }
+            let each = cells.map(|n| match other(n) {
+                Some(c) => steepest(c, grid.step),
+                None => steepest(&spline.about(n), grid.step),
+            });
+            ([(each.fold(0.0, f64::max) * (1.0 + 1e-6)) as f32, 0.0], [[0.0; 3]; 3])
+        };
+        (spline.lipschitz, spline.middles) = (0..nx * ny * nz).into_par_iter().map(of_block).unzip();
+        spline
+    }
+
+    /// The coefficients of the cell above a node, x fastest.
+    fn about(&self, node: usize) -> [Vec3; 64] {
+        let ([x, y, z], [_, sy, sz]) = (self.grid.index(node), self.strides());
+        let at = |c: usize| x + c % 4 + (y + c / 4 % 4) * sy + (z + c / 16) * sz;
+        core::array::from_fn(|c| self.coefficients.each_ref().map(|of| of[at(c)]))
     }
 
     /// The values at the nodes.

@@ -179,5 +179,5 @@ pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, soluti
             values.par_iter_mut().zip(&change).for_each(|(v, d)| *v += d);
         }
     }
-    Solution { spline: Spline::through(grid, values), winding: solution.winding }
+    Solution { spline: Spline::through(grid, values), winding: solution.winding, branches: None }
 }

@@ -176,7 +176,8 @@ pub struct DistortionReport {
     pub turn: f64,
 }
 
-/// A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there.
+/// A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there, and a core covers
+/// it if the map has one.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SingularLineReport {
     /// Points along it from end to end, mm, to a step of the map's grid; the first comes again at the end where it is closed. Lines
@@ -186,6 +187,10 @@ pub struct SingularLineReport {
     pub length: f64,
     /// By what the axes are turned once round it, degrees.
     pub turn: f64,
+    /// What covers it, "solid" or "void"; null where nothing does.
+    pub core: Option<&'static str>,
+    /// How far that reaches from the line, mm; null where nothing does.
+    pub core_radius: Option<f64>,
 }
 
 /// The whole numbers of cells round a hole of the region.

@@ -110,6 +110,7 @@ pub fn is_own_name(name: &str) -> bool {
     let of_domain = || name.rsplit_once('_').is_some_and(|(d, p)| OWN.contains(&d) && plane(p));
     OWN.contains(&name.as_str())
         || name.starts_with("KEEP_")
+        || name.starts_with("CORE_")
         || name.starts_with("FRACTION_")
         || plane(&name)
         || of_domain()

@@ -4,6 +4,7 @@ mod beam_fraction;
 mod blend;
 mod combined;
 mod common;
+mod cores;
 mod crease;
 mod damage;
 mod disclinations;

@@ -1,0 +1,255 @@
+//! Least squares for phases with branches: Σ w |M⁻¹ uⱼ − uᵢ − h (Kᵢ + S⁻¹Kⱼ)/2|² / h² over the grid's edges, M: u → S u + t what
+//! phases become along an edge (`branch_cuts`).
+//!
+//! By conjugate gradients on all three phases together; edges across cuts are left out of the multigrid that is the preconditioner.
+//! What remains free are the whole numbers t. The error is a quadratic form in them, and those near its least are tried.
+
+use rayon::prelude::*;
+
+use super::branch_cuts::{BranchCuts, Move};
+use super::multigrid::Multigrid;
+use super::phase_grid::Grid;
+use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, dot, scale, sub, transpose};
+use geometry::progress::checkpoint;
+
+/// The energy of the error, relative to the first, of which conjugate gradients end at the square.
+const RESIDUAL: f64 = 1e-7;
+/// Most steps of conjugate gradients.
+const STEPS: usize = 600;
+/// Numbers that are summed in one go, so that sums do not depend on the number of threads.
+const CHUNK: usize = 4096;
+
+/// An edge across a cut: its lower node and axis, and what phases become along it.
+struct Crossing {
+    node: usize,
+    axis: usize,
+    to: Move,
+}
+
+/// The problem on a grid.
+pub(super) struct Branched<'a> {
+    grid: &'a Grid,
+    k: &'a [Vec<Vec3>; 3],
+    /// What the square of a difference along each edge counts.
+    edges: [Vec<f64>; 3],
+    crossings: Vec<Crossing>,
+    multigrid: Multigrid,
+}
+
+impl<'a> Branched<'a> {
+    /// With what edges count, and the cuts, whose translations are those of the problem itself.
+    pub fn new(grid: &'a Grid, k: &'a [Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &BranchCuts) -> Branched<'a> {
+        let strides = grid.strides();
+        let mut inner = edges.clone();
+        let mut crossings = Vec::new();
+        for (axis, stride) in strides.into_iter().enumerate() {
+            for node in (0..grid.len()).filter(|n| grid.index(*n)[axis] + 1 < grid.shape[axis]) {
+                if cuts.any([node, node + stride]) {
+                    inner[axis][node] = 0.0;
+                    crossings.push(Crossing { node, axis, to: cuts.between([node, node + stride]) });
+                }
+            }
+        }
+        let multigrid = Multigrid::new(grid.shape, grid.step, inner, Vec::new());
+        Branched { grid, k, edges, crossings, multigrid }
+    }
+
+    /// What phases are to rise by along each edge above a node, in the branch of the node: of the target, or of the translations alone.
+    fn steps(&self, with: impl Fn(&Move) -> Vec3, target: bool) -> [Vec<Vec3>; 3] {
+        let (grid, strides) = (self.grid, self.grid.strides());
+        let at = |n: usize, a: usize| [0, 1, 2].map(|i| self.k[i][n][a]);
+        let mut steps: [Vec<Vec3>; 3] = core::array::from_fn(|a| {
+            let one = |n: usize| {
+                if !target || grid.index(n)[a] + 1 == grid.shape[a] {
+                    return [0.0; 3];
+                }
+                scale(add(at(n, a), at(n + strides[a], a)), 0.5 * grid.step[a])
+            };
+            (0..grid.len()).into_par_iter().map(one).collect()
+        });
+        for c in &self.crossings {
+            let (a, n) = (c.axis, c.node);
+            let back = transpose(&c.to.turn);
+            let mut s = apply(&back, with(&c.to));
+            if target {
+                s = add(s, scale(add(at(n, a), apply(&back, at(n + strides[a], a))), 0.5 * grid.step[a]));
+            }
+            steps[a][n] = s;
+        }
+        steps
+    }
+
+    /// The phases at the nodes, and what is left of the steps along edges.
+    fn fit(&self, steps: &[Vec<Vec3>; 3]) -> (Vec<Vec3>, [Vec<Vec3>; 3], usize) {
+        let (strides, len) = (self.grid.strides(), self.grid.len());
+        let mut right = vec![[0.0; 3]; len];
+        for (a, stride) in strides.into_iter().enumerate() {
+            let of = |n: usize| scale(steps[a][n], self.edges[a][n]);
+            right.par_iter_mut().enumerate().for_each(|(n, r)| {
+                *r = sub(*r, of(n));
+                if let Some(m) = n.checked_sub(stride) {
+                    *r = add(*r, of(m));
+                }
+            });
+        }
+        // In the branch of the upper node.
+        for c in &self.crossings {
+            let (s, m) = (scale(steps[c.axis][c.node], self.edges[c.axis][c.node]), c.node + strides[c.axis]);
+            right[m] = add(right[m], sub(apply(&c.to.turn, s), s));
+        }
+        let (u, taken) = self.solved(columns(&right));
+        let u: Vec<Vec3> = (0..len).map(|n| [u[0][n], u[1][n], u[2][n]]).collect();
+        let mut left: [Vec<Vec3>; 3] = core::array::from_fn(|a| {
+            let one = |n: usize| match self.grid.index(n)[a] + 1 < self.grid.shape[a] {
+                true => sub(sub(u[n + strides[a]], u[n]), steps[a][n]),
+                false => [0.0; 3],
+            };
+            (0..len).into_par_iter().map(one).collect()
+        });
+        for c in &self.crossings {
+            let m = c.node + strides[c.axis];
+            left[c.axis][c.node] = sub(sub(apply(&transpose(&c.to.turn), u[m]), u[c.node]), steps[c.axis][c.node]);
+        }
+        (u, left, taken)
+    }
+
+    /// The normal equations' solution for a right-hand side.
+    fn solved(&self, right: [Vec<f64>; 3]) -> ([Vec<f64>; 3], usize) {
+        let zeros = || [0, 1, 2].map(|_| vec![0.0; self.grid.len()]);
+        let (mut x, mut r, mut q, mut z) = (zeros(), right, zeros(), zeros());
+        let mut cycle = self.multigrid.cycle();
+        let mut precondition = |r: &[Vec<f64>; 3], z: &mut [Vec<f64>; 3]| {
+            r.iter().zip(z).for_each(|(r, z)| cycle(r, z));
+        };
+        precondition(&r, &mut z);
+        let mut p = z.clone();
+        let mut rz = inner(&r, &z);
+        let (first, mut taken) = (rz, 0);
+        while taken < STEPS && rz > RESIDUAL * RESIDUAL * first && rz > 0.0 {
+            checkpoint();
+            self.apply(&p, &mut q);
+            let alpha = rz / inner(&p, &q);
+            if !alpha.is_finite() {
+                break;
+            }
+            for i in 0..3 {
+                x[i].par_iter_mut().zip(&p[i]).for_each(|(x, p)| *x += alpha * p);
+                r[i].par_iter_mut().zip(&q[i]).for_each(|(r, q)| *r -= alpha * q);
+            }
+            precondition(&r, &mut z);
+            let next = inner(&r, &z);
+            for (p, z) in p.iter_mut().zip(&z) {
+                p.par_iter_mut().zip(z).for_each(|(p, z)| *p = z + next / rz * *p);
+            }
+            (rz, taken) = (next, taken + 1);
+        }
+        (x, taken)
+    }
+
+    /// The normal equations' operator.
+    fn apply(&self, x: &[Vec<f64>; 3], out: &mut [Vec<f64>; 3]) {
+        let none = vec![0.0; self.grid.len()];
+        for (x, out) in x.iter().zip(out.iter_mut()) {
+            self.multigrid.finest().apply(x, out, |_, _, product| product, &none);
+        }
+        let strides = self.grid.strides();
+        for c in &self.crossings {
+            let (w, m) = (self.edges[c.axis][c.node], c.node + strides[c.axis]);
+            let at = |n: usize| [x[0][n], x[1][n], x[2][n]];
+            let off = sub(at(c.node), apply(&transpose(&c.to.turn), at(m)));
+            let there = apply(&c.to.turn, off);
+            for i in 0..3 {
+                out[i][c.node] += w * off[i];
+                out[i][m] -= w * there[i];
+            }
+        }
+    }
+
+    /// The sum of products of steps, as errors count.
+    fn product(&self, a: &[Vec<Vec3>; 3], b: &[Vec<Vec3>; 3]) -> f64 {
+        let of = |axis: usize| sums(self.grid.len(), |n| self.edges[axis][n] * dot(a[axis][n], b[axis][n]));
+        (0..3).map(of).sum()
+    }
+}
+
+/// The phases for translations of the cuts, and the numbers that are free.
+pub(super) struct Fits {
+    /// The phases without translations, and what each of the free numbers adds to them.
+    base: Vec<Vec3>,
+    each: Vec<Vec<Vec3>>,
+    /// The cut and the axis of each free number.
+    pub free: Vec<(usize, usize)>,
+    /// The quadratic form of the error in (1, n), row by row.
+    pub form: Vec<f64>,
+    pub steps: usize,
+}
+
+impl Fits {
+    /// For cuts without translations.
+    pub fn new(grid: &Grid, k: &[Vec<Vec3>; 3], edges: &[Vec<f64>; 3], cuts: &mut BranchCuts) -> Fits {
+        let free = free(cuts);
+        let whole = Branched::new(grid, k, edges.clone(), cuts);
+        let (base, left, mut steps) = whole.fit(&whole.steps(|_| [0.0; 3], true));
+        let (mut each, mut all) = (Vec::new(), vec![left]);
+        for (line, axis) in &free {
+            let plain = cuts.step(*line);
+            let mut by = [0.0; 3];
+            by[*axis] = 1.0;
+            cuts.set(*line, Move { by, ..plain });
+            let moved = Branched::new(grid, k, edges.clone(), cuts);
+            cuts.set(*line, plain);
+            let (fit, left, taken) = moved.fit(&moved.steps(|m| m.by, false));
+            steps = steps.max(taken);
+            each.push(fit);
+            all.push(left);
+        }
+        let pairs = all.iter().flat_map(|a| all.iter().map(move |b| (a, b)));
+        let form = pairs.map(|(a, b)| whole.product(a, b)).collect();
+        Fits { base, each, free, form, steps }
+    }
+
+    /// Gives cuts their translations, and the phases that they have at the nodes.
+    pub fn phases(&self, numbers: &[i64], cuts: &mut BranchCuts) -> Vec<Vec3> {
+        let mut u = self.base.clone();
+        (0..cuts.len()).for_each(|line| cuts.set(line, Move { by: [0.0; 3], ..cuts.step(line) }));
+        for (((line, axis), fit), n) in self.free.iter().zip(&self.each).zip(numbers) {
+            let mut step = cuts.step(*line);
+            step.by[*axis] = *n as f64;
+            cuts.set(*line, step);
+            u.par_iter_mut().zip(fit).for_each(|(u, f)| *u = add(*u, scale(*f, *n as f64)));
+        }
+        u
+    }
+}
+
+/// The numbers that are free: of each cut those across the axis of its rotation. Phases are free to move across the axis of the first
+/// rotation, which does for its cut.
+fn free(cuts: &BranchCuts) -> Vec<(usize, usize)> {
+    let turned = |line: usize, a: usize| cuts.step(line).turn[a] != IDENTITY[a];
+    let first = (0..cuts.len()).find(|line| (0..3).any(|a| turned(*line, a)));
+    let mut free = Vec::new();
+    for line in (0..cuts.len()).filter(|line| Some(*line) != first) {
+        let plain = (0..3).all(|a| !turned(line, a));
+        free.extend((0..3).filter(|a| plain || turned(line, *a)).map(|a| (line, a)));
+    }
+    free
+}
+
+fn columns(of: &[Vec3]) -> [Vec<f64>; 3] {
+    core::array::from_fn(|i| of.iter().map(|v| v[i]).collect())
+}
+
+fn inner(a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]) -> f64 {
+    (0..3).map(|i| sums(a[i].len(), |n| a[i][n] * b[i][n])).sum()
+}
+
+/// The sum of numbers, in chunks of one length.
+fn sums(n: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let chunk = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(n)).map(&of).sum::<f64>();
+    (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Vec<f64>>().iter().sum()
+}
+
+/// Rotations about one axis: that axis, if all have it.
+pub(super) fn common_axis(turns: &[Mat3]) -> Option<usize> {
+    (0..3).find(|a| turns.iter().all(|t| t[*a][*a] == 1.0))
+}

@@ -1,0 +1,255 @@
+//! Cores of singular lines: what covers the place at which no lattice is without a flaw.
+
+use super::branch_cuts::BranchCuts;
+use super::branched_solve::Fits;
+use super::core_branches::{labels, rotations};
+use super::cut_cells::{self, CutCells};
+use super::edge_squares::weights;
+use super::frame::in_mm;
+use super::judged::{Judged, fold_at_node, fold_between};
+use super::pace;
+use super::periods::{least, nearest};
+use super::phase::{Found, Settings, Wanted};
+use super::phase_target::{LEAST_ROOT, Laid, Target, wavelengths};
+use super::singular_lines::{Alike, SingularLine, singular_lines};
+use super::solution::Solution;
+use super::winding::Winding;
+use crate::field::Field;
+use crate::kind::Kind;
+use crate::region::{OutsideTube, Tube, smoothed};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, scale, sub, unit};
+use geometry::progress::checkpoint;
+
+/// Steps of the grid in the radius of a core: cells are torn within 2 √2 steps of a line, which is known to most of a step.
+const FINE: f64 = 4.0;
+/// Nodes of the grid beyond the part.
+const PADDING: usize = 3;
+/// The most lines that are covered: each but the first takes two more solutions.
+const MOST: usize = 12;
+/// How deep the end of a line may lie in the part, in steps: lines are found between nodes in the part.
+const END: f64 = 3.0;
+
+/// What the core of a singular line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
+#[kind(noun = "core")]
+pub enum CoreFill {
+    /// Solid.
+    Solid,
+    /// Void.
+    Void,
+}
+
+/// How singular lines are covered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covering {
+    /// What their cores are.
+    pub fill: CoreFill,
+    /// The radius of the cores, mm; half the wavelength at the lines if none.
+    pub radius: Option<f64>,
+}
+
+/// The cores of a map.
+#[derive(Clone, Debug)]
+pub struct Cores {
+    /// What they are.
+    pub fill: CoreFill,
+    /// All points that are at most the radius away from a line.
+    pub tube: Tube,
+}
+
+/// A map of one value but for the branches at covered lines.
+pub(super) struct Covered {
+    pub laid: Laid,
+    pub found: Found,
+    pub lines: Vec<SingularLine>,
+    pub cores: Cores,
+}
+
+impl Covering {
+    /// The map outside the cores of `lines`, which are those on a coarser grid; `None` where a finer one has none.
+    pub(super) fn solve(
+        &self,
+        bounds: &Aabb,
+        wanted: &Wanted,
+        settings: &Settings,
+        (coarse, lines): (f64, &[SingularLine]),
+    ) -> Result<Option<Covered>, Fault> {
+        refuse(wanted)?;
+        let radius = self.radius(wanted, lines)?;
+        let step = settings.step.unwrap_or(coarse).min(radius / FINE);
+        let chosen = pace::choose(bounds, wanted, Some(step), settings.region)
+            .map_err(|f| if f.at == "step" { too_fine(radius) } else { f })?;
+        let laid = Laid::over(bounds, chosen.grid.padded(PADDING), wanted, settings.region)?;
+        checkpoint();
+        let mut target = Target::new(&laid, wanted, None)?;
+        checkpoint();
+        let least_length = 0.5 * shortest(&laid);
+        let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
+        let mut paths = lines.iter().map(|l| path(l, &laid, settings, radius)).collect::<Result<Vec<_>, Fault>>()?;
+        if paths.is_empty() {
+            return Ok(None);
+        }
+        if paths.len() > MOST {
+            let message = format!(
+                "axes do not come back to themselves round {} lines; {MOST} at most are covered. Smooth the {} over more than a wavelength, \
+                 or leave core out",
+                paths.len(),
+                wanted.orientation.key()
+            );
+            return Err(Fault::new("core", message));
+        }
+        let mut cuts = BranchCuts::new(&laid.grid, &mut paths);
+        let tube = Tube::new(&paths, radius);
+        let outside: Vec<bool> =
+            (laid.nodes.iter().zip(&laid.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
+        let alike = wanted.alike();
+        let labels = labels(&laid, &target, &outside, &cuts, &alike);
+        target.relabel(&labels, &laid.given);
+        rotations(&laid, &target, &outside, &mut cuts, &alike)?;
+        let cores = Cores { fill: self.fill, tube };
+        let found = found(Laid { inside: outside, ..laid }, wanted, settings, target, cuts, &cores)?;
+        Ok(Some(Covered { laid: found.0, found: found.1, lines, cores }))
+    }
+
+    /// The radius of cores, mm.
+    fn radius(&self, wanted: &Wanted, lines: &[SingularLine]) -> Result<f64, Fault> {
+        if let Some(radius) = self.radius {
+            return Ok(radius);
+        }
+        let points: Vec<Vec3> = lines.iter().flat_map(|l| l.points.iter().copied()).collect();
+        let longest = wavelengths(&wanted.wavelength, &points)?.into_iter().flatten().fold(0.0, f64::max);
+        Ok(0.5 * longest)
+    }
+}
+
+fn shortest(laid: &Laid) -> f64 {
+    laid.given.iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w))
+}
+
+fn too_fine(radius: f64) -> Fault {
+    let message = format!(
+        "{} mm; the grid needs {FINE} steps in the radius of a core, and in a part of this size these are too many: give a larger core_radius",
+        number(radius)
+    );
+    Fault::new("core_radius", message)
+}
+
+/// Refuses what does not go with cores.
+fn refuse(wanted: &Wanted) -> Result<(), Fault> {
+    let clash = |key: &str, why: &str| {
+        let message = format!("core covers singular lines here, and {why}; leave {key} or core out");
+        Err(Fault::new(key, message))
+    };
+    match () {
+        () if matches!(wanted.alike(), Alike::Line) => {
+            let message = "a direction alone comes back reversed round a line, and says nothing of the cell's other two axes there: core needs \
+                           a stress or a frame; give one of these, or leave core out";
+            Err(Fault::new("core", message))
+        }
+        () if wanted.stretch.is_some() => clash("stretch", "cells round them are not held within a range"),
+        () if !wanted.fix.is_empty() => clash("fix", "phases are fixed by the lines"),
+        () if wanted.angle_weight != 1.0 => {
+            clash("angle_weight", "errors of angle and of spacing count alike round them")
+        }
+        () if wanted.offset != [0.0; 3] => clash("offset", "phases are fixed by the lines"),
+        () => Ok(()),
+    }
+}
+
+/// A smooth polyline along a singular line, led on beyond the part.
+fn path(line: &SingularLine, laid: &Laid, settings: &Settings, radius: f64) -> Result<Vec<Vec3>, Fault> {
+    let mut path = smoothed(&line.points, laid.longest());
+    let n = path.len();
+    if path[0] == path[n - 1] {
+        return Ok(path);
+    }
+    let Aabb { min, max } = laid.bounds;
+    let box_depth = |p: Vec3| (0..3).map(|a| (min[a] - p[a]).max(p[a] - max[a])).fold(f64::NEG_INFINITY, f64::max);
+    for (end, next) in [(0, 1), (n - 1, n - 2)] {
+        let p = path[end];
+        if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * laid.longest() {
+            let message = format!(
+                "a singular line ends within the part at {}, where lines meet or directions are not clear: lines from surface to surface and \
+                 closed ones are covered. Smooth directions over more than a wavelength (smooth, in mm), or leave core out",
+                in_mm(p)
+            );
+            return Err(Fault::new("core", message));
+        }
+        path[end] = add(p, scale(unit(sub(p, path[next])), radius + END * laid.longest()));
+    }
+    Ok(path)
+}
+
+/// The map for the whole numbers with the least error that does not fold outside the cores, and the grid whose nodes in the cores do not
+/// count.
+fn found(
+    laid: Laid,
+    wanted: &Wanted,
+    settings: &Settings,
+    target: Target,
+    mut cuts: BranchCuts,
+    cores: &Cores,
+) -> Result<(Laid, Found), Fault> {
+    let Cores { tube, .. } = cores;
+    let plain = || vec![1.0; laid.grid.len()];
+    let mut roots = target.roots(&laid, wanted)?.unwrap_or_else(plain);
+    for (root, p) in roots.iter_mut().zip(&laid.nodes) {
+        let near = (tube.from_lines(*p) / tube.radius).min(1.0).powi(2);
+        *root = (*root * near).max(LEAST_ROOT);
+    }
+    let edges = weights(laid.grid, &roots, None);
+    let mean = target.mean(&roots);
+    let fits = Fits::new(&laid.grid, &target.k, &edges, &mut cuts);
+    let asked = least(&fits.form, fits.free.len());
+    let part = OutsideTube { region: settings.region, tube };
+    let (mut first, mut cuts) = (None, cuts);
+    for (_, numbers) in nearest(&fits.form, &asked) {
+        checkpoint();
+        let mut values = fits.phases(&numbers, &mut cuts);
+        anchor(&mut values, &laid, &cuts, &mean, &roots);
+        let (spline, branches) = cut_cells::through(laid.grid, &values, cuts.clone());
+        torn(&branches, &part, tube.radius)?;
+        let solution = Solution { spline, winding: Winding::default(), branches: Some(branches) };
+        let fold = fold_at_node(&solution, &laid).or_else(|| fold_between(&solution, &laid.inside));
+        if fold.is_none() || first.is_none() {
+            first = Some(solution);
+        }
+        if fold.is_none() {
+            break;
+        }
+    }
+    let Some(solution) = first else { return Err(Fault::new("core", "no map was found")) };
+    let judged = Judged::of(&laid, wanted, Some(&part), &target, &solution)?;
+    let steps = fits.steps;
+    Ok((laid, Found { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
+}
+
+/// Moves phases that no rotation fixes so that their mean is that of K̄ x, as where there are no lines.
+fn anchor(values: &mut [Vec3], laid: &Laid, cuts: &BranchCuts, mean: &Mat3, roots: &[f64]) {
+    let free = |a: &usize| (0..cuts.len()).all(|line| cuts.step(line).turn[*a] == IDENTITY[*a]);
+    let whole: f64 = roots.iter().map(|r| r * r).sum();
+    for a in (0..3).filter(free) {
+        let off = |n: usize| roots[n] * roots[n] * (values[n][a] - dot(mean[a], laid.nodes[n]));
+        let off = (0..values.len()).map(off).sum::<f64>() / whole;
+        values.iter_mut().for_each(|u| u[a] -= off);
+    }
+}
+
+/// Refuses cells of the part that are torn: those next to lines that are not in the cores.
+fn torn(branches: &CutCells, part: &dyn Field, radius: f64) -> Result<(), Fault> {
+    // The corners and the middle of a cell, which is at most a fourth of the radius across.
+    let out = branches.torn().find_map(|b| {
+        let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] });
+        (0..8).map(corner).chain([b.center()]).find(|p| part.value(*p) < 0.0)
+    });
+    out.map_or(Ok(()), |p| {
+        let message = format!(
+            "{} mm; cells do not fit together at {}, outside the cores, where lines are near to each other or bend sharply: give a larger \
+             core_radius, or smooth directions over more than a wavelength (smooth, in mm)",
+            number(radius),
+            in_mm(p)
+        );
+        Err(Fault::new("core_radius", message))
+    })
+}

@@ -1,0 +1,98 @@
+//! A field without what is in a tube.
+
+use std::sync::Arc;
+
+use super::Tube;
+use crate::field::{Block, Field};
+use crate::implicit::Implicit;
+use geometry::math::{Aabb, Interval, Vec3, scale};
+
+/// What a field has outside a tube.
+pub struct Hollowed {
+    /// The field.
+    pub of: Arc<dyn Implicit>,
+    /// The tube.
+    pub tube: Arc<Tube>,
+}
+
+impl Field for Hollowed {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let mut inside = vec![0.0; points.len()];
+        self.of.values(points, out);
+        self.tube.values(points, &mut inside);
+        out.iter_mut().zip(inside).for_each(|(o, d)| *o = o.max(-d));
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let (mut d, mut slopes) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+        self.of.gradients(points, values, gradients);
+        self.tube.gradients(points, &mut d, &mut slopes);
+        for i in 0..points.len() {
+            if -d[i] > values[i] {
+                (values[i], gradients[i]) = (-d[i], scale(slopes[i], -1.0));
+            }
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        self.of.bound(b).max(-self.tube.bound(b))
+    }
+
+    fn is_large(&self) -> bool {
+        self.of.is_large()
+    }
+}
+
+impl Implicit for Hollowed {
+    fn lipschitz(&self) -> f64 {
+        self.of.lipschitz().max(1.0)
+    }
+
+    fn has_creases(&self) -> bool {
+        true
+    }
+
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
+        let mut parts = self.of.parts();
+        if parts.is_empty() {
+            parts.push(self.of.clone());
+        }
+        parts.push(Arc::new(Outside(self.tube.clone())));
+        parts
+    }
+}
+
+/// All outside a tube.
+struct Outside(Arc<Tube>);
+
+impl Field for Outside {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v = -*v);
+        gradients.iter_mut().for_each(|g| *g = scale(*g, -1.0));
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        -self.0.bound(b)
+    }
+
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.0.fill(block, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
+}
+
+impl Implicit for Outside {
+    fn lipschitz(&self) -> f64 {
+        1.0
+    }
+
+    fn has_creases(&self) -> bool {
+        true
+    }
+}
