@@ -84,6 +84,12 @@ impl BranchCuts {
         BranchCuts { sense: filaments.first().map_or(1.0, sense), cuts: filaments.iter().map(cut).collect() }
     }
 
+    /// The same cuts on a grid of some of the nodes.
+    pub fn at(&self, nodes: &[usize]) -> BranchCuts {
+        let cut = |c: &Cut| Cut { angle: nodes.iter().map(|n| c.angle[*n]).collect(), step: c.step };
+        BranchCuts { cuts: self.cuts.iter().map(cut).collect(), sense: self.sense }
+    }
+
     pub fn len(&self) -> usize {
         self.cuts.len()
     }

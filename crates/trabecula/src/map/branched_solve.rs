@@ -12,8 +12,10 @@ use super::phase_grid::Grid;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, dot, scale, sub, transpose};
 use geometry::progress::checkpoint;
 
-/// The energy of the error, relative to the first, of which conjugate gradients end at the square.
-const RESIDUAL: f64 = 1e-7;
+/// The energy of the error, relative to that of no phases, of which conjugate gradients end at the square: of a map, and of what tells
+/// which whole numbers have the least error.
+const RESIDUAL: f64 = 1e-6;
+const ROUGH: f64 = 1e-3;
 /// Most steps of conjugate gradients.
 const STEPS: usize = 600;
 /// Numbers that are summed in one go, so that sums do not depend on the number of threads.
@@ -37,7 +39,7 @@ pub(super) struct Branched<'a> {
 }
 
 impl<'a> Branched<'a> {
-    /// With what edges count, and the cuts, whose translations are those of the problem itself.
+    /// With what edges count, and the cuts.
     pub fn new(grid: &'a Grid, k: &'a [Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &BranchCuts) -> Branched<'a> {
         let strides = grid.strides();
         let mut inner = edges.clone();
@@ -52,6 +54,19 @@ impl<'a> Branched<'a> {
         }
         let multigrid = Multigrid::new(grid.shape, grid.step, inner, Vec::new());
         Branched { grid, k, edges, crossings, multigrid }
+    }
+
+    /// Takes the translations of the same cuts anew.
+    fn translate(&mut self, cuts: &BranchCuts) {
+        let strides = self.grid.strides();
+        self.crossings.par_iter_mut().for_each(|c| c.to = cuts.between([c.node, c.node + strides[c.axis]]));
+    }
+
+    /// The phases at the nodes for the translations of the cuts, and how many steps they took.
+    pub fn phases(&mut self, cuts: &BranchCuts) -> (Vec<Vec3>, usize) {
+        self.translate(cuts);
+        let (u, _, taken) = self.fit(&self.steps(|m| m.by, true), RESIDUAL);
+        (u, taken)
     }
 
     /// What phases are to rise by along each edge above a node, in the branch of the node: of the target, or of the translations alone.
@@ -79,8 +94,8 @@ impl<'a> Branched<'a> {
         steps
     }
 
-    /// The phases at the nodes, and what is left of the steps along edges.
-    fn fit(&self, steps: &[Vec<Vec3>; 3]) -> (Vec<Vec3>, [Vec<Vec3>; 3], usize) {
+    /// The phases at the nodes to a residual, what is left of the steps along edges, and how many steps it took.
+    fn fit(&self, steps: &[Vec<Vec3>; 3], residual: f64) -> (Vec<Vec3>, [Vec<Vec3>; 3], usize) {
         let (strides, len) = (self.grid.strides(), self.grid.len());
         let mut right = vec![[0.0; 3]; len];
         for (a, stride) in strides.into_iter().enumerate() {
@@ -97,7 +112,7 @@ impl<'a> Branched<'a> {
             let (s, m) = (scale(steps[c.axis][c.node], self.edges[c.axis][c.node]), c.node + strides[c.axis]);
             right[m] = add(right[m], sub(apply(&c.to.turn, s), s));
         }
-        let (u, taken) = self.solved(columns(&right));
+        let (u, taken) = self.solved(columns(&right), residual);
         let u: Vec<Vec3> = (0..len).map(|n| [u[0][n], u[1][n], u[2][n]]).collect();
         let mut left: [Vec<Vec3>; 3] = core::array::from_fn(|a| {
             let one = |n: usize| match self.grid.index(n)[a] + 1 < self.grid.shape[a] {
@@ -114,7 +129,7 @@ impl<'a> Branched<'a> {
     }
 
     /// The normal equations' solution for a right-hand side.
-    fn solved(&self, right: [Vec<f64>; 3]) -> ([Vec<f64>; 3], usize) {
+    fn solved(&self, right: [Vec<f64>; 3], residual: f64) -> ([Vec<f64>; 3], usize) {
         let zeros = || [0, 1, 2].map(|_| vec![0.0; self.grid.len()]);
         let (mut x, mut r, mut q, mut z) = (zeros(), right, zeros(), zeros());
         let mut cycle = self.multigrid.cycle();
@@ -125,7 +140,7 @@ impl<'a> Branched<'a> {
         let mut p = z.clone();
         let mut rz = inner(&r, &z);
         let (first, mut taken) = (rz, 0);
-        while taken < STEPS && rz > RESIDUAL * RESIDUAL * first && rz > 0.0 {
+        while taken < STEPS && rz > residual * residual * first && rz > 0.0 {
             checkpoint();
             self.apply(&p, &mut q);
             let alpha = rz / inner(&p, &q);
@@ -172,53 +187,42 @@ impl<'a> Branched<'a> {
     }
 }
 
-/// The phases for translations of the cuts, and the numbers that are free.
-pub(super) struct Fits {
-    /// The phases without translations, and what each of the free numbers adds to them.
-    base: Vec<Vec3>,
-    each: Vec<Vec<Vec3>>,
-    /// The cut and the axis of each free number.
+/// The whole numbers that are free, and the error of the phases for them.
+pub(super) struct Numbers {
+    /// The cut and the axis of each.
     pub free: Vec<(usize, usize)>,
     /// The quadratic form of the error in (1, n), row by row.
     pub form: Vec<f64>,
-    pub steps: usize,
 }
 
-impl Fits {
-    /// For cuts without translations.
-    pub fn new(grid: &Grid, k: &[Vec<Vec3>; 3], edges: &[Vec<f64>; 3], cuts: &mut BranchCuts) -> Fits {
+impl Numbers {
+    /// Of the phases with these gradients over cuts that have no translations yet.
+    pub fn new(grid: &Grid, k: &[Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &mut BranchCuts) -> Numbers {
         let free = free(cuts);
-        let whole = Branched::new(grid, k, edges.clone(), cuts);
-        let (base, left, mut steps) = whole.fit(&whole.steps(|_| [0.0; 3], true));
-        let (mut each, mut all) = (Vec::new(), vec![left]);
+        let mut problem = Branched::new(grid, k, edges, cuts);
+        let left = |problem: &Branched, steps: &[Vec<Vec3>; 3]| problem.fit(steps, ROUGH).1;
+        let mut all = vec![left(&problem, &problem.steps(|_| [0.0; 3], true))];
         for (line, axis) in &free {
             let plain = cuts.step(*line);
             let mut by = [0.0; 3];
             by[*axis] = 1.0;
             cuts.set(*line, Move { by, ..plain });
-            let moved = Branched::new(grid, k, edges.clone(), cuts);
+            problem.translate(cuts);
             cuts.set(*line, plain);
-            let (fit, left, taken) = moved.fit(&moved.steps(|m| m.by, false));
-            steps = steps.max(taken);
-            each.push(fit);
-            all.push(left);
+            all.push(left(&problem, &problem.steps(|m| m.by, false)));
         }
         let pairs = all.iter().flat_map(|a| all.iter().map(move |b| (a, b)));
-        let form = pairs.map(|(a, b)| whole.product(a, b)).collect();
-        Fits { base, each, free, form, steps }
+        Numbers { free, form: pairs.map(|(a, b)| problem.product(a, b)).collect() }
     }
 
-    /// Gives cuts their translations, and the phases that they have at the nodes.
-    pub fn phases(&self, numbers: &[i64], cuts: &mut BranchCuts) -> Vec<Vec3> {
-        let mut u = self.base.clone();
+    /// Gives cuts their translations.
+    pub fn set(&self, numbers: &[i64], cuts: &mut BranchCuts) {
         (0..cuts.len()).for_each(|line| cuts.set(line, Move { by: [0.0; 3], ..cuts.step(line) }));
-        for (((line, axis), fit), n) in self.free.iter().zip(&self.each).zip(numbers) {
+        for ((line, axis), n) in self.free.iter().zip(numbers) {
             let mut step = cuts.step(*line);
             step.by[*axis] = *n as f64;
             cuts.set(*line, step);
-            u.par_iter_mut().zip(fit).for_each(|(u, f)| *u = add(*u, scale(*f, *n as f64)));
         }
-        u
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cores of singular lines: what covers the place at which no lattice is without a flaw.
 
 use super::branch_cuts::BranchCuts;
-use super::branched_solve::Fits;
+use super::branched_solve::{Branched, Numbers};
 use super::core_branches::{labels, rotations};
 use super::cut_cells::{self, CutCells};
 use super::edge_squares::weights;
@@ -141,20 +141,24 @@ fn refuse(wanted: &Wanted) -> Result<(), Fault> {
         let message = format!("core covers singular lines here, and {why}; leave {key} or core out");
         Err(Fault::new(key, message))
     };
-    match () {
-        () if matches!(wanted.alike(), Alike::Line) => {
-            let message = "a direction alone comes back reversed round a line, and says nothing of the cell's other two axes there: core needs \
-                           a stress or a frame; give one of these, or leave core out";
-            Err(Fault::new("core", message))
-        }
-        () if wanted.stretch.is_some() => clash("stretch", "cells round them are not held within a range"),
-        () if !wanted.fix.is_empty() => clash("fix", "phases are fixed by the lines"),
-        () if wanted.angle_weight != 1.0 => {
-            clash("angle_weight", "errors of angle and of spacing count alike round them")
-        }
-        () if wanted.offset != [0.0; 3] => clash("offset", "phases are fixed by the lines"),
-        () => Ok(()),
+    if matches!(wanted.alike(), Alike::Line) {
+        let message = "a direction alone comes back reversed round a line, and says nothing of the cell's other two axes there: core needs \
+                       a stress or a frame; give one of these, or leave core out";
+        return Err(Fault::new("core", message));
     }
+    if wanted.stretch.is_some() {
+        return clash("stretch", "cells round them are not held within a range");
+    }
+    if !wanted.fix.is_empty() {
+        return clash("fix", "phases are fixed by the lines");
+    }
+    if wanted.angle_weight != 1.0 {
+        return clash("angle_weight", "errors of angle and of spacing count alike round them");
+    }
+    if wanted.offset != [0.0; 3] {
+        return clash("offset", "phases are fixed by the lines");
+    }
+    Ok(())
 }
 
 /// A smooth polyline along a singular line, led on beyond the part.
@@ -200,13 +204,22 @@ fn found(
     }
     let edges = weights(laid.grid, &roots, None);
     let mean = target.mean(&roots);
-    let fits = Fits::new(&laid.grid, &target.k, &edges, &mut cuts);
-    let asked = least(&fits.form, fits.free.len());
+    // Every other node is enough to find the numbers with the least error.
+    let numbers = {
+        let (half, nodes) = laid.grid.halved();
+        let k = target.k.each_ref().map(|k| nodes.iter().map(|n| k[*n]).collect());
+        let roots: Vec<f64> = nodes.iter().map(|n| roots[*n]).collect();
+        Numbers::new(&half, &k, weights(half, &roots, None), &mut cuts.at(&nodes))
+    };
+    let asked = least(&numbers.form, numbers.free.len());
     let part = OutsideTube { region: settings.region, tube };
-    let (mut first, mut cuts) = (None, cuts);
-    for (_, numbers) in nearest(&fits.form, &asked) {
+    let mut problem = Branched::new(&laid.grid, &target.k, edges, &cuts);
+    let (mut first, mut steps) = (None, 0);
+    for (_, given) in nearest(&numbers.form, &asked) {
         checkpoint();
-        let mut values = fits.phases(&numbers, &mut cuts);
+        numbers.set(&given, &mut cuts);
+        let (mut values, taken) = problem.phases(&cuts);
+        steps = steps.max(taken);
         anchor(&mut values, &laid, &cuts, &mean, &roots);
         let (spline, branches) = cut_cells::through(laid.grid, &values, cuts.clone());
         torn(&branches, &part, tube.radius)?;
@@ -221,7 +234,6 @@ fn found(
     }
     let Some(solution) = first else { return Err(Fault::new("core", "no map was found")) };
     let judged = Judged::of(&laid, wanted, Some(&part), &target, &solution)?;
-    let steps = fits.steps;
     Ok((laid, Found { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
 }
 

@@ -23,6 +23,14 @@ impl Grid {
         Grid { origin, step: self.step, shape: self.shape.map(|n| n + 2 * by) }
     }
 
+    /// The grid of every other node, from the first one on, and the numbers of its nodes in this one.
+    pub fn halved(&self) -> (Grid, Vec<usize>) {
+        let half = Grid { step: self.step.map(|s| 2.0 * s), shape: self.shape.map(|n| n.div_ceil(2)), ..*self };
+        let strides = self.strides();
+        let here = |n: usize| half.index(n).into_iter().zip(strides).map(|(i, s)| 2 * i * s).sum();
+        (half, (0..half.len()).map(here).collect())
+    }
+
     pub fn len(&self) -> usize {
         self.shape.iter().product()
     }
