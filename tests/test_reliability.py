@@ -105,11 +105,12 @@ def test_an_interrupt_ends_the_work_itself(tmp_path):
             design.build()
             sys.exit("it was built before the interrupt")
         except KeyboardInterrupt:
-            time.sleep(3.0)  # the last round
-            before = time.process_time()
-            time.sleep(2.0)
-            print(time.process_time() - before)
+            for _ in range(10):  # the round that was under way may end
+                before = time.process_time()
+                time.sleep(1.0)
+                if time.process_time() - before < 0.1:
+                    sys.exit()
+            sys.exit("the work went on")
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.2, "the work went on"
