@@ -112,6 +112,25 @@ def test_the_command_writes_files(tmp_path, capsys):
         assert f"{' '.join(option[: 1 + (option[0] == '--islands')])} does not go with a STEP file" in capsys.readouterr().err
 
 
+def test_both_protocols_have_the_same_solids(tmp_path, capsys):
+    from trabecula.cli import main
+
+    design, path, mesh = (tmp_path / name for name in ("ring.toml", "ring.step", "ring.stl"))
+    design.write_text(lt.Design(region=ROOM, beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8)).to_toml())
+    found = {}
+    for protocol, schema in (("ap214", "AUTOMOTIVE_DESIGN"), ("ap242", "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF")):
+        assert main(["mesh", str(design), "-o", str(path), "--protocol", protocol]) == 0
+        assert f"FILE_SCHEMA(('{schema} {{ 1 0 10303 " in path.read_text("ascii")
+        of = entities(path).values()
+        found[protocol] = [text for text in of if not text.startswith(("APPLICATION_CONTEXT(", "APPLICATION_PROTOCOL_"))]
+    assert len(found["ap214"]) == len(entities(path)) - 2 and found["ap214"] == found["ap242"]
+    capsys.readouterr()
+    assert main(["mesh", str(design), "-o", str(mesh), "--protocol", "ap242"]) == 1
+    assert "--protocol is of STEP files" in capsys.readouterr().err and not mesh.exists()
+    with pytest.raises(ValueError, match="protocol is ap203; it must be ap214 or ap242"):
+        solid().save_step(path, protocol="ap203")
+
+
 @pytest.mark.parametrize("fillet", [None, "auto"])
 @pytest.mark.parametrize("cell", ["bcc", "octet", "kelvin"])
 def test_a_cad_kernel_reads_closed_solids(cell, fillet, tmp_path):
@@ -125,7 +144,7 @@ def test_a_cad_kernel_reads_closed_solids(cell, fillet, tmp_path):
         inner = lt.Design(region=lt.region.box(min=[-1, -1, -1], max=[11, 11, 11]), beams=beams).build()
     built = whole(inner, fillet)
     path = tmp_path / "cell.step"
-    made = built.save_step(path)
+    made = built.save_step(path, protocol="ap242" if cell == "octet" else "ap214")
     found = step_solid(path)
     assert found["valid"] and found["free_edges"] == 0
     assert (found["solids"], found["faces"]) == (made.solids, made.faces)

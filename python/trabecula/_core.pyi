@@ -304,7 +304,7 @@ class Solid:
     def write_step(
         self,
         path: str,
-        name: str,
+        title: tuple[str, str],
         tolerance: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,

@@ -22,6 +22,7 @@ from .formats import (
     PART_READS,
     PERMEABILITY_WRITES,
     STDIN,
+    STEP_PROTOCOLS,
     STEP_WRITES,
     STIFFNESS_WRITES,
     SWEEP_WRITES,
@@ -350,6 +351,7 @@ COMMANDS = {
             help="write the part as a function of position: .3mf with the volumetric and implicit extensions, which are drafts",
         ),
         option("--no-mesh", action="store_true", help="with --beams, no coarse mesh for programs that cannot show beams"),
+        option("--protocol", choices=STEP_PROTOCOLS, help="of a .step, the application protocol (default: ap214)"),
         *(JSON, *NOTICES),
     ),
     "simplify": (

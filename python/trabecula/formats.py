@@ -40,6 +40,8 @@ PART_READS = (*MESH_READS, *CAD_READS)
 MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
 #: The exact surface of beams alone, for CAD systems.
 STEP_WRITES = ("step", "stp")
+#: Application protocols of STEP files, the usual one first.
+STEP_PROTOCOLS = ("ap214", "ap242")
 #: The formats of beams as such, not their surface, by suffix: what each is and whether it is written. 3MF is, by a writer of
 #: its own.
 BEAMS = {suffix: (title, writes or suffix == "3mf") for suffix, title, writes in _core.graph_formats()}

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from .errors import Refused
 from .files import check_place
-from .formats import MESH_WRITES, STEP_WRITES, kind_of
+from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, kind_of
 from .inputs import build, closes, keep_inputs, resolution, same_file
 from .mesh import Mesh
 from .parts import part_files, write_parts
@@ -29,6 +29,8 @@ def mesh(args) -> None:
         raise Refused("--no-mesh belongs to --beams; add it")
     if kind_of(args.output) in STEP_WRITES:
         return mesh_step(args)
+    if args.protocol:
+        raise Refused(f"--protocol is of STEP files, and {args.output} is none; leave it out, or write a .step")
     if kind_of(args.output) not in MESH_WRITES:
         raise Refused(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
     if args.parts:
@@ -81,7 +83,8 @@ def mesh_step(args) -> None:
 
     def save(solid: Solid) -> dict:
         with Progress("fitting patches", args.progress) as progress:
-            return solid.save_step(args.output, args.tolerance, args.threads, progress).to_dict()
+            protocol = args.protocol or STEP_PROTOCOLS[0]
+            return solid.save_step(args.output, args.tolerance, args.threads, progress, protocol).to_dict()
 
     without_mesh(args, save, words)
 
@@ -89,7 +92,7 @@ def mesh_step(args) -> None:
 def mesh_beams(args) -> None:
     """``trabecula mesh --beams``."""
     kind = kind_of(args.output)
-    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles"]
+    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "protocol"]
     names += [] if kind == "3mf" else ["chord", "no_mesh"]
     refuse_others(args, names, ("drop-small",), f"--beams and a .{kind}: it has beams, not their surface")
 
@@ -106,7 +109,7 @@ def mesh_beams(args) -> None:
 
 def mesh_implicit(args) -> None:
     """``trabecula mesh --implicit``."""
-    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord")
+    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord", "protocol")
     refuse_others(args, names, ("drop-small",), "--implicit: the file has a function, and no triangles")
 
     def words(made: dict) -> str:

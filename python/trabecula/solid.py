@@ -513,9 +513,10 @@ class Solid(Seen, Simulated):
         tolerance: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        protocol: str = "ap214",
     ) -> StepReport:
-        """Writes a STEP file (.step or .stp; AP214, mm) of smooth faces for CAD systems, and gives its figures. Each connected
-        component is a solid.
+        """Writes a STEP file (.step or .stp; mm) of smooth faces for CAD systems, and gives its figures. Each connected
+        component is a solid. ``protocol`` is "ap214" or "ap242".
 
         Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
         rational B-splines. A ValueError for a region that cuts them, and beams that run into each other without a node.
@@ -530,7 +531,7 @@ class Solid(Seen, Simulated):
         name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
-            return self._core.write_step(temporary, name, within, thread_count(threads), progress)
+            return self._core.write_step(temporary, (name, protocol), within, thread_count(threads), progress)
 
     def save_beams(
         self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None

@@ -1,6 +1,6 @@
 //! STEP files: the boundary of a quador lattice in exact form, for CAD systems.
 //!
-//! ISO 10303-21 text of the application protocol AP214, in mm. Each connected component is a `MANIFOLD_SOLID_BREP`.
+//! ISO 10303-21 text of the application protocol AP214 or AP242, in mm. Each connected component is a `MANIFOLD_SOLID_BREP`.
 //! Cylinders, cones and balls are written as such, other beams as surfaces of revolution of a conic, and fillets as rational
 //! biquadratic B-spline surfaces, all of which represent them exactly. Edges are rational quadratic B-splines, with curves
 //! in the parameter planes of both their faces: a reader that has to find these itself does so to 1e-5 only.
@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 use std::io;
 
-use geometry::formats::part21::{AP214, Id, Part21, Product, list, real, spline_curve};
+use geometry::formats::part21::{Id, Part21, Product, Title, list, real, spline_curve};
 use geometry::math::{Vec3, add};
 use geometry::progress::{Stopped, checkpoint};
 
@@ -28,19 +28,18 @@ pub struct StepSummary {
     pub vertices: usize,
 }
 
-/// Writes the boundary of a quador lattice as a STEP file (AP214, mm), under the name of a product. The same lattice gives
-/// the same bytes.
+/// Writes the boundary of a quador lattice as a STEP file (mm). The same lattice gives the same bytes.
 ///
 /// # Errors
 /// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close; failures of the output.
-pub fn write_step(quadors: &Quadors, name: &str, out: &mut dyn io::Write) -> Result<StepSummary, Stopped> {
+pub fn write_step(quadors: &Quadors, title: Title, out: &mut dyn io::Write) -> Result<StepSummary, Stopped> {
     let brep = quadors.brep().map_err(Stopped::Refused)?;
-    write(&brep, name, out).map_err(Stopped::Io)
+    write(&brep, title, out).map_err(Stopped::Io)
 }
 
-fn write(brep: &Brep, name: &str, out: &mut dyn io::Write) -> io::Result<StepSummary> {
-    let mut file = Part21::new(out, name, AP214)?;
-    let product = Product::write(&mut file, name)?;
+fn write(brep: &Brep, title: Title, out: &mut dyn io::Write) -> io::Result<StepSummary> {
+    let mut file = Part21::new(out, title)?;
+    let product = Product::write(&mut file)?;
     let planar = file.parameter_plane()?;
     let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
     let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
@@ -246,7 +245,8 @@ mod tests {
 
     fn text() -> (String, StepSummary) {
         let mut out = Vec::new();
-        let made = write_step(&lattice(), "it's", &mut out).expect("written to memory");
+        let made =
+            write_step(&lattice(), Title { name: "it's", ..Title::default() }, &mut out).expect("written to memory");
         (String::from_utf8(out).expect("ASCII"), made)
     }
 

@@ -3,6 +3,7 @@
 use std::io::BufWriter;
 use std::path::PathBuf;
 
+use geometry::formats::part21::{Protocol, Title};
 use geometry::progress::Stopped;
 use geometry::repair::Repaired;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
@@ -418,21 +419,25 @@ impl Solid {
         report(py, "SurfaceReport", &SurfaceReport::from(&made.map_err(error::stopped)?))
     }
 
-    /// Writes a STEP file at `path`, under the name of a product: beams alone exactly, lattices in a box as patches within
-    /// `tolerance` (mm); gives its `reports.StepReport`.
-    #[pyo3(signature = (path, name, tolerance=None, threads=None, progress=None))]
+    /// Writes a STEP file at `path`, of a product's name and a protocol ("ap214", "ap242"): beams alone exactly, lattices in a box as
+    /// patches within `tolerance` (mm); gives its `reports.StepReport`.
+    #[pyo3(signature = (path, title, tolerance=None, threads=None, progress=None))]
     fn write_step<'py>(
         &self,
         py: Python<'py>,
         path: PathBuf,
-        name: &str,
+        title: (String, String),
         tolerance: Option<f64>,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let (name, protocol) = &title;
+        let known =
+            || PyValueError::new_err(format!("protocol is {protocol}; it must be {}", Protocol::NAMES.join(" or ")));
+        let title = Title { name, protocol: Protocol::of(protocol).ok_or_else(known)? };
         let made = run(py, threads, progress, |p| {
             let mut out = BufWriter::new(file::anew(&path).map_err(Stopped::Io)?);
-            self.built.write_step(name, tolerance, &mut out, p)
+            self.built.write_step(title, tolerance, &mut out, p)
         })?;
         report(py, "StepReport", &made.map_err(error::stopped)?)
     }

@@ -58,6 +58,7 @@ use crate::truss::Beams;
 use crate::volume_mesh;
 use geometry::fault::Fault;
 use geometry::fe_mesh::HexMesh;
+use geometry::formats::part21::Title;
 use geometry::progress::{Progress, Stopped};
 use geometry::repair::Repaired;
 
@@ -373,7 +374,7 @@ impl Built {
         Ok(BeamSurface(build_beams::alone(self)?))
     }
 
-    /// Writes a STEP file (AP214, mm) under the name of a product: of beams alone their exact surface, of lattices in a box bicubic
+    /// Writes a STEP file (mm): of beams alone their exact surface, of lattices in a box bicubic
     /// patches no farther than `tolerance` (mm; a thousandth of the smallest wavelength unless given) from it.
     ///
     /// # Errors
@@ -381,12 +382,12 @@ impl Built {
     /// failures of the output; an interruption.
     pub fn write_step(
         &self,
-        name: &str,
+        title: Title,
         tolerance: Option<f64>,
         out: &mut dyn io::Write,
         progress: &dyn Progress,
     ) -> Result<StepReport, Stopped> {
-        build_step::write(self, name, tolerance, out, progress)
+        build_step::write(self, title, tolerance, out, progress)
     }
 
     /// The chord error (mm) at which `beam_surface` makes a surface unless another resolution is asked for: a fiftieth of the radius

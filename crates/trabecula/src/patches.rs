@@ -10,6 +10,7 @@
 use std::io;
 
 use geometry::fault::{Fault, number};
+use geometry::formats::part21::Title;
 use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
 use geometry::progress::{Progress, Stage, Stopped};
 use rayon::prelude::*;
@@ -147,12 +148,12 @@ impl Patches {
         }
     }
 
-    /// Writes them as a STEP file (AP214, mm) under the name of a product. The same patches give the same bytes.
+    /// Writes them as a STEP file (mm). The same patches give the same bytes.
     ///
     /// # Errors
     /// Failures of the output; an interruption.
-    pub fn write_step(&self, name: &str, out: &mut dyn io::Write, progress: &dyn Progress) -> Result<(), Stopped> {
-        patch_step::write(&self.boundary, &self.solids, name, out, progress)
+    pub fn write_step(&self, title: Title, out: &mut dyn io::Write, progress: &dyn Progress) -> Result<(), Stopped> {
+        patch_step::write(&self.boundary, &self.solids, title, out, progress)
     }
 }
 

@@ -7,8 +7,55 @@ use std::io;
 
 use crate::math::Vec3;
 
-/// The schema of the application protocol AP214.
-pub const AP214: &str = "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }";
+/// The application protocol of a file. Solids are the same in both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Protocol {
+    /// AP214, automotive design, of 2000.
+    #[default]
+    Ap214,
+    /// AP242, managed model based 3D engineering, of 2014.
+    Ap242,
+}
+
+impl Protocol {
+    /// Their names.
+    pub const NAMES: [&str; 2] = ["ap214", "ap242"];
+
+    /// The protocol of a name.
+    pub fn of(name: &str) -> Option<Protocol> {
+        match name {
+            "ap214" => Some(Protocol::Ap214),
+            "ap242" => Some(Protocol::Ap242),
+            _ => None,
+        }
+    }
+
+    fn schema(self) -> &'static str {
+        match self {
+            Protocol::Ap214 => "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }",
+            Protocol::Ap242 => "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF { 1 0 10303 442 1 1 4 }",
+        }
+    }
+
+    /// The application, and the name and the year of the protocol.
+    fn application(self) -> [&'static str; 2] {
+        match self {
+            Protocol::Ap214 => ["core data for automotive mechanical design processes", "'automotive_design',2000"],
+            Protocol::Ap242 => {
+                ["managed model based 3d engineering", "'ap242_managed_model_based_3d_engineering',2014"]
+            }
+        }
+    }
+}
+
+/// What a file is headed by.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Title<'a> {
+    /// The name of its product.
+    pub name: &'a str,
+    /// Its application protocol.
+    pub protocol: Protocol,
+}
 
 /// The number of an entity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,22 +70,24 @@ impl Display for Id {
 /// A file that is being written.
 pub struct Part21<'a> {
     out: &'a mut dyn io::Write,
+    title: Title<'a>,
     last: u64,
     /// Entities that others share, by their text.
     shared: HashMap<String, Id>,
 }
 
 impl<'a> Part21<'a> {
-    /// Starts a file of a schema, under a name. The time stamp is left empty, so that the same data give the same bytes.
-    pub fn new(out: &'a mut dyn io::Write, name: &str, schema: &str) -> io::Result<Part21<'a>> {
+    /// Starts a file. The time stamp is left empty, so that the same data give the same bytes.
+    pub fn new(out: &'a mut dyn io::Write, title: Title<'a>) -> io::Result<Part21<'a>> {
         write!(
             out,
             "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME({},'',(''),(''),'Trabecula {}','Trabecula','');\n\
-             FILE_SCHEMA(('{schema}'));\nENDSEC;\nDATA;\n",
-            string(name),
-            env!("CARGO_PKG_VERSION")
+             FILE_SCHEMA(('{}'));\nENDSEC;\nDATA;\n",
+            string(title.name),
+            env!("CARGO_PKG_VERSION"),
+            title.protocol.schema()
         )?;
-        Ok(Part21 { out, last: 0, shared: HashMap::new() })
+        Ok(Part21 { out, title, last: 0, shared: HashMap::new() })
     }
 
     /// Writes an entity.
@@ -90,13 +139,12 @@ pub struct Product {
 }
 
 impl Product {
-    /// Writes what stands before the solids: a product of this name, lengths in mm, to be finished with the solids.
-    pub fn write(file: &mut Part21, name: &str) -> io::Result<Product> {
-        let name = string(name);
-        let application = file.entity("APPLICATION_CONTEXT('core data for automotive mechanical design processes')")?;
-        file.entity(&format!(
-            "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{application})"
-        ))?;
+    /// Writes what stands before the solids: the product, lengths in mm, to be finished with the solids.
+    pub fn write(file: &mut Part21) -> io::Result<Product> {
+        let name = string(file.title.name);
+        let [of, protocol] = file.title.protocol.application();
+        let application = file.entity(&format!("APPLICATION_CONTEXT('{of}')"))?;
+        file.entity(&format!("APPLICATION_PROTOCOL_DEFINITION('international standard',{protocol},{application})"))?;
         let context = file.entity(&format!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
         let product = file.entity(&format!("PRODUCT({name},{name},'',({context}))"))?;
         file.entity(&format!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;

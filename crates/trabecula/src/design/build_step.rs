@@ -7,12 +7,13 @@ use crate::patches::{PatchSummary, Patches, TOLERANCE};
 use crate::report::StepReport;
 use ::beams::{StepSummary, write_step};
 use geometry::fault::Fault;
+use geometry::formats::part21::Title;
 use geometry::progress::{Progress, Stage, Stopped};
 
 /// Writes the STEP file of a design, as `Built::write_step` says.
 pub(super) fn write(
     built: &Built,
-    name: &str,
+    title: Title,
     tolerance: Option<f64>,
     out: &mut dyn io::Write,
     progress: &dyn Progress,
@@ -24,7 +25,7 @@ pub(super) fn write(
             return refuse("tolerance", message);
         }
         let quadors = build_beams::exact(built).map_err(Stopped::Refused)?;
-        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, name, out)?;
+        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, title, out)?;
         let volume = quadors.volume().map_err(Stopped::Refused)?;
         return Ok(StepReport { solids, faces, edges, vertices, volume, deviation: 0.0, angle: None });
     }
@@ -35,7 +36,7 @@ pub(super) fn write(
     }
     let tolerance = tolerance.unwrap_or(TOLERANCE * built.solid.wavelength);
     let made = Patches::new(&built.solid, tolerance, &Stage { whole: progress, from: 0.0, to: 0.8 })?;
-    made.write_step(name, out, &Stage { whole: progress, from: 0.8, to: 1.0 })?;
+    made.write_step(title, out, &Stage { whole: progress, from: 0.8, to: 1.0 })?;
     let PatchSummary { solids, faces, edges, vertices, volume, deviation, angle } = made.summary();
     Ok(StepReport { solids, faces, edges, vertices, volume, deviation, angle: Some(angle) })
 }

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use geometry::formats::part21::{AP214, Id, Part21, Product, list, spline_curve};
+use geometry::formats::part21::{Id, Part21, Product, Title, list, spline_curve};
 use geometry::math::{Vec3, norm, scale, sub};
 use geometry::progress::{Progress, Stopped};
 
@@ -19,16 +19,16 @@ pub fn rounded(p: Vec3) -> Vec3 {
     p.map(|x| (x * DECIMALS).round() / DECIMALS)
 }
 
-/// Writes solids of a boundary under the name of a product.
+/// Writes solids of a boundary.
 pub fn write(
     of: &Boundary,
     solids: &[Shells],
-    name: &str,
+    title: Title,
     out: &mut dyn io::Write,
     progress: &dyn Progress,
 ) -> Result<(), Stopped> {
-    let mut file = Part21::new(out, name, AP214).map_err(Stopped::Io)?;
-    let product = Product::write(&mut file, name).map_err(Stopped::Io)?;
+    let mut file = Part21::new(out, title).map_err(Stopped::Io)?;
+    let product = Product::write(&mut file).map_err(Stopped::Io)?;
     let planar = file.parameter_plane().map_err(Stopped::Io)?;
     let lines = square(&mut file, planar).map_err(Stopped::Io)?;
     let mut writer = Writer {

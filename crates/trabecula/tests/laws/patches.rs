@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use geometry::formats::part21::Title;
 use geometry::math::{Vec3, add, norm, scale};
 use geometry::measure::size;
 use geometry::progress::{Silent, Stopped};
@@ -15,7 +16,7 @@ use crate::common::{Random, ball, cases, cuboid, lattice, meshed, solid};
 fn made(solid: &Solid, tolerance: f64) -> (PatchSummary, String) {
     let patches = Patches::new(solid, tolerance, &Silent).expect("patches");
     let mut out = Vec::new();
-    patches.write_step("law", &mut out, &Silent).expect("written to memory");
+    patches.write_step(Title::default(), &mut out, &Silent).expect("written to memory");
     (patches.summary(), String::from_utf8(out).expect("ASCII"))
 }
 
@@ -74,7 +75,7 @@ fn patches_close_keep_the_topology_and_lie_on_the_surface() {
             Err(other) => panic!("{what}: {other:?}"),
         };
         let mut out = Vec::new();
-        patches.write_step("law", &mut out, &Silent).expect("written to memory");
+        patches.write_step(Title::default(), &mut out, &Silent).expect("written to memory");
         let (summary, text) = (patches.summary(), String::from_utf8(out).expect("ASCII"));
         let found = entities(&text);
         let mut uses: HashMap<&str, [u32; 2]> = HashMap::new();
