@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Tube;
+use super::{OutsideTube, Tube};
 use crate::field::{Block, Field};
 use crate::implicit::Implicit;
 use geometry::math::{Aabb, Interval, Vec3, scale};
@@ -15,27 +15,23 @@ pub struct Hollowed {
     pub tube: Arc<Tube>,
 }
 
+impl Hollowed {
+    fn outside(&self) -> OutsideTube<'_> {
+        OutsideTube { region: Some(&*self.of), tube: &self.tube }
+    }
+}
+
 impl Field for Hollowed {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let mut inside = vec![0.0; points.len()];
-        self.of.values(points, out);
-        self.tube.values(points, &mut inside);
-        out.iter_mut().zip(inside).for_each(|(o, d)| *o = o.max(-d));
+        self.outside().values(points, out);
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let (mut d, mut slopes) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-        self.of.gradients(points, values, gradients);
-        self.tube.gradients(points, &mut d, &mut slopes);
-        for i in 0..points.len() {
-            if -d[i] > values[i] {
-                (values[i], gradients[i]) = (-d[i], scale(slopes[i], -1.0));
-            }
-        }
+        self.outside().gradients(points, values, gradients);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        self.of.bound(b).max(-self.tube.bound(b))
+        self.outside().bound(b)
     }
 
     fn is_large(&self) -> bool {
