@@ -123,9 +123,19 @@ impl Surface {
 }
 
 /// The negative of a field.
-struct Negated(Arc<dyn Field>);
+pub(crate) struct Negated<F: ?Sized>(pub Arc<F>);
 
-impl Field for Negated {
+impl<F: Implicit + ?Sized> Implicit for Negated<F> {
+    fn lipschitz(&self) -> f64 {
+        self.0.lipschitz()
+    }
+
+    fn has_creases(&self) -> bool {
+        self.0.has_creases()
+    }
+}
+
+impl<F: Field + ?Sized> Field for Negated<F> {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         self.0.values(points, out);
         out.iter_mut().for_each(|v| *v = -*v);

@@ -5,6 +5,7 @@ mod affine_kind;
 mod branch_cuts;
 mod branched_solve;
 mod cohomology;
+mod conjugate_gradients;
 mod core_branches;
 mod covering;
 pub(crate) mod curved_tets;

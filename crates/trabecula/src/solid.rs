@@ -89,7 +89,8 @@ impl Solid {
     pub fn spaces(&self) -> Result<Spaces, Fault> {
         let Some(faces) = self.field.as_ref().and_then(|f| f.faces()) else {
             let message = "this design has no lower and upper side: only sheets have, whether of one lattice or of a blend of \
-                           sheets. Give the lattices part = \"sheet\", or leave the parts out";
+                           sheets. Give the lattices part = \"sheet\" (and core = \"solid\" where it is \"void\", which cuts both faces), or leave \
+                           the parts out";
             return Err(Fault::new("parts", message));
         };
         let pair = self.field.as_ref().and_then(|f| f.pair());

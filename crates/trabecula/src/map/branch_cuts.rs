@@ -64,10 +64,8 @@ impl BranchCuts {
         lines.sort_by(|a, b| dot(middle(a), across).total_cmp(&dot(middle(b), across)));
         let filament = |points: &Vec<Vec3>| {
             let n = points.len();
-            let closed = points[0] == points[n - 1];
-            let ends = (!closed).then(|| [unit(sub(points[0], points[1])), unit(sub(points[n - 1], points[n - 2]))]);
-            let points = if closed { points[..n - 1].to_vec() } else { points.clone() };
-            Filament::Bent { points, ends, aside }
+            let ends = [unit(sub(points[0], points[1])), unit(sub(points[n - 1], points[n - 2]))];
+            Filament::Bent { points: points.clone(), ends: Some(ends), aside }
         };
         let far = grid.step.into_iter().fold(0.0, f64::max);
         let sense = |f: &Filament| {
@@ -134,9 +132,7 @@ impl BranchCuts {
 fn like_oriented(lines: &mut [Vec<Vec3>]) -> Vec3 {
     let mut sum = [0.0; 3];
     for line in lines {
-        let n = line.len();
-        let chord = sub(line[n - 1], line[0]);
-        let chord = if norm(chord) > 0.0 { chord } else { sub(line[n / 2], line[0]) };
+        let chord = sub(line[line.len() - 1], line[0]);
         if dot(chord, sum) < 0.0 {
             line.reverse();
             sum = sub(sum, chord);

@@ -7,19 +7,17 @@
 use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
+use super::conjugate_gradients::{self, Solved, sums};
 use super::multigrid::Multigrid;
 use super::phase_grid::Grid;
-use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, dot, scale, sub, transpose};
-use geometry::progress::checkpoint;
+use geometry::math::{IDENTITY, Vec3, add, apply, dot, scale, sub, transpose};
 
-/// The energy of the error, relative to that of no phases, of which conjugate gradients end at the square: of a map, and of what tells
-/// which whole numbers have the least error.
+/// The error, relative to that of no phases, at which conjugate gradients end: of a map, and of what tells which whole numbers have the
+/// least error.
 const RESIDUAL: f64 = 1e-6;
 const ROUGH: f64 = 1e-3;
 /// Most steps of conjugate gradients.
 const STEPS: usize = 600;
-/// Numbers that are summed in one go, so that sums do not depend on the number of threads.
-const CHUNK: usize = 4096;
 
 /// An edge across a cut: its lower node and axis, and what phases become along it.
 struct Crossing {
@@ -112,8 +110,14 @@ impl<'a> Branched<'a> {
             let (s, m) = (scale(steps[c.axis][c.node], self.edges[c.axis][c.node]), c.node + strides[c.axis]);
             right[m] = add(right[m], sub(apply(&c.to.turn, s), s));
         }
-        let (u, taken) = self.solved(columns(&right), residual);
-        let u: Vec<Vec3> = (0..len).map(|n| [u[0][n], u[1][n], u[2][n]]).collect();
+        let columns: Vec<f64> = (0..3).flat_map(|i| right.iter().map(move |v| v[i])).collect();
+        let mut cycle = self.multigrid.cycle();
+        let precondition =
+            |r: &[f64], z: &mut [f64]| r.chunks(len).zip(z.chunks_mut(len)).for_each(|(r, z)| cycle(r, z));
+        let operator = |x: &[f64], out: &mut [f64]| self.apply(x, out);
+        let Solved { x, steps: taken, .. } =
+            conjugate_gradients::solve(columns, vec![0.0; 3 * len], operator, precondition, (residual, STEPS));
+        let u: Vec<Vec3> = (0..len).map(|n| [x[n], x[len + n], x[2 * len + n]]).collect();
         let mut left: [Vec<Vec3>; 3] = core::array::from_fn(|a| {
             let one = |n: usize| match self.grid.index(n)[a] + 1 < self.grid.shape[a] {
                 true => sub(sub(u[n + strides[a]], u[n]), steps[a][n]),
@@ -128,54 +132,22 @@ impl<'a> Branched<'a> {
         (u, left, taken)
     }
 
-    /// The normal equations' solution for a right-hand side.
-    fn solved(&self, right: [Vec<f64>; 3], residual: f64) -> ([Vec<f64>; 3], usize) {
-        let zeros = || [0, 1, 2].map(|_| vec![0.0; self.grid.len()]);
-        let (mut x, mut r, mut q, mut z) = (zeros(), right, zeros(), zeros());
-        let mut cycle = self.multigrid.cycle();
-        let mut precondition = |r: &[Vec<f64>; 3], z: &mut [Vec<f64>; 3]| {
-            r.iter().zip(z).for_each(|(r, z)| cycle(r, z));
-        };
-        precondition(&r, &mut z);
-        let mut p = z.clone();
-        let mut rz = inner(&r, &z);
-        let (first, mut taken) = (rz, 0);
-        while taken < STEPS && rz > residual * residual * first && rz > 0.0 {
-            checkpoint();
-            self.apply(&p, &mut q);
-            let alpha = rz / inner(&p, &q);
-            if !alpha.is_finite() {
-                break;
-            }
-            for i in 0..3 {
-                x[i].par_iter_mut().zip(&p[i]).for_each(|(x, p)| *x += alpha * p);
-                r[i].par_iter_mut().zip(&q[i]).for_each(|(r, q)| *r -= alpha * q);
-            }
-            precondition(&r, &mut z);
-            let next = inner(&r, &z);
-            for (p, z) in p.iter_mut().zip(&z) {
-                p.par_iter_mut().zip(z).for_each(|(p, z)| *p = z + next / rz * *p);
-            }
-            (rz, taken) = (next, taken + 1);
-        }
-        (x, taken)
-    }
-
-    /// The normal equations' operator.
-    fn apply(&self, x: &[Vec<f64>; 3], out: &mut [Vec<f64>; 3]) {
-        let none = vec![0.0; self.grid.len()];
-        for (x, out) in x.iter().zip(out.iter_mut()) {
+    /// The normal equations' operator on all first phases, then all second and all third ones.
+    fn apply(&self, x: &[f64], out: &mut [f64]) {
+        let len = self.grid.len();
+        let none = vec![0.0; len];
+        for (x, out) in x.chunks(len).zip(out.chunks_mut(len)) {
             self.multigrid.finest().apply(x, out, |_, _, product| product, &none);
         }
         let strides = self.grid.strides();
         for c in &self.crossings {
             let (w, m) = (self.edges[c.axis][c.node], c.node + strides[c.axis]);
-            let at = |n: usize| [x[0][n], x[1][n], x[2][n]];
+            let at = |n: usize| [x[n], x[len + n], x[2 * len + n]];
             let off = sub(at(c.node), apply(&transpose(&c.to.turn), at(m)));
             let there = apply(&c.to.turn, off);
             for i in 0..3 {
-                out[i][c.node] += w * off[i];
-                out[i][m] -= w * there[i];
+                out[i * len + c.node] += w * off[i];
+                out[i * len + m] -= w * there[i];
             }
         }
     }
@@ -237,23 +209,4 @@ fn free(cuts: &BranchCuts) -> Vec<(usize, usize)> {
         free.extend((0..3).filter(|a| plain || turned(line, *a)).map(|a| (line, a)));
     }
     free
-}
-
-fn columns(of: &[Vec3]) -> [Vec<f64>; 3] {
-    core::array::from_fn(|i| of.iter().map(|v| v[i]).collect())
-}
-
-fn inner(a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]) -> f64 {
-    (0..3).map(|i| sums(a[i].len(), |n| a[i][n] * b[i][n])).sum()
-}
-
-/// The sum of numbers, in chunks of one length.
-fn sums(n: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let chunk = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(n)).map(&of).sum::<f64>();
-    (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Vec<f64>>().iter().sum()
-}
-
-/// Rotations about one axis: that axis, if all have it.
-pub(super) fn common_axis(turns: &[Mat3]) -> Option<usize> {
-    (0..3).find(|a| turns.iter().all(|t| t[*a][*a] == 1.0))
 }

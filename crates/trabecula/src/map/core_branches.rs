@@ -6,7 +6,6 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
-use super::branched_solve::common_axis;
 use super::frame::in_mm;
 use super::phase_target::{Laid, Target};
 use super::singular_lines::Alike;
@@ -95,6 +94,11 @@ pub(super) fn rotations(
     check_lengths(laid, target, &all)?;
     all.into_iter().enumerate().for_each(|(line, turn)| cuts.set(line, Move { turn, by: [0.0; 3] }));
     Ok(())
+}
+
+/// Rotations about one axis: that axis, if all have it.
+fn common_axis(turns: &[Mat3]) -> Option<usize> {
+    (0..3).find(|a| turns.iter().all(|t| t[*a][*a] == 1.0))
 }
 
 /// Refuses cells of unequal edges where axes change places.

@@ -163,19 +163,24 @@ fn refuse(wanted: &Wanted) -> Result<(), Fault> {
 
 /// A smooth polyline along a singular line, led on beyond the part.
 fn path(line: &SingularLine, laid: &Laid, settings: &Settings, radius: f64) -> Result<Vec<Vec3>, Fault> {
+    if line.is_closed() {
+        let message = format!(
+            "a singular line is closed, {}: core covers lines from surface to surface. Smooth directions over more than a wavelength (smooth, \
+             in mm), or leave core out",
+            line.words(1)
+        );
+        return Err(Fault::new("core", message));
+    }
     let mut path = smoothed(&line.points, laid.longest());
     let n = path.len();
-    if path[0] == path[n - 1] {
-        return Ok(path);
-    }
     let Aabb { min, max } = laid.bounds;
     let box_depth = |p: Vec3| (0..3).map(|a| (min[a] - p[a]).max(p[a] - max[a])).fold(f64::NEG_INFINITY, f64::max);
     for (end, next) in [(0, 1), (n - 1, n - 2)] {
         let p = path[end];
         if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * laid.longest() {
             let message = format!(
-                "a singular line ends within the part at {}, where lines meet or directions are not clear: lines from surface to surface and \
-                 closed ones are covered. Smooth directions over more than a wavelength (smooth, in mm), or leave core out",
+                "a singular line ends within the part at {}, where lines meet or directions are not clear: core covers lines from surface to \
+                 surface. Smooth directions over more than a wavelength (smooth, in mm), or leave core out",
                 in_mm(p)
             );
             return Err(Fault::new("core", message));

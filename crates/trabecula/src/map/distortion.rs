@@ -189,62 +189,62 @@ pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
     most
 }
 
-/// The most that frames turn within one cell of edge `length`, or twice what they turn within half of one or less, and where. Across cuts
-/// they turn by what is left after the rotation there.
-pub(super) fn turning(
-    grid: &Grid,
-    frames: &[Mat3],
-    cuts: Option<&CutCells>,
-    inside: &[bool],
-    length: f64,
-) -> (f64, Vec3) {
-    let mut most = (0.0, grid.origin);
-    for cells in [1.0, 0.5, 0.25, 0.125] {
-        let found = (0..3).map(|a| turning_along((a, cells), grid, frames, cuts, inside, length));
-        most = found.fold(most, |m, f| if f.0 > m.0 { f } else { m });
-    }
-    most
+/// Frames at the nodes of a grid.
+pub(super) struct Frames<'a> {
+    pub grid: &'a Grid,
+    pub frames: &'a [Mat3],
+    /// Across these they turn by what is left after the rotation there.
+    pub cuts: Option<&'a CutCells>,
+    /// Which nodes count.
+    pub inside: &'a [bool],
 }
 
-/// The same along an axis between nodes `cells` cells apart.
-fn turning_along(
-    (a, cells): (usize, f64),
-    grid: &Grid,
-    frames: &[Mat3],
-    cuts: Option<&CutCells>,
-    inside: &[bool],
-    length: f64,
-) -> (f64, Vec3) {
-    let strides = grid.strides();
-    // Nodes nearly that far apart; where that is less than a step, what a step turns is shared out.
-    let apart = ((cells * length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
-    let share = (length / (apart as f64 * grid.step[a])).min(1.0 / cells).min(2.0);
-    let angle = |n: usize| {
-        let m = n + apart * strides[a];
-        if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
-            return (0.0, n);
+impl Frames<'_> {
+    /// The most that they turn within one cell of edge `length` (mm), degrees, or twice what they turn within half of one or less, and
+    /// where.
+    pub fn turning(&self, length: f64) -> (f64, Vec3) {
+        let mut most = (0.0, self.grid.origin);
+        for cells in [1.0, 0.5, 0.25, 0.125] {
+            let found = (0..3).map(|axis| self.turning_along(axis, cells, length));
+            most = found.fold(most, |m, f| if f.0 > m.0 { f } else { m });
         }
-        let there = match cuts {
-            None => frames[m],
-            // Not from one side of a core to the other.
-            Some(_) if !inside[n + apart / 2 * strides[a]] => return (0.0, n),
-            Some(cuts) => product(&frames[m], &cuts.between([n, m]).turn),
-        };
-        let pairs = frames[n].as_flattened().iter().zip(there.as_flattened());
-        let trace: f64 = pairs.map(|(a, b)| a * b).sum();
-        let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
-        (angle * share, n)
-    };
-    // Of equals the first, whatever the threads do.
-    let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
-        Ordering::Less => b,
-        Ordering::Equal if b.1 < a.1 => b,
-        _ => a,
-    };
-    let (turn, n) = (0..grid.len()).into_par_iter().map(angle).reduce(|| (0.0, usize::MAX), greater);
-    if turn == 0.0 {
-        return (0.0, grid.origin);
+        most
     }
-    let (p, q) = (grid.node(n), grid.node(n + apart * strides[a]));
-    (turn, Aabb::EMPTY.with(p).with(q).center())
+
+    /// The same along an axis between nodes `cells` cells apart.
+    fn turning_along(&self, a: usize, cells: f64, length: f64) -> (f64, Vec3) {
+        let Frames { grid, frames, cuts, inside } = *self;
+        let strides = grid.strides();
+        // Nodes nearly that far apart; where that is less than a step, what a step turns is shared out.
+        let apart = ((cells * length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
+        let share = (length / (apart as f64 * grid.step[a])).min(1.0 / cells).min(2.0);
+        let angle = |n: usize| {
+            let m = n + apart * strides[a];
+            if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
+                return (0.0, n);
+            }
+            let there = match cuts {
+                None => frames[m],
+                // Not from one side of a core to the other.
+                Some(_) if !inside[n + apart / 2 * strides[a]] => return (0.0, n),
+                Some(cuts) => product(&frames[m], &cuts.between([n, m]).turn),
+            };
+            let pairs = frames[n].as_flattened().iter().zip(there.as_flattened());
+            let trace: f64 = pairs.map(|(a, b)| a * b).sum();
+            let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+            (angle * share, n)
+        };
+        // Of equals the first, whatever the threads do.
+        let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
+            Ordering::Less => b,
+            Ordering::Equal if b.1 < a.1 => b,
+            _ => a,
+        };
+        let (turn, n) = (0..grid.len()).into_par_iter().map(angle).reduce(|| (0.0, usize::MAX), greater);
+        if turn == 0.0 {
+            return (0.0, grid.origin);
+        }
+        let (p, q) = (grid.node(n), grid.node(n + apart * strides[a]));
+        (turn, Aabb::EMPTY.with(p).with(q).center())
+    }
 }

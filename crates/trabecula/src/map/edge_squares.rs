@@ -9,18 +9,16 @@
 
 use rayon::prelude::*;
 
+use super::conjugate_gradients::{self, Solved, sums};
 use super::multigrid::Multigrid;
 use super::phase_grid::Grid;
 use super::tilt::Tilt;
 use geometry::math::Vec3;
-use geometry::progress::checkpoint;
 
 /// The energy of the error, relative to the first, of which conjugate gradients end at the square.
 const RESIDUAL: f64 = 1e-7;
 /// Most steps of conjugate gradients.
 const STEPS: usize = 400;
-/// Numbers that are summed in one go, so that sums do not depend on the number of threads.
-const CHUNK: usize = 4096;
 /// What edges count that have no share in the region.
 const BEYOND: f64 = 1e-5;
 /// Least squares on the edges of a grid.
@@ -79,44 +77,14 @@ impl EdgeSquares {
     /// The solution of the normal equations, from `start` on.
     fn solve(&self, right: Vec<f64>, start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
         let none = vec![0.0; start.len()];
-        let operator = |x: &[f64], out: &mut Vec<f64>| {
+        let operator = |x: &[f64], out: &mut [f64]| {
             self.multigrid.finest().apply(x, out, |_, _, product| product, &none);
             if let Some(tilt) = tilt {
                 out.par_iter_mut().zip(tilt.apply(x)).for_each(|(o, more)| *o += more);
             }
         };
-        let dot = |a: &[f64], b: &[f64]| sums(a.len(), |n| a[n] * b[n]);
-        let mut q = vec![0.0; start.len()];
-        let (mut x, mut r) = (start, right);
-        let scale = dot(&r, &r).sqrt();
-        operator(&x, &mut q);
-        r.par_iter_mut().zip(&q).for_each(|(r, q)| *r -= q);
-        // What rounding leaves of a gradient that needs no solving.
-        if dot(&r, &r).sqrt() <= 1e-12 * scale {
-            return Fit { values: x, steps: 0, left: 0.0 };
-        }
-        let mut cycle = self.multigrid.cycle();
-        let mut z = vec![0.0; x.len()];
-        cycle(&r, &mut z);
-        let mut p = z.clone();
-        let mut rz = dot(&r, &z);
-        let (first, mut steps, mut left) = (rz, 0, 1.0);
-        while steps < STEPS && left > RESIDUAL {
-            checkpoint();
-            operator(&p, &mut q);
-            let alpha = rz / dot(&p, &q);
-            if !alpha.is_finite() {
-                break;
-            }
-            let both = (x.par_iter_mut(), r.par_iter_mut(), p.par_iter(), q.par_iter()).into_par_iter();
-            both.for_each(|(x, r, p, q)| (*x, *r) = (*x + alpha * p, *r - alpha * q));
-            cycle(&r, &mut z);
-            let next = dot(&r, &z);
-            p.par_iter_mut().zip(&z).for_each(|(p, z)| *p = z + next / rz * *p);
-            rz = next;
-            steps += 1;
-            left = (rz.max(0.0) / first).sqrt();
-        }
+        let Solved { x, steps, left } =
+            conjugate_gradients::solve(right, start, operator, self.multigrid.cycle(), (RESIDUAL, STEPS));
         Fit { values: x, steps, left }
     }
 }
@@ -143,12 +111,6 @@ fn flow(grid: &Grid, edges: &[Vec<f64>; 3], slopes: &[Vec3]) -> Vec<f64> {
     let of =
         |n: usize| -> f64 { (0..3).map(|a| n.checked_sub(strides[a]).map_or(0.0, |m| edge(a, m)) - edge(a, n)).sum() };
     (0..slopes.len()).into_par_iter().map(of).collect()
-}
-
-/// The sum of numbers, in chunks of one length.
-fn sums(n: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let chunk = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(n)).map(&of).sum::<f64>();
-    (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Vec<f64>>().iter().sum()
 }
 
 /// Half the sum of a gradient at both ends of each edge above a node.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::cut_cells::CutCells;
-use super::distortion::{self, Distortion};
+use super::distortion::{self, Distortion, Frames};
 use super::frame;
 use super::phase::Wanted;
 use super::phase_grid::Grid;
@@ -62,7 +62,7 @@ impl Judged {
         let whole = |n: &&usize| cuts.is_none_or(|c| !c.is_near(**n));
         let curl: Vec<f64> = (compared.par_iter()).filter(whole).map(|&n| distortion::curl(grid, k, n)).collect();
         let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
-        let turn = distortion::turning(grid, &target.frames, cuts, inside, longest);
+        let turn = Frames { grid, frames: &target.frames, cuts, inside }.turning(longest);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);

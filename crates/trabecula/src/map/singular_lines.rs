@@ -35,11 +35,17 @@ impl SingularLine {
         [self.points.first(), self.points.last()].map(|p| p.copied().unwrap_or_default())
     }
 
+    /// Whether it comes back to where it begins.
+    pub(super) fn is_closed(&self) -> bool {
+        let [a, b] = self.ends();
+        a == b
+    }
+
     /// Where it is, as the longest of `count` lines.
     pub(crate) fn words(&self, count: usize) -> String {
         let at = |[x, y, z]: Vec3| format!("({x:.1}, {y:.1}, {z:.1})");
         let [a, b] = self.ends();
-        let place = if a == b {
+        let place = if self.is_closed() {
             format!("a ring through {} mm", at(a))
         } else {
             format!("a line from {} to {} mm", at(a), at(b))

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{OutsideTube, Tube};
-use crate::field::{Block, Field};
-use crate::implicit::Implicit;
-use geometry::math::{Aabb, Interval, Vec3, scale};
+use crate::field::Field;
+use crate::implicit::{Implicit, Negated};
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// What a field has outside a tube.
 pub struct Hollowed {
@@ -53,42 +53,7 @@ impl Implicit for Hollowed {
         if parts.is_empty() {
             parts.push(self.of.clone());
         }
-        parts.push(Arc::new(Outside(self.tube.clone())));
+        parts.push(Arc::new(Negated(self.tube.clone())));
         parts
-    }
-}
-
-/// All outside a tube.
-struct Outside(Arc<Tube>);
-
-impl Field for Outside {
-    fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        self.0.values(points, out);
-        out.iter_mut().for_each(|v| *v = -*v);
-    }
-
-    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        self.0.gradients(points, values, gradients);
-        values.iter_mut().for_each(|v| *v = -*v);
-        gradients.iter_mut().for_each(|g| *g = scale(*g, -1.0));
-    }
-
-    fn bound(&self, b: &Aabb) -> Interval {
-        -self.0.bound(b)
-    }
-
-    fn fill(&self, block: &Block, out: &mut [f32]) {
-        self.0.fill(block, out);
-        out.iter_mut().for_each(|v| *v = -*v);
-    }
-}
-
-impl Implicit for Outside {
-    fn lipschitz(&self) -> f64 {
-        1.0
-    }
-
-    fn has_creases(&self) -> bool {
-        true
     }
 }

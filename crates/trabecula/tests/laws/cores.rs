@@ -39,6 +39,10 @@ const CIRCLES: &[([f64; 2], bool)] = &[(AT, false), (AT, false)];
 const WEDGES: &[([f64; 2], bool)] = &[([-3.7, 0.4], false), ([4.6, 1.1], false)];
 const BOTH: &[([f64; 2], bool)] = &[([-3.7, 0.4], false), ([4.6, 1.1], true)];
 
+/// Axes come back turned by a half round a ring of radius 5 in the plane z = 2.7.
+const RING: &str = "stress = [{ formula = \"sqrt(x^2 + y^2) - 5\" }, { formula = \"5 - sqrt(x^2 + y^2)\" }, -20, 0, 0, \
+                    { formula = \"z - 2.7\" }]";
+
 const GYROID: &str = "cell = \"gyroid\"\npart = \"sheet\"\nlevel.fraction = 0.3";
 const PRIMITIVE: &str = "cell = \"primitive\"\npart = \"upper\"\nlevel.fraction = 0.4";
 
@@ -108,6 +112,28 @@ fn cells_are_whole_outside_cores() {
             }
         }
     }
+}
+
+/// Stresses round which axes come back turned by a quarter, as averages over a length have them: a cell with axes of order four closes,
+/// another is refused.
+#[test]
+fn quarter_turns_close_for_cells_with_such_axes() {
+    let quarter = "smooth = 3, stress = [{ formula = \"1 + 0.9*cos(atan2(y, x)/2)\" }, { formula = \"1 - 0.9*cos(atan2(y, x)/2)\" }, \
+                   0, 0, 0, { formula = \"0.9*sin(atan2(y, x)/2)\" }]";
+    let made = built(&design(PRIMITIVE, quarter, ", core = \"solid\"")).expect("a quarter");
+    let found = lines(&made);
+    assert!(found.len() == 1 && (found[0].turn - 90.0).abs() < 1.0, "{found:?}");
+    let map = &made.lattices[0].1.map;
+    let out = points(200_000).into_iter().filter(|p| p[0].hypot(p[1]) > 1.6);
+    let least = out.map(|p| determinant(&map.jacobian(p))).fold(f64::INFINITY, f64::min);
+    println!("quarter: least det J {:.3} of the one asked for", least * 27.0);
+    assert!(least > 0.0);
+    for (r, z) in [(1.9, 1.0), (3.3, 4.9), (5.2, 2.2)] {
+        let (change, at) = seam(&made, [0.0; 2], r, z);
+        assert!(change < 1e-4 * 8.0, "{at:?}: {change}");
+    }
+    let why = built(&design(GYROID, quarter, ", core = \"solid\"")).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(why.contains("axes come back turned by 90 degrees"), "{why}");
 }
 
 /// Rows equal points, and bounds hold, across cuts and next to cores.
@@ -221,6 +247,7 @@ fn what_is_not_possible_is_said() {
             "lattice.a.map.phase.core: a direction alone comes back reversed",
         ),
         (odd, &wedge, ", core = \"void\"", "lattice.a.cell: axes come back turned by 180 degrees"),
+        (GYROID, RING, ", core = \"solid\"", "lattice.a.map.phase.core: a singular line is closed, a ring through"),
     ] {
         let why = built(&design(cell, orientation, keys)).err().map(|e| e.to_string()).unwrap_or_default();
         println!("{why}");
