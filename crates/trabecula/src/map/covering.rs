@@ -18,7 +18,7 @@ use crate::field::Field;
 use crate::kind::Kind;
 use crate::region::{OutsideTube, Tube, smoothed};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, scale, sub, unit};
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 
 /// Steps of the grid in the radius of a core: cells are torn within 2 √2 steps of a line, which is known to most of a step.
@@ -29,6 +29,9 @@ const PADDING: usize = 3;
 const MOST: usize = 12;
 /// How deep the end of a line may lie in the part, in steps: lines are found between nodes in the part.
 const END: f64 = 3.0;
+
+/// Least cosine of the angle between the ends of lines that face each other and the way from one to the other.
+const FACING: f64 = 0.7;
 
 /// What the core of a singular line is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
@@ -86,7 +89,9 @@ impl Covering {
         checkpoint();
         let least_length = 0.5 * shortest(&laid);
         let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
-        let mut paths = lines.iter().map(|l| path(l, &laid, settings, radius)).collect::<Result<Vec<_>, Fault>>()?;
+        let pieces = lines.iter().map(|l| path(l, &laid, settings)).collect::<Result<Vec<_>, Fault>>()?;
+        let mut paths = joined(pieces);
+        paths.iter_mut().for_each(|p| lead_on(p, radius + END * laid.longest()));
         if paths.is_empty() {
             return Ok(None);
         }
@@ -103,6 +108,11 @@ impl Covering {
         let tube = Tube::new(&paths, radius);
         let outside: Vec<bool> =
             (laid.nodes.iter().zip(&laid.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
+        if !outside.contains(&true) {
+            let message =
+                format!("{} mm; cores of this radius cover the whole part: give a smaller one", number(radius));
+            return Err(Fault::new("core_radius", message));
+        }
         let alike = wanted.alike();
         let labels = labels(&laid, &target, &outside, &cuts, &alike);
         target.relabel(&labels, &laid.given);
@@ -161,8 +171,8 @@ fn refuse(wanted: &Wanted) -> Result<(), Fault> {
     Ok(())
 }
 
-/// A smooth polyline along a singular line, led on beyond the part.
-fn path(line: &SingularLine, laid: &Laid, settings: &Settings, radius: f64) -> Result<Vec<Vec3>, Fault> {
+/// A smooth polyline along a singular line, from surface to surface.
+fn path(line: &SingularLine, laid: &Laid, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
     if line.is_closed() {
         let message = format!(
             "a singular line is closed, {}: core covers lines from surface to surface. Smooth directions over more than a wavelength (smooth, \
@@ -171,12 +181,10 @@ fn path(line: &SingularLine, laid: &Laid, settings: &Settings, radius: f64) -> R
         );
         return Err(Fault::new("core", message));
     }
-    let mut path = smoothed(&line.points, laid.longest());
-    let n = path.len();
+    let path = smoothed(&line.points, laid.longest());
     let Aabb { min, max } = laid.bounds;
     let box_depth = |p: Vec3| (0..3).map(|a| (min[a] - p[a]).max(p[a] - max[a])).fold(f64::NEG_INFINITY, f64::max);
-    for (end, next) in [(0, 1), (n - 1, n - 2)] {
-        let p = path[end];
+    for p in [path[0], path[path.len() - 1]] {
         if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * laid.longest() {
             let message = format!(
                 "a singular line ends within the part at {}, where lines meet or directions are not clear: core covers lines from surface to \
@@ -185,9 +193,45 @@ fn path(line: &SingularLine, laid: &Laid, settings: &Settings, radius: f64) -> R
             );
             return Err(Fault::new("core", message));
         }
-        path[end] = add(p, scale(unit(sub(p, path[next])), radius + END * laid.longest()));
     }
     Ok(path)
+}
+
+/// Lines of which one leaves the part and the other enters it again ahead, as one: whatever lies between, phases have one branch about both.
+fn joined(mut lines: Vec<Vec<Vec3>>) -> Vec<Vec<Vec3>> {
+    let outward = |l: &[Vec3], last: bool| {
+        let n = l.len();
+        if last { (l[n - 1], unit(sub(l[n - 1], l[n - 2]))) } else { (l[0], unit(sub(l[0], l[1]))) }
+    };
+    // How far apart two ends are that face each other.
+    let gap = |a: (Vec3, Vec3), b: (Vec3, Vec3)| {
+        let (way, length) = (sub(b.0, a.0), norm(sub(b.0, a.0)));
+        (dot(way, a.1) > FACING * length && -dot(way, b.1) > FACING * length).then_some(length)
+    };
+    loop {
+        let ends: Vec<(usize, bool)> = (0..lines.len()).flat_map(|i| [(i, false), (i, true)]).collect();
+        let pairs = ends.iter().flat_map(|a| ends.iter().filter(move |b| a.0 < b.0).map(move |b| (*a, *b)));
+        let facing =
+            pairs.filter_map(|(a, b)| Some((gap(outward(&lines[a.0], a.1), outward(&lines[b.0], b.1))?, a, b)));
+        let Some((_, a, b)) = facing.min_by(|x, y| x.0.total_cmp(&y.0)) else { return lines };
+        let mut second = lines.swap_remove(b.0);
+        let first = &mut lines[a.0];
+        if !a.1 {
+            first.reverse();
+        }
+        if b.1 {
+            second.reverse();
+        }
+        first.extend(second);
+    }
+}
+
+/// Leads a line on beyond both ends.
+fn lead_on(line: &mut [Vec3], by: f64) {
+    let n = line.len();
+    for (end, next) in [(0, 1), (n - 1, n - 2)] {
+        line[end] = add(line[end], scale(unit(sub(line[end], line[next])), by));
+    }
 }
 
 /// The map for the whole numbers with the least error that does not fold outside the cores, and the grid whose nodes in the cores do not

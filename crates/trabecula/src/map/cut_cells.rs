@@ -13,7 +13,7 @@ use super::branch_cuts::{BranchCuts, Move};
 use super::phase_grid::Grid;
 use super::spline::Spline;
 use geometry::cubic_spline::{slopes, weights};
-use geometry::math::{Aabb, Mat3, Vec3, add, norm, scale, spectral_norm, sub};
+use geometry::math::{Aabb, Mat3, Vec3, add, norm, product, scale, spectral_norm, sub};
 
 /// By how much phases on a face may differ from cell to cell, turns: rounding.
 const APART: f64 = 1e-6;
@@ -126,6 +126,11 @@ impl CutCells {
             scale(sum(c, w), 1.0 / self.grid.step[a])
         };
         Some(geometry::math::transpose(&[along(0), along(1), along(2)]))
+    }
+
+    /// A Jacobian found at a node, in the branch of that node: rounding decides which of the cells about it was taken.
+    pub fn of_node(&self, node: usize, jacobian: &Mat3) -> Mat3 {
+        product(&self.cuts.between([self.cell(self.grid.node(node)).0, node]).turn, jacobian)
     }
 
     /// Whether a row of points along x may meet such cells.

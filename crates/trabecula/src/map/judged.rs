@@ -51,8 +51,11 @@ impl Judged {
         checkpoint();
         let (compared, between) = compared(grid, inside, region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
-        let jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
+        let mut jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
         let cuts = solution.branches.as_ref();
+        if let Some(cuts) = cuts {
+            compared.iter().zip(&mut jacobians).for_each(|(n, j)| *j = cuts.of_node(*n, j));
+        }
         let off_nodes = targets(wanted, target.range, grid, &target.frames, target.lengths.as_deref(), cuts, &between)?;
         let k = &target.k;
         let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);

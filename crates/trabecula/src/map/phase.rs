@@ -230,10 +230,11 @@ impl Phase {
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
             if found.solution.branches.is_some() {
-                return Err(folded(p, &remedy(wanted, lengths_range[1]), ", outside the cores of its singular lines"));
+                let remedy = remedy(wanted, lengths_range[1], true);
+                return Err(folded(p, &remedy, ", outside the cores of its singular lines"));
             }
             tried += &found.judged.distortion.winds();
-            return Err(folded(p, &remedy(wanted, lengths_range[1]), &tried));
+            return Err(folded(p, &remedy(wanted, lengths_range[1], false), &tried));
         }
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
         let stress_range = target.range;
@@ -420,18 +421,18 @@ fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
 }
 
 /// What may keep a map from folding.
-fn remedy(wanted: &Wanted, longest: f64) -> String {
+fn remedy(wanted: &Wanted, longest: f64, covered: bool) -> String {
     let smoother = match (&wanted.orientation, wanted.smooth) {
         (Orientation::Angles(_), _) => "Let".into(),
         (of, None) => format!("Smooth the {} over a length, such as smooth = {}, let", of.key(), number(longest)),
         (_, Some(length)) => format!("Use a smooth of more than {} mm, let", number(length)),
     };
-    let bounded = if wanted.stretch.is_none() {
-        ", bound what cells are stretched by, such as stretch = [0.67, 1.5]"
-    } else {
-        ""
+    let more = match (covered, wanted.stretch) {
+        (true, _) => ", give a larger core_radius",
+        (false, None) => ", bound what cells are stretched by, such as stretch = [0.67, 1.5]",
+        (false, Some(_)) => "",
     };
-    format!("{smoother} orientation and wavelength vary more slowly{bounded}")
+    format!("{smoother} orientation and wavelength vary more slowly{more}")
 }
 
 /// A solution, and what it was found for.

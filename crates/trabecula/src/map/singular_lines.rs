@@ -107,7 +107,12 @@ fn longest_first(lines: &mut [SingularLine]) {
 fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
     // Each with its points as they were found: means wander.
     let mut kept: Vec<(SingularLine, Vec<Vec3>)> = Vec::new();
-    let close = |a: &[Vec3], b: &[Vec3]| [0, a.len() - 1].iter().all(|i| norm(sub(a[*i], b[*i])) < near);
+    let close = |a: &[Vec3], b: &[Vec3]| {
+        let chord = sub(a[a.len() - 1], a[0]);
+        // One after the other they are pieces of one line, between which the part is not.
+        let level = |d: Vec3| dot(d, chord).abs() <= 0.5 * dot(chord, chord) || chord == [0.0; 3];
+        [0, a.len() - 1].map(|i| sub(b[i], a[i])).into_iter().all(|d| norm(d) < near && level(d))
+    };
     for line in lines {
         let beside = |(i, (_, points)): (usize, &(SingularLine, Vec<Vec3>))| {
             let other = matched(points, &line.points);

@@ -90,6 +90,8 @@ fn cells_are_whole_outside_cores() {
             let d = made.report().lattices["a"].distortion.clone().expect("solved");
             println!("{what}: density {:?}, angle {:?}, turn {}, {:?}", d.density, d.angle[0], d.turn, made.warnings);
             assert_eq!(found.len(), count, "{what}: {found:?}");
+            // In the branch of each place: axes that are turned about a line's are off by less than a quarter.
+            assert!(d.angle.iter().all(|a| a.max < 90.0), "{what}: {:?}", d.angle);
             for line in &found {
                 // To a step of the grid, an eighth of a wavelength.
                 assert!(line.points.iter().all(|p| from_lines(*p, of) < 0.55), "{what}: {line:?}");
@@ -112,6 +114,29 @@ fn cells_are_whole_outside_cores() {
             }
         }
     }
+}
+
+/// A line that leaves the part through a cavity and comes in again is one: cells close round both pieces, and round the cavity.
+#[test]
+fn pieces_of_a_line_are_covered_as_one() {
+    let text = design(GYROID, &stress(WEDGE), ", core = \"solid\"");
+    let whole = "[region.box]\nmin = [-9, -8, 0]\nmax = [10, 9, 6]\n";
+    let hollow = "[region]\ndifference = [{ box = { min = [-9, -8, 0], max = [10, 9, 6] } }, \
+                  { box = { min = [-2, -1, 2], max = [3, 4, 4] } }]\n";
+    assert!(text.contains(whole));
+    let hollow = text.replace(whole, hollow);
+    let wide = built(&hollow.replace("core = \"solid\"", "core = \"solid\", core_radius = 5")).expect("built");
+    let made = built(&hollow).expect("built");
+    for found in [lines(&wide), lines(&made)] {
+        let whole = |l: &SingularLineReport| (l.length - 2.0).abs() < 0.3 && l.turn == 180.0;
+        assert!(found.len() == 2 && found.iter().all(whole), "{found:?}");
+    }
+    let map = &made.lattices[0].1.map;
+    let out = points(200_000).into_iter().filter(|p| from_lines(*p, WEDGE) > 1.6 && made.solid.region.value(*p) < 0.0);
+    let least = out.map(|p| determinant(&map.jacobian(p))).fold(f64::INFINITY, f64::min);
+    assert!(least > 0.0, "{least}");
+    let mesh = surface(&made.solid, 0.2, &Silent).expect("meshed").mesh;
+    assert!(size(&mesh).closed && self_intersections(&mesh, 1) == 0);
 }
 
 /// Stresses round which axes come back turned by a quarter, as averages over a length have them: a cell with axes of order four closes,
@@ -231,6 +256,12 @@ fn what_is_not_possible_is_said() {
             &wedge,
             ", core = \"solid\", core_radius = 0.003",
             "lattice.a.map.phase.core_radius: 0.003 mm; the grid needs 4 steps",
+        ),
+        (
+            GYROID,
+            &wedge,
+            ", core = \"solid\", core_radius = 100",
+            "lattice.a.map.phase.core_radius: 100 mm; cores of this radius cover the whole part",
         ),
         (
             GYROID,
