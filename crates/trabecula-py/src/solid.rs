@@ -222,7 +222,7 @@ impl Solid {
             Some((_, Beams::Pattern(laid))) => {
                 let written = run(py, None, None, |_| laid.expand())?;
                 let written = written.map_err(|f| error::fault(f.under(&format!("beams.{name}"))))?;
-                Ok(Quadors { quadors: written.into() })
+                Ok(Quadors { quadors: written })
             }
             None => Err(PyValueError::new_err(format!("there are no beams named {name}"))),
         }

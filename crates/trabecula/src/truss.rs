@@ -22,11 +22,14 @@ pub enum Beams {
 }
 
 impl Beams {
-    /// The solid as an implicit function.
+    /// The solid as an implicit function; a small pattern as its hubs, which are evaluated over whole blocks of points.
     pub fn field(&self) -> Arc<dyn Implicit> {
         match self {
             Beams::Truss(t) => t.quadors.clone(),
-            Beams::Pattern(p) => p.clone(),
+            Beams::Pattern(p) => match p.expanded_if_small() {
+                Some(quadors) => quadors,
+                None => p.clone(),
+            },
         }
     }
 

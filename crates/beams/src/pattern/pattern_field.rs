@@ -4,6 +4,8 @@ mod box_tree;
 mod index_classes;
 mod pattern_collisions;
 
+use std::sync::{Arc, OnceLock};
+
 use rayon::prelude::*;
 
 use super::{MAX_DISTINCT_HUBS, Pattern, Similarity, Strut};
@@ -47,6 +49,8 @@ pub struct PatternField {
     cap: f64,
     /// The minimum scale.
     min_scale: f64,
+    /// Every hub, once it was asked for.
+    expanded: OnceLock<Result<Arc<Quadors>, Fault>>,
 }
 
 impl PatternField {
@@ -120,6 +124,7 @@ impl PatternField {
             quadors,
             pattern,
             fillet,
+            expanded: OnceLock::new(),
         };
         field.compute_boxes();
         Ok(field)
@@ -256,11 +261,20 @@ impl PatternField {
         inside
     }
 
-    /// The pattern expanded to quadors, for queries by hub.
+    /// The pattern expanded to quadors, for queries by hub; kept from the first call on.
     ///
     /// # Errors
     /// More beams than the maximum that is expanded.
-    pub fn expand(&self) -> Result<Quadors, Fault> {
+    pub fn expand(&self) -> Result<Arc<Quadors>, Fault> {
+        self.expanded.get_or_init(|| self.expansion().map(Arc::new)).clone()
+    }
+
+    /// The pattern expanded to quadors where it has at most 100 000 beams, about 100 MB.
+    pub fn expanded_if_small(&self) -> Option<Arc<Quadors>> {
+        (self.pattern.counts().1 <= SMALL).then(|| self.expand().ok()).flatten()
+    }
+
+    fn expansion(&self) -> Result<Quadors, Fault> {
         let (_, beams) = self.pattern.counts();
         if beams > MAX_EXPANDED_BEAMS {
             let message = format!(
@@ -397,6 +411,9 @@ fn candidate_repeats((step, count): &(Similarity, u32), p: &Aabb, b: &Aabb) -> s
     }
     low as usize..high as usize + 1
 }
+
+/// Number of beams of a pattern that is small.
+const SMALL: f64 = 1e5;
 
 /// Maximum number of beams of a pattern that is expanded, and bytes of each: two half-beams and its part of a hub and
 /// of the index.

@@ -38,7 +38,7 @@ fn written(built: &Built) -> Result<Written<'_>, Fault> {
     let (name, beams) = build_beams::only(built).map_err(refuse)?;
     let (graph, quadors) = match beams {
         Beams::Truss(t) => (Cow::Borrowed(&t.graph), t.quadors.clone()),
-        Beams::Pattern(laid) => (Cow::Owned(laid.pattern().expanded()?), Arc::new(laid.expand()?)),
+        Beams::Pattern(laid) => (Cow::Owned(laid.pattern().expanded()?), laid.expand()?),
     };
     checkpoint();
     Ok(Written { name, graph, quadors, cut: !build_beams::held(beams, built) })

@@ -26,8 +26,8 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
 use geometry::progress::checkpoint;
 
-use beam_report::{FEW, warn, warn_cleaned};
 pub(super) use beam_report::{held, inside, lone, report, share};
+use beam_report::{warn, warn_cleaned};
 pub(super) use wire::given;
 use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
 
@@ -43,7 +43,7 @@ pub(super) fn beams(
     warnings: &mut Vec<Warning>,
 ) -> Result<Beams, DesignError> {
     if let GraphSpec::Pattern(of) = &spec.graph {
-        return build_pattern::laid(spec, &of.pattern, environment, warnings).map(|p| Beams::Pattern(Arc::new(p)));
+        return build_pattern::laid(spec, &of.pattern, environment, warnings);
     }
     let fault = |f: Fault| DesignError::fault(&environment.path, f);
     let mut radii = radii(spec, environment)?;
@@ -171,7 +171,7 @@ fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quador
             let written = laid.expand()?;
             let whole = whole(&written, &*built.solid.region);
             let apart = written.collisions().is_empty();
-            (Arc::new(written), apart, whole)
+            (written, apart, whole)
         }
     };
     if !apart {
@@ -192,7 +192,7 @@ const PER_RADIUS: f64 = 50.0;
 /// made on a grid: other solids, beams that the region cuts or that overlap, patterns of many beams.
 pub(super) fn default_chord(built: &Built) -> Option<f64> {
     if let [(_, Beams::Pattern(laid))] = &built.beams[..]
-        && laid.pattern().counts().1 > FEW
+        && laid.expanded_if_small().is_none()
     {
         return None;
     }

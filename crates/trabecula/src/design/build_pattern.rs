@@ -1,11 +1,14 @@
 //! Patterns of beams: data to a program of repeats.
 
+use std::sync::Arc;
+
 use super::build_beams::{check_open, fillet, given, inside, share};
 use super::data::*;
 use super::{Built, Warning};
 use crate::environment::Environment;
 use crate::kind::DesignError;
 use crate::report::{BeamsReport, PatternReport};
+use crate::truss::Beams;
 use ::beams::graph::{Hub, Profile};
 use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
 use geometry::fault::{counted, number};
@@ -16,7 +19,7 @@ pub(super) fn laid(
     of: &PatternSpec,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
-) -> Result<PatternField, DesignError> {
+) -> Result<Beams, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let single = |given: &Option<GradeSpec>| match given {
         Some(GradeSpec::Constant(v)) => Some(*v),
@@ -75,7 +78,6 @@ pub(super) fn laid(
         );
         return Err(DesignError::new(at, message));
     }
-    check_open(&laid, environment)?;
     let found = laid.collisions().map_err(|f| DesignError::fault(&at, f))?;
     if let Some(c) = found
         && let Some(p) = c.at
@@ -88,7 +90,9 @@ pub(super) fn laid(
         );
         warnings.push(Warning { path: at, message });
     }
-    Ok(laid)
+    let beams = Beams::Pattern(Arc::new(laid));
+    check_open(&*beams.field(), environment)?;
+    Ok(beams)
 }
 
 /// The figures of a pattern.

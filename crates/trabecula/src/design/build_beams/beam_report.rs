@@ -87,9 +87,6 @@ pub(in crate::design) fn lone(built: &Built) -> bool {
     built.beams.len() == 1 && built.lattices.is_empty() && built.tilings.is_empty() && built.solid.filled.is_empty()
 }
 
-/// Largest number of beams of a pattern that are checked one by one.
-pub(super) const FEW: f64 = 2e4;
-
 /// Whether all beams lie in the region: of a large pattern, by the box that holds it.
 pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
     match beams {
@@ -101,8 +98,7 @@ pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
 /// As `held`, for a pattern.
 pub(in crate::design) fn inside(laid: &PatternField, built: &Built) -> bool {
     let region = &*built.solid.region;
-    let each = || laid.expand().is_ok_and(|expanded| whole(&expanded, region));
-    region.bound(&laid.bounds()).hi <= 0.0 || laid.pattern().counts().1 <= FEW && each()
+    region.bound(&laid.bounds()).hi <= 0.0 || laid.expanded_if_small().is_some_and(|all| whole(&all, region))
 }
 
 /// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.
