@@ -1,4 +1,4 @@
-"""Seconds of real parts: the command on the designs of examples/, and on one gyroid in a box, a sphere and a mesh.
+"""Seconds of real parts: the command on all designs of examples/, and on one gyroid in a box, a sphere and a mesh.
 
   python bench/parts.py --trabecula .venv/bin/trabecula [--also NAME=COMMAND ...] [--rounds 3] [--only WORD]
 
@@ -28,7 +28,7 @@ MADE = {
     "in the stem": STEM + GYROID + SAME,
     "in the stem, by depth": STEM + GYROID + DEPTH,
 }
-NAMED = ("hybrid_stem", "swept_beam", "wrapped_tube", "stress_bracket", "bracket", "kelvin_stem", "helmet_liner")
+NAMED = sorted(path.stem for path in EXAMPLES.glob("*.toml"))
 
 
 def timed(command):
