@@ -89,7 +89,8 @@ impl Covering {
         checkpoint();
         let least_length = 0.5 * shortest(&laid);
         let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
-        let pieces = lines.iter().map(|l| path(l, &laid, settings)).collect::<Result<Vec<_>, Fault>>()?;
+        let pieces =
+            lines.iter().map(|l| Ok((path(l, &laid, settings)?, l.turn))).collect::<Result<Vec<_>, Fault>>()?;
         let mut paths = joined(pieces);
         paths.iter_mut().for_each(|p| lead_on(p, radius + END * laid.longest()));
         if paths.is_empty() {
@@ -197,8 +198,9 @@ fn path(line: &SingularLine, laid: &Laid, settings: &Settings) -> Result<Vec<Vec
     Ok(path)
 }
 
-/// Lines of which one leaves the part and the other enters it again ahead, as one: whatever lies between, phases have one branch about both.
-fn joined(mut lines: Vec<Vec<Vec3>>) -> Vec<Vec<Vec3>> {
+/// Lines, each with its turn, of which one leaves the part and another of the same turn enters it again ahead, as one: whatever lies between,
+/// phases have one branch about both.
+fn joined(mut lines: Vec<(Vec<Vec3>, f64)>) -> Vec<Vec<Vec3>> {
     let outward = |l: &[Vec3], last: bool| {
         let n = l.len();
         if last { (l[n - 1], unit(sub(l[n - 1], l[n - 2]))) } else { (l[0], unit(sub(l[0], l[1]))) }
@@ -211,11 +213,14 @@ fn joined(mut lines: Vec<Vec<Vec3>>) -> Vec<Vec<Vec3>> {
     loop {
         let ends: Vec<(usize, bool)> = (0..lines.len()).flat_map(|i| [(i, false), (i, true)]).collect();
         let pairs = ends.iter().flat_map(|a| ends.iter().filter(move |b| a.0 < b.0).map(move |b| (*a, *b)));
+        let pairs = pairs.filter(|(a, b)| lines[a.0].1 == lines[b.0].1);
         let facing =
-            pairs.filter_map(|(a, b)| Some((gap(outward(&lines[a.0], a.1), outward(&lines[b.0], b.1))?, a, b)));
-        let Some((_, a, b)) = facing.min_by(|x, y| x.0.total_cmp(&y.0)) else { return lines };
-        let mut second = lines.swap_remove(b.0);
-        let first = &mut lines[a.0];
+            pairs.filter_map(|(a, b)| Some((gap(outward(&lines[a.0].0, a.1), outward(&lines[b.0].0, b.1))?, a, b)));
+        let Some((_, a, b)) = facing.min_by(|x, y| x.0.total_cmp(&y.0)) else {
+            return lines.into_iter().map(|l| l.0).collect();
+        };
+        let mut second = lines.swap_remove(b.0).0;
+        let first = &mut lines[a.0].0;
         if !a.1 {
             first.reverse();
         }

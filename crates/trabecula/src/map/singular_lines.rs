@@ -110,15 +110,15 @@ fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
     let close = |a: &[Vec3], b: &[Vec3]| {
         let chord = sub(a[a.len() - 1], a[0]);
         // One after the other they are pieces of one line, between which the part is not.
-        let level = |d: Vec3| dot(d, chord).abs() <= 0.5 * dot(chord, chord) || chord == [0.0; 3];
-        [0, a.len() - 1].map(|i| sub(b[i], a[i])).into_iter().all(|d| norm(d) < near && level(d))
+        let abreast = |d: Vec3| dot(d, chord).abs() <= 0.5 * dot(chord, chord) || chord == [0.0; 3];
+        [0, a.len() - 1].map(|i| sub(b[i], a[i])).into_iter().all(|d| norm(d) < near && abreast(d))
     };
     for line in lines {
-        let beside = |(i, (_, points)): (usize, &(SingularLine, Vec<Vec3>))| {
+        let adjacent = |(i, (_, points)): (usize, &(SingularLine, Vec<Vec3>))| {
             let other = matched(points, &line.points);
             close(points, &other).then_some((i, other))
         };
-        let Some((i, other)) = kept.iter().enumerate().find_map(beside) else {
+        let Some((i, other)) = kept.iter().enumerate().find_map(adjacent) else {
             kept.push((line.clone(), line.points));
             continue;
         };
