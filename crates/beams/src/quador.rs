@@ -29,6 +29,7 @@ use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, add, norm, scale, sub};
 use geometry::progress::{Cancellation, checkpoint};
 
+mod active_in_box;
 mod bezier;
 mod block_fill;
 mod boundary_form;
@@ -44,6 +45,7 @@ mod foot;
 mod gauss;
 mod hub;
 mod hub_classes;
+mod hub_in_box;
 mod hub_mesh;
 mod hub_quadric;
 mod integral;

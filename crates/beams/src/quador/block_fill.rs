@@ -1,10 +1,8 @@
 //! The field at all nodes of a structured block: the hubs that can matter are found for parts of it instead of for each node.
 
 use super::Quadors;
-use geometry::math::{Aabb, Interval, Vec3, norm};
-
-/// Parts of a block of at most this many nodes are not divided.
-const FEW_NODES: usize = 32;
+use super::hub_in_box::{HubInBox, MOST_POINTS};
+use geometry::math::{Aabb, Interval, norm};
 
 /// Which nodes of a block need which values.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +23,7 @@ struct Fill<'a> {
     /// Diagonal of the largest grid cell, mm.
     diagonal: f64,
     /// The hubs of the parts from the whole block to the present one.
-    hubs: Vec<u32>,
+    hubs: Vec<HubInBox>,
     out: &'a mut [f32],
 }
 
@@ -41,9 +39,11 @@ impl Quadors {
         let mut fill = Fill { quadors: self, axes, wanted, around, diagonal: norm(widest), hubs: Vec::new(), out };
         let shape = axes.map(<[f64]>::len);
         let bounds = fill.bounds([0; 3], shape);
-        self.index.about(&bounds, &mut |near| fill.hubs.extend_from_slice(near));
-        fill.hubs.sort_unstable();
-        fill.hubs.dedup();
+        let mut hubs = Vec::new();
+        self.index.about(&bounds, &mut |near| hubs.extend_from_slice(near));
+        hubs.sort_unstable();
+        hubs.dedup();
+        fill.hubs.extend(hubs.into_iter().map(HubInBox::anywhere));
         fill.part([0; 3], shape, 0);
     }
 }
@@ -57,21 +57,21 @@ impl Fill<'_> {
     /// Fills the nodes from `lo` up to `hi`. The hubs from number `first` on are all that can matter there.
     fn part(&mut self, lo: [usize; 3], hi: [usize; 3], first: usize) {
         if !self.is_wanted(lo, hi) {
-            return self.each(lo, hi, |fill, _| fill.quadors.cap);
+            return self.constant(lo, hi, self.quadors.cap);
         }
         let bounds = self.bounds(lo, hi);
         let own = self.hubs.len();
         let range = self.cull(&bounds, first);
         let sign = if range.lo > 0.0 { 1.0 } else { -1.0 };
         if own == self.hubs.len() {
-            self.each(lo, hi, |fill, _| fill.quadors.cap);
+            self.constant(lo, hi, self.quadors.cap);
         } else if self.wanted.near && (range.lo > 0.0 || range.hi < 0.0) {
             let far = sign * range.lo.abs().min(range.hi.abs()).max(self.diagonal);
-            self.each(lo, hi, |_, _| far);
+            self.constant(lo, hi, far);
         } else {
             let size = [0, 1, 2].map(|a| hi[a] - lo[a]);
-            if size.iter().product::<usize>() <= FEW_NODES {
-                self.each(lo, hi, |fill, p| fill.quadors.value_among(p, &fill.hubs[own..]));
+            if size.iter().product::<usize>() <= MOST_POINTS {
+                self.values(lo, hi, own);
             } else {
                 let length = |a: usize| self.axes[a][hi[a] - 1] - self.axes[a][lo[a]];
                 let longest =
@@ -92,10 +92,9 @@ impl Fill<'_> {
         let mut range = Interval::new(self.quadors.cap, self.quadors.cap);
         let mut lows = Vec::with_capacity(own - first);
         for n in first..own {
-            let hub = self.hubs[n];
-            let apart = self.quadors.apart(hub, bounds);
+            let apart = self.quadors.apart(self.hubs[n].hub, bounds);
             if apart == 0.0 || apart < range.hi {
-                let of = self.quadors.hub_bound(hub as usize, bounds);
+                let (hub, of) = self.quadors.hub_in_box(&self.hubs[n], bounds);
                 range = range.min(of);
                 lows.push(of.lo);
                 self.hubs.push(hub);
@@ -120,14 +119,40 @@ impl Fill<'_> {
         (lo[2]..hi[2]).any(|k| (lo[1]..hi[1]).any(|j| words[k * self.axes[1].len() + j] & mask != 0))
     }
 
-    fn each(&mut self, lo: [usize; 3], hi: [usize; 3], value: impl Fn(&Self, Vec3) -> f64) {
-        let [nx, ny] = [0, 1].map(|a| self.axes[a].len());
+    fn row(&mut self, lo: [usize; 3], hi: [usize; 3], j: usize, k: usize) -> &mut [f32] {
+        let row = (k * self.axes[1].len() + j) * self.axes[0].len();
+        &mut self.out[row + lo[0]..row + hi[0]]
+    }
+
+    fn constant(&mut self, lo: [usize; 3], hi: [usize; 3], value: f64) {
+        for k in lo[2]..hi[2] {
+            for j in lo[1]..hi[1] {
+                self.row(lo, hi, j, k).fill(value as f32);
+            }
+        }
+    }
+
+    /// Fills few nodes with the least values of the hubs from number `first` on.
+    fn values(&mut self, lo: [usize; 3], hi: [usize; 3], first: usize) {
+        let mut points = [[0.0; MOST_POINTS]; 3];
+        let mut n = 0;
         for k in lo[2]..hi[2] {
             for j in lo[1]..hi[1] {
                 for i in lo[0]..hi[0] {
-                    self.out[(k * ny + j) * nx + i] =
-                        value(self, [self.axes[0][i], self.axes[1][j], self.axes[2][k]]) as f32;
+                    (points[0][n], points[1][n], points[2][n]) = (self.axes[0][i], self.axes[1][j], self.axes[2][k]);
+                    n += 1;
                 }
+            }
+        }
+        let mut least = [self.quadors.cap; MOST_POINTS];
+        for hub in &self.hubs[first..] {
+            self.quadors.lower(hub, points.each_ref().map(|p| &p[..n]), &mut least[..n]);
+        }
+        let mut rows = least.chunks(hi[0] - lo[0]);
+        for k in lo[2]..hi[2] {
+            for j in lo[1]..hi[1] {
+                let values = rows.next().unwrap_or_default();
+                self.row(lo, hi, j, k).iter_mut().zip(values).for_each(|(out, v)| *out = *v as f32);
             }
         }
     }
@@ -172,6 +197,29 @@ mod tests {
                             assert!(near[n] == v || far && !crossed, "{fillet:?} {step}: {} {v}", near[n]);
                         }
                     }
+                }
+            }
+        }
+    }
+
+    /// Stars of few and of many half-beams, where one, two or more are active in a part.
+    #[test]
+    fn a_block_has_the_values_of_its_nodes_to_the_last_bit_about_random_hubs() {
+        let mut random = tests::Random(11);
+        for n in [1, 2, 3, 5, 8, 14] {
+            for fillet in [Fillet::None, Fillet::Auto, Fillet::Tau(0.9), Fillet::Radius(0.2)] {
+                let q = Quadors::new(&tests::random_star(&mut random, n), fillet).expect("a star");
+                let step = 0.03 + 0.2 * random.next();
+                let axes = [(); 3].map(|()| {
+                    let from = 6.0 * random.next() - 5.0;
+                    (0..24).map(|i| from + step * f64::from(i)).collect::<Vec<f64>>()
+                });
+                let mut out = vec![f32::NAN; 24 * 24 * 24];
+                q.fill(axes.each_ref().map(Vec::as_slice), Wanted { nodes: None, near: false }, &mut out);
+                for (at, v) in out.iter().enumerate() {
+                    let p = [at % 24, at / 24 % 24, at / 576];
+                    let p = [0, 1, 2].map(|a| axes[a][p[a]]);
+                    assert_eq!(v.to_bits(), (q.value(p) as f32).to_bits(), "{n} {fillet:?} {step}: {p:?}");
                 }
             }
         }

@@ -18,8 +18,8 @@ impl Quadors {
     /// Length derived from q = S − N: ρ − a around a cylinder of the typical radius a. Outside it increases no faster
     /// than the distance; inside it is proportional to q, since a square root would not be smooth.
     #[inline]
-    fn length(&self, q: f64) -> f64 {
-        if q < 0.0 { q / (2.0 * self.scale) } else { q / ((q + self.scale * self.scale).sqrt() + self.scale) }
+    pub(super) fn length(&self, q: f64) -> f64 {
+        q / if q < 0.0 { 2.0 * self.scale } else { (q + self.scale * self.scale).sqrt() + self.scale }
     }
 
     /// The field at one point, mm.
@@ -65,7 +65,7 @@ impl Quadors {
 
     /// The value of a hub at x in its frame, if less than `least`; else that or more.
     #[inline]
-    fn below(&self, hub: &Hub, x: Vec3, least: f64) -> f64 {
+    pub(super) fn below(&self, hub: &Hub, x: Vec3, least: f64) -> f64 {
         hub.with_g(x, |g| {
             let from_center = dot(x, x);
             let square = from_center - hub.radius * hub.radius;
@@ -126,53 +126,6 @@ impl Quadors {
         let of = &self.balls[hub as usize].bounds;
         let apart = [0, 1, 2].map(|a| (of.min[a] - b.max[a]).max(b.min[a] - of.max[a]).max(0.0));
         dot(apart, apart).sqrt()
-    }
-
-    /// The range of one hub's value over a box.
-    pub(crate) fn hub_bound(&self, i: usize, b: &Aabb) -> Interval {
-        let ball = &self.balls[i];
-        let hub = self.hub(i);
-        let half = scale(b.size(), 0.5);
-        let x = sub(b.center(), ball.center);
-        let h2 = dot(half, half);
-        let reach = |g: Vec3| g[0].abs() * half[0] + g[1].abs() * half[1] + g[2].abs() * half[2];
-        let (q, g) = hub.gradient(x);
-        // N is convex: S − N lies below its tangent plus |δ|². Its second derivative is at most twice the curvature
-        // bound.
-        let hi = q + reach(g) + h2;
-        let lo = if hub.sharp() {
-            let s = dot(x, x) - ball.radius * ball.radius;
-            let ball_lo = s - reach(scale(x, 2.0));
-            hub.half_beams.iter().fold(ball_lo, |lo, half_beam| {
-                let g = half_beam.g.at(x);
-                if g + reach(half_beam.g.a) <= 0.0 {
-                    return lo;
-                }
-                let slope = sub(scale(x, 2.0), scale(half_beam.g.a, 2.0 * g));
-                let curvature = (dot(half_beam.g.a, half_beam.g.a) - 1.0).max(0.0);
-                lo.min(s - g * g - reach(slope) - curvature * h2)
-            })
-        } else {
-            q - reach(g) - (ball.curvature - 1.0).max(0.0) * h2
-        };
-        let (mut lo, mut hi) = (self.length(lo), self.length(hi));
-        let past = hub.half_beams.iter().fold(f64::NEG_INFINITY, |m: f64, s| {
-            let along = dot(s.axis, x) + reach(s.axis) - s.cut;
-            m.max(along.min(s.g.at(x) + reach(s.g.a)))
-        });
-        hi = hi.max(past);
-        let farthest = [0, 1, 2].map(|a| (ball.bounds.min[a] - b.min[a]).max(b.max[a] - ball.bounds.max[a]).max(0.0));
-        let apart = self.apart(i as u32, b);
-        if apart > 0.0 {
-            lo = lo.max(apart);
-        }
-        let farthest = dot(farthest, farthest).sqrt();
-        if farthest > 0.0 {
-            hi = hi.max(farthest);
-        }
-        // Lengths are computed from squares: a few roundings of the largest.
-        let slack = 1e-12 * (1.0 + dot(x, x) / self.scale);
-        Interval::new(lo - slack, hi + slack)
     }
 }
 

@@ -8,7 +8,7 @@ use geometry::math::{Vec3, add, dot, scale, sub};
 use super::hub::{AffineFunction, Hub};
 
 /// g above Ry by less than this part of the largest g does not make a half-beam active: rounding.
-const ROUNDING: f64 = 1e-14;
+pub(super) const ROUNDING: f64 = 1e-14;
 /// Number of active half-beams for which no memory is allocated.
 const FEW: usize = 8;
 /// Number of half-beams of a hub for which no memory is allocated.
