@@ -34,6 +34,22 @@ def test_files_made_by_numpy_are_read(tmp_path):
         design(lt.map.affine(wavelength=3), lt.level.fraction({"grid": {**grid["grid"], "step": 1}})).build()
 
 
+@pytest.mark.parametrize("step", [0.2, 1.6])
+def test_an_image_that_leaves_some_of_the_region_out_is_refused(tmp_path, step):
+    """As a mesh or a grid is: beyond it there would be the numbers at its edge. Such as of a file in cm."""
+    values = " ".join("0.3" for _ in range(7**3))
+    (tmp_path / "field.vti").write_text(
+        f'<VTKFile type="ImageData"><ImageData WholeExtent="0 6 0 6 0 6" Origin="0 0 0" Spacing="{step} {step} {step}">'
+        '<Piece Extent="0 6 0 6 0 6"><PointData><DataArray type="Float64" Name="f" format="ascii">'
+        f"{values}</DataArray></PointData></Piece></ImageData></VTKFile>"
+    )
+    field = lt.grade.field(str(tmp_path / "field.vti"), array="f")
+    with pytest.raises(lt.DesignError, match="the grid does not cover .* of the region; .* give another as unit"):
+        design(lt.map.affine(wavelength=3), lt.level.fraction(field)).build()
+    whole = {"field": {**field["field"], "unit": "cm"}}
+    assert design(lt.map.affine(wavelength=3), lt.level.fraction(whole)).build().report()["lattices"]["core"]["fraction"] == 0.3
+
+
 def test_a_map_that_folds_is_refused_and_can_be_allowed():
     turn = lt.grade.formula("170*tanh(2*(x-6))")
     with pytest.raises(lt.DesignError, match="folds at"):

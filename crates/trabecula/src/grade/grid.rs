@@ -1,7 +1,7 @@
 //! Numbers on a grid from a file: arrays, images, stacks of pictures.
 
 use super::remapped::sampled;
-use super::result::{percent, pick};
+use super::result::{not_covered, pick};
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension, names_pictures, picture_stack};
 use crate::kind::{DesignError, Kind, OneOrThree};
@@ -105,19 +105,9 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
         "path" => wrong(f),
         _ => DesignError::fault(path, f),
     })?;
-    // A number also covers half a step about it.
-    let reach = samples.step().into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
-    let covered = samples.bounds().grown(reach);
-    let missing = environment.points.iter().filter(|p| covered.distance(**p) > 0.0).count();
-    if missing > 0 {
-        let (b, share) = (samples.bounds(), missing as f64 / environment.points.len() as f64);
-        let message = format!(
-            "{}: the grid does not cover {} of the region; it reaches from {:?} to {:?} mm",
-            spec.path,
-            percent(share),
-            b.min,
-            b.max
-        );
+    let share = samples.uncovered(environment.points);
+    if share > 0.0 {
+        let message = not_covered(&spec.path, "grid", share, &samples.bounds());
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     Ok(samples)

@@ -101,6 +101,12 @@ pub(super) fn percent(share: f64) -> String {
     if share >= 0.01 { format!("{:.0} %", 100.0 * share) } else { format!("{:.2} %", 100.0 * share) }
 }
 
+/// What is wrong with numbers that leave a share of the region without one.
+pub(super) fn not_covered(file: &str, what: &str, share: f64, reach: &Aabb) -> String {
+    let (share, [from, to]) = (percent(share), [reach.min, reach.max]);
+    format!("{file}: the {what} does not cover {share} of the region; it reaches from {from:?} to {to:?} mm")
+}
+
 fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
     let made = columns(spec, path, environment, |array| {
         let invariant = invariant(spec, path, array)?;
@@ -225,6 +231,11 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
         );
         return Err(DesignError::new(format!("{path}.array"), message));
     }
+    let uncovered = |what: &str, share: f64, reach: Aabb| {
+        let ask = if spec.unit.is_none() { "; is that its unit? give another as unit, such as \"m\"" } else { "" };
+        let message = format!("{}{ask}", not_covered(&spec.path, what, share, &reach));
+        DesignError::new(&at, message).found(&spec.path)
+    };
     let unit = spec.unit.map_or(1.0, Unit::in_mm);
     let (count, number) = choose(array)?;
     let column = |c: usize| array.values.chunks_exact(array.components).map(|t| number(t, c)).collect::<Vec<f64>>();
@@ -241,7 +252,11 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
                 (origin, nodes)
             };
             let made = (0..count).map(|c| Samples::new(origin, step, shape, column(c)));
-            return made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong);
+            let made = made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong)?;
+            return match made.iter().map(|of| (of.uncovered(environment.points), of.bounds())).next() {
+                Some((share, reach)) if share > 0.0 => Err(uncovered("grid", share, reach)),
+                _ => Ok(made),
+            };
         }
     };
     // Values of cells go to their corners, weighted by volume.
@@ -267,16 +282,7 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     let (made, share) =
         Samples::meshed(&points, &tets, &values, &environment.region.bounds(), environment.points).map_err(wrong)?;
     if share > UNCOVERED {
-        let b = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-        let message = format!(
-            "{}: the mesh does not cover {} of the region; it reaches from {:?} to {:?} mm{}",
-            spec.path,
-            percent(share),
-            b.min,
-            b.max,
-            if spec.unit.is_none() { "; is that its unit? give another as unit, such as \"m\"" } else { "" }
-        );
-        return Err(DesignError::new(at, message).found(&spec.path));
+        return Err(uncovered("mesh", share, points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))));
     }
     Ok(made)
 }

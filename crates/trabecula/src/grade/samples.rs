@@ -83,6 +83,13 @@ impl Samples {
         Aabb { min: self.origin, max: far }
     }
 
+    /// The share of points that no number covers: a number also covers half a step about it.
+    pub(super) fn uncovered(&self, points: &[Vec3]) -> f64 {
+        let reach = self.step.into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
+        let covered = self.bounds().grown(reach);
+        points.iter().filter(|p| covered.distance(**p) > 0.0).count() as f64 / points.len() as f64
+    }
+
     /// Steps between nodes, mm.
     pub fn step(&self) -> Vec3 {
         self.step
@@ -270,7 +277,7 @@ impl Samples {
         }
         let found: Vec<bool> = out[0].iter().map(|v| !v.is_nan()).collect();
         if !found.contains(&true) {
-            return Err(Fault::new("path", "the mesh does not meet the region; are its coordinates in mm?"));
+            return Ok((Vec::new(), 1.0));
         }
         let node = |p: &Vec3| -> [usize; 3] {
             core::array::from_fn(|a| ((p[a] - bounds.min[a]) / step[a]).clamp(0.0, (shape[a] - 1) as f64) as usize)
