@@ -336,6 +336,8 @@ def test_bad_layers_are_refused(arguments, why):
         ("a.png", {}, "the name must end in .cli, .svg, .3mf, .sl1, .zip, .tif, .npy"),
         ("a.zip", {}, "give pixel"),
         ("a.cli", {"pixel": 0.1}, "pixel and size are for pictures"),
+        ("a.svg", {"size": (40, 80)}, "pixel and size are for pictures (.sl1, .zip, .tif, .npy)"),
+        ("a.tif", {"pixel": 1.0, "exposure": (5.0, 9.0)}, "exposure is for .sl1"),
         ("a.svg", {"binary": True}, "binary is for .cli"),
         ("a.zip", {"pixel": 1e-7}, "at most 1048576 are possible"),
         ("a.npy", {"pixel": 2e-5}, "of memory for pictures"),
@@ -355,6 +357,10 @@ def test_the_command_slices_a_design(cube, tmp_path):
     assert found["contours"] == sum(len(loops) for _, loops in read_cli(out.read_bytes()))
     text = in_process("slice", cube, "-o", tmp_path / "cube.zip", "--layer", 2, "--pixel", 0.1)
     assert "4 layers of 2 mm" in text
+    stack = tmp_path / "cube.npy"
+    in_process("slice", cube, "-o", stack, "--layer", 2, "--pixel", 0.1, "--size", "100x120")
+    wide = np.load(stack)
+    assert wide.shape == (100, 120, 4) and not wide[:10].any() and not wide[:, :20].any() and wide[10:90, 20:100].any()
     one = json.loads(in_process("slice", cube, "--z", 1, "-o", tmp_path / "one.svg", "--json"))
     assert one["area"] > 10 and "<path" in (tmp_path / "one.svg").read_text()
 

@@ -100,14 +100,23 @@ GIGABYTES = number("a size in GB", lambda v: 0.001 <= v <= 1e6, " from 0.001 to 
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
 
+def pixels(text: str) -> tuple[int, int]:
+    """WIDTHxHEIGHT in pixels."""
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, found {text!r}")
+    return int(parts[0]), int(parts[1])
+
+
 def size(text: str) -> tuple[float, float, str]:
     """WIDTHxHEIGHT in pixels, or with mm behind it in mm, where the height is three quarters of the width unless given."""
     small = text.lower()
-    parts = small.removesuffix("mm").split("x")
     if not small.endswith("mm"):
-        if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
-            raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, or WIDTHmm, found {text!r}")
-        return int(parts[0]), int(parts[1]), "px"
+        try:
+            return *pixels(text), "px"
+        except argparse.ArgumentTypeError as e:
+            raise argparse.ArgumentTypeError(str(e).replace(", found", ", or WIDTHmm, found", 1)) from None
+    parts = small.removesuffix("mm").split("x")
     try:
         wide, high = [float(p) for p in parts] if len(parts) == 2 else (float(parts[0]), 0.75 * float(parts[0]))
     except ValueError:
@@ -506,8 +515,8 @@ COMMANDS = {
         option("--least", type=LENGTH, metavar="MM", help="thinnest adaptive layer, mm (default: a quarter of --layer)"),
         option("--binary", action="store_true", help="write .cli as bytes"),
         option("--pixel", type=LENGTH, metavar="MM", help="edge of a pixel of pictures, mm"),
-        option("--size", type=size, metavar="WxH", help="pixels of pictures, the part in the middle (default: the part)"),
-        option("--exposure", type=exposure, default=(8.0, 35.0), metavar="S,S", help="of layers and first ones, s (8,35)"),
+        option("--size", type=pixels, metavar="WxH", help="pixels of pictures, the part in the middle (default: the part)"),
+        option("--exposure", type=exposure, metavar="S,S", help="of layers and first ones of .sl1, s (default: 8,35)"),
         option("--beams", metavar="NAME", help="the beams to cut in arcs, of several"),
         option("--chord", type=LENGTH, metavar="MM", help="chord error of drawn arcs, mm (default: 0.01)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),

@@ -106,15 +106,16 @@ class Layers(Sequence):
         binary: bool = False,
         pixel: float | None = None,
         size: tuple[int, int] | None = None,
-        exposure: tuple[float, float] = (8.0, 35.0),
+        exposure: tuple[float, float] | None = None,
         progress: Progress | None = None,
     ) -> LayersReport:
         """Writes all layers to a file and gives its figures; a few layers are held in memory at a time.
 
         ``path`` ends in .cli (``binary`` or text), .svg, .3mf (slices), or for pictures in .zip (PNG and a manifest), .sl1
-        (resin printers) or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey is the
+        (resin printers), .tif or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey is the
         exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without it they
-        are as large as the region. ``exposure`` (s, of layers and of the first ones) is for .sl1.
+        are as large as the region. ``exposure`` (s, of layers and of the first ones; 8 and 35 unless given) is
+        for .sl1.
         """
         kind = extension(path, LAYER_WRITES)
         row = LAYERS[kind]
@@ -127,8 +128,11 @@ class Layers(Sequence):
         if row.pictures:
             raster = self._raster(kind, pixel, size)
         elif pixel is not None or size is not None:
-            raise ValueError(f"pixel and size are for pictures (.zip, .sl1, .npy); a .{kind} holds contours")
-        times = [positive("exposure", t) for t in exposure]
+            pictures = ", ".join(f".{name}" for name, of in LAYERS.items() if of.pictures)
+            raise ValueError(f"pixel and size are for pictures ({pictures}); a .{kind} holds contours")
+        if exposure is not None and kind != "sl1":
+            raise ValueError(f"exposure is for .sl1; a .{kind} holds no times")
+        times = [positive("exposure", t) for t in exposure or (8.0, 35.0)]
         check_place(path)
         if special(os.fsdecode(path)):
             raise ValueError(f"{os.fsdecode(path)} is a device or a pipe; layers are written to a file")
