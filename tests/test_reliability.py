@@ -72,6 +72,26 @@ def test_an_interrupt_ends_a_solve(tmp_path, words):
     assert run.returncode in (130, -signal.SIGINT) and not (tmp_path / "out.stl").exists()
 
 
+def test_an_interrupt_ends_a_volume_mesh(tmp_path):
+    """Within seconds, in the middle of a stage that takes minutes."""
+    script = """
+        import os, signal, sys, threading, time
+        import trabecula as lt
+
+        core = lt.Lattice("gyroid", "sheet", lt.map.affine(2), lt.level.fraction(0.3))
+        solid = lt.Design(region=lt.region.box([30, 30, 30]), lattice=core).build()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        threading.Timer(4.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            solid.volume_mesh(edge=0.12)
+            sys.exit("it was made before the interrupt")
+        except KeyboardInterrupt:
+            sys.exit("it took long" if time.process_time() > 40 else None)
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("kind", ["obj", "off", "ply"])
 def test_contents_of_other_files_are_not_shown(tmp_path, kind):
     """A path may lead to a file that is nobody's business."""

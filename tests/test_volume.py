@@ -167,6 +167,53 @@ def test_curved_regions_skins_and_keep_zones():
     assert np.hypot(middle[:, 0], middle[:, 1]).max() < 1 and {"SKIN", "Z0", "Z1", "CUT", "LATTICE"} <= set(mesh.sets)
 
 
+def test_flat_faces_of_a_mesh_at_its_bounds_are_sets(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box([8, 8, 8]).export(tmp_path / "cube.stl")
+    region = lt.region.mesh(str(tmp_path / "cube.stl"))
+    part = lt.Lattice("primitive", "lower", lt.map.affine(4), lt.level.fraction(0.5))
+    mesh = lt.Design(region=region, lattice=part).build().volume_mesh(edge=0.8)
+    own = solid("primitive", "lower", 0.5, lt.region.box([8, 8, 8])).volume_mesh(edge=0.8)
+    for axis in range(3):
+        for side, at in (("0", -4), ("1", 4)):
+            name = "XYZ"[axis] + side
+            assert np.allclose(mesh.nodes[faces_of(mesh, mesh.sets[name].faces)][..., axis], at, atol=1e-5)
+            # The cut of the lattice by the plane is that of a box, within the squares of chords.
+            assert area_of(mesh, name) == pytest.approx(area_of(own, name), rel=0.03)
+
+
+def test_what_is_left_out_and_far_from_the_surface_is_warned_of():
+    text = """
+        schema = 1
+        [region]
+        difference = [
+          { cylinder = { base = [0, 0, 0], radius = 8, height = 4 } },
+          { cylinder = { base = [0, 0, -1], radius = 4, height = 6 } },
+        ]
+        [lattice.a]
+        part = "lower"
+        cell.tet.name = "iwp"
+        map.tets.size = 4
+        level.fraction = 0.3
+    """
+    with pytest.warns(lt.DesignWarning) as found:
+        mesh = lt.Design.from_toml(text).build().volume_mesh(edge=0.4)
+    words = " ".join(str(w.message) for w in found)
+    assert (
+        mesh.report().dropped > 0.005 * mesh.report().volume and "is left out where the solid is thinner than an edge" in words
+    )
+    assert "mm off the surface" in words
+
+
+def test_a_size_that_nobody_gave_is_bounded(monkeypatch):
+    part = solid("gyroid", "sheet", 0.3, lt.region.box([8, 8, 8]))
+    full = part.volume_mesh()
+    monkeypatch.setattr("trabecula.simulated.MOST_TETS", 2e4)
+    with pytest.warns(lt.DesignWarning, match=r"an edge of .* mm is used: two edges through the thinnest wall .* give an edge"):
+        fewer = part.volume_mesh()
+    assert len(fewer.elements) < 0.6 * len(full.elements)
+
+
 def test_the_same_bytes_for_any_number_of_threads():
     one, two = (solid(region=lt.region.sphere(radius=2.5)).volume_mesh(edge=0.25, threads=n) for n in (1, 3))
     assert one.nodes.tobytes() == two.nodes.tobytes() and one.elements.tobytes() == two.elements.tobytes()

@@ -32,6 +32,8 @@ STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
 PERMEABILITY_BYTES = 1300
 #: Short edges of a volume mesh's tetrahedra as a fraction of the long ones.
 SHORT_EDGE = math.sqrt(0.75)
+#: Most tetrahedra of a volume mesh for which no size was given: about 2 GB.
+MOST_TETS = 5e6
 
 
 class Simulated:
@@ -62,7 +64,7 @@ class Simulated:
 
         One size: ``edge`` (mm), the longest edge of most tetrahedra; ``per_cell``, edges along the smallest wavelength;
         ``wall``, edges through the thinnest wall or neck. Without one, two through the thinnest wall, at least 16 along the
-        wavelength.
+        wavelength; where that makes more than 5 million tetrahedra, longer ones that the thinnest wall allows, with a warning.
 
         ``order`` 2 gives quadratic tetrahedra, the nodes of boundary edges on the surface. Nodes of linear
         ones are shifted off curved surfaces by about half the distance of a chord, so that the volume is kept.
@@ -85,6 +87,17 @@ class Simulated:
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
         count = 12 * max(part, 0.02) * region / size**3
+        if count > MOST_TETS and edge is None and per_cell is None and wall is None:
+            usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
+            used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
+            if used > size:
+                warnings.warn(
+                    f"an edge of {used:g} mm is used: two edges through the thinnest wall ({size:.3g} mm) would make about "
+                    f"{count:.2g} tetrahedra; give an edge to have them",
+                    DesignWarning,
+                    stacklevel=2,
+                )
+                size, count = used, count * (size / used) ** 3
         if count > 3e8:
             raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
         fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
@@ -142,16 +155,18 @@ class Simulated:
             warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
         return made
 
+    def _thinnest_wall(self) -> tuple[str, float]:
+        """Where the thinnest wall is, and its thickness (mm); infinite where none is known."""
+        walls = self._thinnest if self.skin is None else {**self._thinnest, "skin": self.skin}
+        return min(walls.items(), key=lambda item: item[1], default=("", math.inf))
+
     def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
         """The edge (mm) of a request for a volume mesh."""
         if sum(v is not None for v in (edge, per_cell, wall)) > 1:
             raise ValueError("give one of edge, per_cell and wall")
-        walls = dict(self._thinnest)
-        if self.skin is not None:
-            walls["skin"] = self.skin
-        where, thin = min(walls.items(), key=lambda item: item[1], default=("", math.inf))
+        where, thin = self._thinnest_wall()
         if wall is not None:
-            if not walls:
+            if not where:
                 raise ValueError("wall: the thinnest wall of this design is not known; give edge, mm")
             size = thin / positive("wall", wall)
         elif edge is None and per_cell is None:

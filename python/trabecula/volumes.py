@@ -38,6 +38,8 @@ __all__ = ["ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 OF = ("solid", "pore", "lower", "upper", "all")
 #: Dihedral angles (degrees) outside of which tetrahedra are warned of.
 SHARP, FLAT = 12, 160
+#: Volume left out, as a share of the mesh, and distance from the surface, as a share of the edge, that are warned of.
+LEFT_OUT, FAR = 0.005, 0.3
 #: Bytes for each tetrahedron: the background, the cut mesh and its faces while they are sorted.
 TET_BYTES = 420
 #: Bytes for each voxel of the grid: its fraction, its piece, and nodes and faces of those that are elements.
@@ -394,8 +396,18 @@ def _resultant(name: str, value: Sequence[float]) -> list[float]:
 
 
 def warn_flaws(made: VolumeMesh, one: bool) -> None:
-    """Warns of several components, if there should be ``one``, of surfaces that cross, and of badly shaped tetrahedra."""
+    """Warns of several components, if there should be ``one``, of what was left out, of faces far from the surface, of surfaces that
+    cross, and of badly shaped tetrahedra."""
     figures, found = made.report(), []
+    if figures.dropped > LEFT_OUT * figures.volume:
+        share = 100 * figures.dropped / (figures.volume + figures.dropped)
+        found += [
+            f"{figures.dropped:.3g} mm³ ({share:.2g} %) is left out where the solid is thinner than an edge; use a smaller edge"
+        ]
+    if figures.deviation > FAR * max(figures.edge):
+        found += [
+            f"the boundary is up to {figures.deviation:.2g} mm off the surface: the edge is too long for it; use a smaller one"
+        ]
     if one and figures.pieces > 1:
         found += [f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another"]
     crossing = made.boundary().self_intersections

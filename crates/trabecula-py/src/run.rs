@@ -82,7 +82,8 @@ pub fn run_apart<T: Send + 'static>(
     })
 }
 
-/// Runs `work` on `threads` threads (all processors if `None`), calling `tell(done, total)` now and then.
+/// Runs `work` on `threads` threads (all processors if `None`), calling `tell(done, total)` now and then. An interrupt ends it at its
+/// next report of progress or checkpoint.
 pub fn run<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -95,11 +96,13 @@ pub fn run<T: Send>(
     py.detach(|| {
         std::thread::scope(|scope| {
             let (finished, waiting) = channel::<()>();
+            let request = Cancellation::default();
+            let asked = request.clone();
             let work = move || {
                 let _finished = finished; // dropped, and so signalled, even if the work panics
                 match pool {
-                    Some(pool) => pool.install(|| work(shared)),
-                    None => work(shared),
+                    Some(pool) => pool.install(|| asked.run(|| work(shared))),
+                    None => asked.run(|| work(shared)),
                 }
             };
             let worker = std::thread::Builder::new().spawn_scoped(scope, work)?;
@@ -123,13 +126,14 @@ pub fn run<T: Send>(
                 });
                 if let Err(e) = news {
                     shared.stop.store(true, Relaxed);
+                    request.cancel();
                     raised = Some(e);
                 }
             }
             let result = worker.join().map_err(error::internal);
             match raised {
                 Some(e) => Err(e),
-                None => result,
+                None => result?.ok_or_else(|| PyKeyboardInterrupt::new_err(())),
             }
         })
     })

@@ -5,7 +5,7 @@
 
 use geometry::fault::{Fault, number};
 use geometry::fe_mesh::FeMesh;
-use geometry::math::{Aabb, Vec3};
+use geometry::math::{Aabb, Vec3, norm, sub};
 use geometry::progress::{Progress, Stopped};
 use geometry::tetmesh::FACES;
 use rayon::prelude::*;
@@ -138,7 +138,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     if options.order == 1 {
         shaping.balance();
     }
-    let mut made = assembled(shaping, &domains, &planes, named, options).map_err(Stopped::Refused)?;
+    let mut made = assembled(shaping, &domains, (&planes, &bounds), named, options).map_err(Stopped::Refused)?;
     (made.dropped, made.step) = (dropped, cubes.step());
     Ok(made)
 }
@@ -182,7 +182,7 @@ fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Parti
 fn assembled(
     shaping: Shaping,
     domains: &Domains,
-    planes: &Planes,
+    (planes, bounds): (&Planes, &Aabb),
     named: &Named,
     options: &Options,
 ) -> Result<Made, Fault> {
@@ -227,7 +227,7 @@ fn assembled(
     };
     let names = domains.names.iter().map(|n| n.to_string()).collect();
     let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, sets: Vec::new(), pairs, period };
-    named_sets::add_sets(&mut mesh, domains, &faces, planes, named.bodies);
+    named_sets::add_sets(&mut mesh, domains, &faces, (planes, bounds), named.bodies);
     let empty = named_sets::add_regions(&mut mesh, &faces, named.sets);
     // A region of the solid's surface may hold none of a fluid's.
     if let (Some(fault), Of::Solid | Of::All) = (empty, options.of) {
@@ -273,7 +273,8 @@ fn faces_on_surfaces(tets: &[[u32; 4]], domain: &[u8], on: &[SurfaceSet]) -> Vec
     found
 }
 
-/// The greatest distance of faces from their surfaces, at corners, edges and centroids.
+/// The greatest distance of faces from their surfaces, at corners, edges and centroids: to first order, and at most the longest edge
+/// of the face, whose corners were put on the surface.
 fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], domains: &Domains) -> f64 {
     let mut by_surface: Vec<(usize, (u32, u8))> = faces
         .iter()
@@ -304,7 +305,14 @@ fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], domains: &D
                     }
                 })
                 .collect();
-            most = distances(&domains.surfaces[same[0].0], &points).fold(most, |m, d| m.max(d.abs()));
+            let per = points.len() / same.len();
+            let limits = same.iter().flat_map(|(_, f)| {
+                let [p, q, r] = mesh.face(*f).map(|n| mesh.nodes[n as usize]);
+                let longest = norm(sub(p, q)).max(norm(sub(q, r))).max(norm(sub(p, r)));
+                core::iter::repeat_n(longest, per)
+            });
+            let off = distances(&domains.surfaces[same[0].0], &points);
+            most = off.zip(limits).fold(most, |m, (d, limit)| m.max(d.abs().min(limit)));
         }
         most
     };

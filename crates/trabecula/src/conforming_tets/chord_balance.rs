@@ -7,13 +7,19 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::node_surfaces::{SurfaceSet, balanced, members};
+use super::node_surfaces::{SurfaceSet, balanced, members, only};
 use super::partition::images;
 use super::shaping::{GONE, GOOD, Shaping};
 use super::tet_shape::shape;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, norm, scale, sub};
 use geometry::tetmesh::FACES;
+
+/// Largest distance of a chord's midpoint from the surface that is believed, as a fraction of the chord: that of half a circle. A value
+/// over a gradient that nearly vanishes says nothing.
+const DEEPEST: f64 = 0.5;
+/// Shifts of more than this part of the root of the area around a node are refused where they leave the region.
+const FAR: f64 = 0.05;
 
 /// Faces of the boundary and between domains, each once: its nodes, four times its tetrahedron (of the first domain) and the opposite
 /// corner, and whether no other tetrahedron has it. Only faces whose nodes all `may` be on one are searched.
@@ -75,7 +81,9 @@ impl Shaping<'_> {
                 for same in chunk.chunk_by(|a, b| a.0 == b.0) {
                     let at = |n: u32| self.nodes[n as usize];
                     let points: Vec<Vec3> = same.iter().map(|(_, [a, b])| scale(add(at(*a), at(*b)), 0.5)).collect();
-                    out.extend(distances(&self.surfaces[same[0].0], &points));
+                    let lengths = same.iter().map(|(_, [a, b])| norm(sub(at(*a), at(*b))));
+                    let off = distances(&self.surfaces[same[0].0], &points);
+                    out.extend(off.zip(lengths).map(|(d, l)| d.clamp(-DEEPEST * l, DEEPEST * l)));
                 }
                 out
             })
@@ -102,7 +110,9 @@ impl Shaping<'_> {
                 let n = of[0].0.0;
                 let wanted: Vec<(usize, f64)> = of.iter().map(|((_, s), [area, sum])| (*s, -sum / area)).collect();
                 let by = balanced(self.surfaces, self.on[n as usize], self.nodes[n as usize], &wanted)?;
-                Some((n, by))
+                let area: f64 = of.iter().map(|(_, [area, _])| area).sum();
+                let far = norm(by) > FAR * area.sqrt();
+                (!far || !self.leaves_region(n, by)).then_some((n, by))
             })
             .collect();
         for (n, by) in shifts {
@@ -120,5 +130,12 @@ impl Shaping<'_> {
         let nodes = &self.nodes;
         let shape_of = |t: &[u32; 4]| if *t == GONE { f64::INFINITY } else { shape(t.map(|n| nodes[n as usize])) };
         self.shapes = self.tets.par_iter().map(shape_of).collect();
+    }
+
+    /// Whether a displacement takes a node through a surface of the region.
+    fn leaves_region(&self, n: u32, by: Vec3) -> bool {
+        let (p, on) = (self.nodes[n as usize], self.on[n as usize]);
+        let through = |s: &Surface| s.field.value(p) <= 0.0 && s.field.value(add(p, by)) > 0.0;
+        (0..).zip(self.surfaces).any(|(i, s)| s.cut && on & only(i) == 0 && through(s))
     }
 }

@@ -7,6 +7,7 @@ use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use super::tet_shape::shape;
 use geometry::math::{norm, sub};
+use geometry::progress::checkpoint;
 use geometry::tetmesh::{EDGES, FACES};
 
 /// The greatest number of nodes of a ring.
@@ -21,6 +22,7 @@ impl Shaping<'_> {
     pub fn change_topology(&mut self) -> bool {
         let mut changed = false;
         for t in self.bad() {
+            checkpoint();
             let old = self.tets[t as usize];
             if old == GONE {
                 continue;

@@ -7,6 +7,7 @@ use super::partition::images;
 use super::tet_shape::shape;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::progress::checkpoint;
 use geometry::tetmesh::FACES;
 
 /// Shapes better than this are left as they are: dihedral angles of 22 to 149 degrees.
@@ -102,6 +103,7 @@ impl<'a> Shaping<'a> {
         let mut taken = vec![0u32; self.tets.len()];
         let (mut round, mut changed) = (0, false);
         while !left.is_empty() {
+            checkpoint();
             round += 1;
             let (mut now, mut later) = (Vec::new(), Vec::new());
             for n in left {

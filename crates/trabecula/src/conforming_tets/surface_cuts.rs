@@ -9,6 +9,7 @@ use super::partition::{Partition, Tet, images};
 use super::tet_shape::shape;
 use crate::field::Field;
 use geometry::math::{Vec3, add, norm, sub};
+use geometry::progress::{Cancellation, checkpoint};
 use geometry::tetmesh::{EDGES, volume};
 use rayon::prelude::*;
 
@@ -61,6 +62,7 @@ impl Partition<'_> {
         if !crossings.is_empty() {
             self.snap(surface, &crossings, &mut values, step);
         }
+        checkpoint();
         let marks = self.mark(surface, &crossings, &mut values);
         let straight = self.project(surface, &marks);
         self.bisect(surface, dependent, &marks, &values);
@@ -179,6 +181,7 @@ impl Partition<'_> {
         moves.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let around = self.around(moves.iter().flat_map(|m| self.images(m.1)));
         for (_, n, by) in moves {
+            checkpoint();
             let images: Vec<u32> = images(&self.next, n).collect();
             let old: Vec<Vec3> = images.iter().map(|n| self.nodes[*n as usize]).collect();
             let of = |n: &u32| around.of(*n).iter();
@@ -377,8 +380,11 @@ fn divided(t: Tet, marks: &[&Mark], out: &mut Vec<Tet>) {
 
 /// Values of a field at points, on all threads.
 pub(crate) fn evaluated(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
-    let mut out = vec![0.0; points.len()];
-    out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
+    let (mut out, request) = (vec![0.0; points.len()], Cancellation::current());
+    out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| {
+        request.enter(checkpoint);
+        field.values(p, o);
+    });
     out
 }
 
@@ -386,8 +392,9 @@ pub(crate) fn evaluated(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
 /// Illinois method), which keeps the root bracketed.
 fn roots(field: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]]) -> Vec<f64> {
     const ROUNDS: usize = 40;
-    let mut found = vec![0.0; edges.len()];
+    let (mut found, request) = (vec![0.0; edges.len()], Cancellation::current());
     found.par_chunks_mut(BATCH).zip(edges.par_chunks(BATCH)).for_each(|(found, edges)| {
+        request.enter(checkpoint);
         let start = |[a, b]: &[u32; 2]| Bracket {
             at: [0.0, 1.0],
             values: [values[*a as usize], values[*b as usize]],

@@ -10,25 +10,34 @@ use geometry::fe_mesh::{FeMesh, FeSet};
 use geometry::math::{Aabb, Vec3, add, norm, scale};
 use rayon::prelude::*;
 
+/// Nodes nearer to a bounding plane than this part of the region's size are on it.
+const FLAT: f64 = 1e-6;
+
 /// Adds the sets that are not empty. `faces` are those on surfaces: tetrahedron and corner, their surfaces, whether only one tetrahedron
-/// has them; `planes` the surfaces of the bounding planes; `bodies` the names of what is solid whatever the lattice says.
+/// has them; `planes` the surfaces of the bounding planes; `bounds` those of the region; `bodies` the names of what is solid whatever the
+/// lattice says.
 pub(super) fn add_sets(
     mesh: &mut FeMesh,
     domains: &Domains,
     faces: &[((u32, u8), SurfaceSet, bool)],
-    planes: &[[Option<usize>; 2]; 3],
+    (planes, bounds): (&[[Option<usize>; 2]; 3], &Aabb),
     bodies: &[String],
 ) {
     let below = |n: usize| -> SurfaceSet { (1 << n) - 1 };
     let region = below(domains.region);
     let lattice = !below(domains.lattice) & !HELD;
     let several = domains.names.len() > 1;
+    let near = FLAT * norm(bounds.size());
     for (axis, sides) in planes.iter().enumerate() {
         for (side, s) in sides.iter().enumerate() {
-            let Some(s) = s else { continue };
             let name = PLANES[axis][side];
-            let of: Vec<(u32, u8)> =
-                faces.iter().filter(|(_, set, outer)| *outer && set & only(*s) != 0).map(|f| f.0).collect();
+            let at = [bounds.min, bounds.max][side][axis];
+            // A mesh or an intersection may have flat faces at its bounds too.
+            let flat = |f: (u32, u8)| mesh.face(f).iter().all(|n| (mesh.nodes[*n as usize][axis] - at).abs() <= near);
+            let is_on = |(f, set, outer): &&((u32, u8), SurfaceSet, bool)| {
+                *outer && s.map_or_else(|| set & region != 0 && flat(*f), |s| set & only(s) != 0)
+            };
+            let of: Vec<(u32, u8)> = faces.iter().filter(is_on).map(|f| f.0).collect();
             if several {
                 for (d, domain) in domains.names.iter().enumerate() {
                     let of = of.iter().copied().filter(|f| mesh.domain[f.0 as usize] as usize == d).collect();
@@ -80,7 +89,7 @@ pub(super) fn add_regions(
     };
     let points: Vec<Vec3> = faces.iter().map(|f| mean(f.0)).collect();
     let bounds = mesh.nodes.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-    let near = 1e-6 * norm(bounds.size());
+    let near = FLAT * norm(bounds.size());
     let mut empty = None;
     for (name, region) in sets {
         let mut depth = vec![0.0; points.len()];

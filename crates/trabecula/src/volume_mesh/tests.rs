@@ -62,3 +62,18 @@ fn domains_fill_the_region() {
         assert!(mesh.domain.windows(2).all(|d| d[0] <= d[1]));
     }
 }
+
+#[test]
+fn nodes_of_a_lattice_over_tetrahedra_stay_in_the_region() {
+    // Where the gradient of its field nearly vanishes, a value over it is no distance.
+    let text = "schema = 1\nunits = \"mm\"\n[region]\ndifference = [\n\
+                { cylinder = { base = [0, 0, 0], radius = 8, height = 4 } },\n\
+                { cylinder = { base = [0, 0, -1], radius = 4, height = 6 } } ]\n\
+                [lattice.a]\npart = \"lower\"\ncell.tet.name = \"iwp\"\nmap.tets.size = 4\nlevel.fraction = 0.3\n";
+    let design = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design");
+    let made = design.volume_mesh(&options(0.4), &Silent).expect("a mesh");
+    // Shifts of up to a twentieth of an edge or so are not asked.
+    let bounds = Aabb { min: [-8.0, -8.0, 0.0], max: [8.0, 8.0, 4.0] }.grown(0.04);
+    assert!(made.mesh.nodes.iter().all(|p| bounds.distance(*p) == 0.0));
+    assert!(made.deviation < 1.0, "{}", made.deviation);
+}
