@@ -139,6 +139,17 @@ def test_a_law_says_where_there_is_none():
         lt.law("gyroid", properties=["weight"])
     with pytest.raises(ValueError, match="ascending"):
         lt.law("gyroid", start=0.5, stop=0.2)
+    with pytest.raises(ValueError, match=r'^cell: unknown cell "diamondx"; did you mean "diamond"\?'):
+        lt.law("diamondx")
+    with pytest.raises(ValueError, match=r'^part: unknown part "x"'):
+        lt.law("gyroid", "x")
+
+
+def test_what_is_said_of_a_law_names_its_arguments():
+    found = lt.law("iwp", "lower", 0.01, 0.4, 2, n=8, properties=["stiffness"])
+    assert found.notes[0.01][0].startswith("stiffness: fraction: at a solid fraction of 0.0100 the cell falls apart")
+    thick = lt.law("bcc", start=0.9, stop=0.98, count=2, n=8, properties=["area"])
+    assert thick.notes[0.98][0].startswith("no such cell: fraction: fraction is 0.98")
 
 
 def test_laws_of_beams():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -187,8 +188,8 @@ def law(
         except DesignError as why:
             # Beams of no radius have this fraction.
             if part != "beams":
-                raise
-            notes[float(fraction)] = [f"no such cell: {why}"]
+                raise ValueError(_by_argument(str(why))) from None
+            notes[float(fraction)] = [f"no such cell: {_by_argument(str(why))}"]
             continue
         for j, key in enumerate(k for k in PROPERTIES if k in properties):
             done, total = i * len(properties) + j, count * len(properties)
@@ -196,7 +197,7 @@ def law(
             try:
                 values, said = _FOUND[key](solid, n, nu, work)
             except ValueError as why:
-                values, said = {}, [f"{key}: {why}"]
+                values, said = {}, [f"{key}: {_by_argument(str(why))}"]
             for name, value in values.items():
                 columns[name][i] = np.nan if value is None else value
             if said:
@@ -217,6 +218,15 @@ def _solid(cell: str, part: str, fraction: float) -> Solid:
         # That a cell falls apart is said by its properties, in ``notes``.
         warnings.simplefilter("ignore", DesignWarning)
         return design.build()
+
+
+def _by_argument(message: str) -> str:
+    """A message on the design of a cell, which nobody wrote: by the argument in place of the key."""
+    key, _, said = message.partition(": ")
+    found = re.fullmatch(r"(?:lattice|beams)\.core\.(cell|part|level|fraction)(?:\.\w+)*", key)
+    if not found:
+        return message
+    return f"{'fraction' if found[1] == 'level' else found[1]}: {said}"
 
 
 def _part(progress: Callable[[int, int], Any] | None, done: int, total: int) -> Callable[[int, int], Any] | None:
