@@ -144,6 +144,11 @@ def test_threads_do_not_change_a_byte(tmp_path, cube):
     assert (tmp_path / "one.stl").read_bytes() == (tmp_path / "three.stl").read_bytes()
 
 
+def test_an_open_mesh_has_the_area_of_its_file(tmp_path, cube):
+    told = json.loads(run("mesh", "cube.toml", "-o", "a.stl", "--edge", "0.5", "--open", "--json", cwd=tmp_path).stdout)
+    assert told["open"] and told["area"] == pytest.approx(lt.Mesh.read(tmp_path / "a.stl").area, rel=1e-5)
+
+
 def test_voxels_and_pictures(tmp_path, cube):
     """NPY, VTI and PNG."""
     import numpy as np

@@ -101,6 +101,15 @@ def test_other_formats_have_a_file_each(block, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::trabecula.DesignWarning")
+def test_closed_voids_of_the_wall_are_warned_of(block, tmp_path):
+    """As they are where the wall alone is meshed."""
+    block.write_text(BLOCK + "[skin]\nthickness = 0.8\n")
+    said = run(*words("block.toml", "out.stl", "upper,wall"), cwd=tmp_path)
+    wall = json.loads(said.stdout)["parts"]["wall"]
+    assert wall["cavities"] > 0 and "warning: wall: " in said.stderr and "powder or resin cannot drain" in said.stderr
+    assert any("cannot drain" in it["message"] if isinstance(it, dict) else it for it in json.loads(said.stdout)["warnings"])
+
+
 def test_the_heat_exchanger_does_not_leak():
     """Each fluid is one piece that reaches the outside at its own two ports, and wall alone is between them."""
     parts = lt.load(EXCHANGER).build().parts(edge=0.8)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 from .errors import Refused
 from .files import check_place
-from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, kind_of
-from .inputs import build, closes, keep_inputs, resolution, same_file
+from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, dotted, kind_of
+from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
 from .mesh import Mesh
 from .parts import part_files, write_parts
 from .solid import Solid
@@ -32,6 +32,11 @@ def mesh(args) -> None:
     if args.protocol:
         raise Refused(f"--protocol is of STEP files, and {args.output} is none; leave it out, or write a .step")
     if kind_of(args.output) not in MESH_WRITES:
+        if not design_of(args.design).beams:
+            raise Refused(
+                f"a .{kind_of(args.output)} holds beams, and {args.design} has none; name another output: "
+                f"{dotted((*MESH_WRITES, *STEP_WRITES))}"
+            )
         raise Refused(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
     if args.parts:
         return mesh_parts(args)
@@ -166,6 +171,8 @@ def mesh_parts(args) -> None:
     islands = "error" if args.islands == "error" else "keep"
     with Progress("meshing", args.progress) as progress:
         parts = solid.parts(args.edge, args.per_cell, args.parts, args.threads, progress, islands)
+    if "wall" in parts and parts["wall"].voids:
+        warn(f"wall: {voids(parts['wall'].voids)}")
     settle()
     write_parts(args.output, parts)
     edge = solid.spacing(args.edge, args.per_cell)
@@ -235,7 +242,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     settle()
     if is_open:
         surface = surface.uncapped()
-        made |= {"triangles": surface.counts[1], "open": True}
+        made |= {"triangles": surface.counts[1], "area": surface.area, "open": True}
         say("open at the region's boundary: volume and fraction are the closed part's")
     surface.write(args.output)
     return made
