@@ -354,6 +354,11 @@ def test_an_objective_is_a_plain_function():
     assert made["volume_mm3"] == 64 * made["fraction"] and list(made) == ["fraction", "volume_mm3"]
     with pytest.raises(ValueError, match=r"fraction is 1\.5"):
         of({path: 1.5})
+    other = "lattice.c.level.fraction"
+    with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; the design has lattice\.a$"):
+        lt.objective(design, [other], ["fraction"])({other: 0.25})
+    with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
+        lt.objective(design, ["beams.b.radius"], ["fraction"])({"beams.b.radius": 0.25})
     with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
         of({})
 

@@ -63,7 +63,7 @@ def row_of(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
-    core = job.design._checked().varied(list(values.items()))
+    core = _varied(job.design, values)
     folder = job.design.folder or os.getcwd()
     figures: dict[str, Any] = {"sha256": hashlib.sha256(core.to_toml().encode()).hexdigest()}
     with warnings.catch_warnings(record=True) as heard:
@@ -87,6 +87,22 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     said += [str(w.message) for w in heard if isinstance(w.message, DesignWarning)]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     return figures
+
+
+def _varied(design: Design, values: Mapping[str, Any]) -> _core.Design:
+    """The design with these values. Where that is none, a lattice or the like that only a path names is said to be missing."""
+    try:
+        return design._checked().varied(list(values.items()))
+    except ValueError:
+        given = design.to_dict()
+        for path in values:
+            table, _, rest = path.partition(".")
+            name, below, _ = rest.partition(".")
+            there = list(given.get(table) or ()) if table in ("lattice", "beams", "keep", "set") else [name]
+            if below and name not in there:
+                has = f"the design has {', '.join(f'{table}.{it}' for it in there)}" if there else f"the design has no {table}"
+                raise ValueError(f"{path}: there is no {table}.{name}; {has}") from None
+        raise
 
 
 def _asked(solid: Solid) -> dict[str, Any]:
