@@ -21,6 +21,7 @@ from .slicing import slice
 from .starter import starter
 from .terminal import Progress, figure, put_json, say, settle, warned
 from .texts import counted
+from .volumes import check_order, check_steps
 
 # fmt: off
 __all__ = [
@@ -133,6 +134,7 @@ def volume(args) -> None:
     check_place(args.output)
     keep_file(args.design, args.output)
     check_elements(args)
+    check_sets(args)
     solid = build(args.design, tell=not args.json)
     try:
         fields_at(solid, args.fields or (), solid.bounds)
@@ -170,11 +172,18 @@ def volume(args) -> None:
 
 def check_elements(args) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
-    if args.fields and kind_of(args.output) not in ("vtu", "xdmf"):
+    kind = kind_of(args.output)
+    if args.fields and kind not in ("vtu", "xdmf"):
         raise Refused(f"--fields is for .vtu and .xdmf, not {args.output}")
+    check_steps(kind, args.hold or (), dict(args.load or ()))
+    if args.hold and args.periodic:
+        raise Refused("a periodic mesh has steps of its own; leave out --hold and --load")
+    if args.hold and args.of not in ("solid", "shell"):
+        raise Refused(f"--hold and --load are for --of solid or shell, not {args.of}")
     if args.voxels is None:
         if args.least is not None:
             raise Refused("--least belongs to --voxels; add it")
+        check_order(kind, args.order)
         if args.of == "shell":
             for name in (name for name, given in {"--wall": args.wall, "--periodic": args.periodic}.items() if given):
                 raise Refused(f"{name} is for tetrahedra; leave it out, or --of shell")
@@ -186,6 +195,23 @@ def check_elements(args) -> None:
         raise Refused(f"{name} is for tetrahedra; leave it out, or --voxels")
     if kind_of(args.output) not in VOXEL_ELEMENT_WRITES:
         raise Refused(f"{args.output}: the name of voxels must end in {dotted(VOXEL_ELEMENT_WRITES)}")
+
+
+def check_sets(args) -> None:
+    """Refuses names of sets to hold or to load that no mesh of this design has."""
+    named = [("--hold", name) for name in args.hold or ()] + [("--load", name) for name, _ in args.load or ()]
+    if not named:
+        return
+    design = design_of(args.design)
+    own = ("SURFACE",) if args.voxels is not None else ("BORDER",) if args.of == "shell" else ("CUT", "LATTICE")
+    known = [*own, "X0", "X1", "Y0", "Y1", "Z0", "Z1", *(design.set or ())]
+    if args.voxels is None and args.of != "shell":
+        known += ["SKIN"] if design.skin else []
+        known += ["NET"] if any("tets" in (it.map or {}) for it in (design.lattice or {}).values()) else []
+        known += [f"KEEP_{name}" for name in design.keep or ()]
+    for option, name in named:
+        if name not in known and not name.startswith("CORE_"):
+            raise Refused(f"{option}: no mesh of this design has a set {name}; it may have {', '.join(known)}")
 
 
 def sweep(args) -> None:

@@ -103,11 +103,12 @@ class FiniteElements:
     ) -> None:
         """Writes a file; ``steps`` is what is held and what is loaded."""
         moduli = [positive("E", elastic[0]), number("nu", elastic[1])]
-        hold, load = steps
-        held = [self._with_faces("hold", name) for name in ([hold] if isinstance(hold, str) else hold)]
+        hold, load = ([steps[0]] if isinstance(steps[0], str) else list(steps[0])), steps[1]
+        check_steps(kind, hold, load)
+        held = [self._with_faces("hold", name) for name in hold]
         loads = [(self._with_faces("load", k), _resultant(f"the force on {k}", v)) for k, v in (load or {}).items()]
         if held or loads:
-            self._check_loads(kind, held, loads)
+            self._check_loads()
         if fields and kind not in ("vtu", "xdmf"):
             raise ValueError(f"fields are written to .vtu and .xdmf, not .{kind}")
         further = {name: self._field(name, values) for name, values in (fields or {}).items()}
@@ -140,12 +141,8 @@ class FiniteElements:
             raise ValueError(f"a field cannot be named {name!r}; use another name")
         return found
 
-    def _check_loads(self, kind: str, held: list, loads: list) -> None:
-        """Whether what is held and loaded makes a step."""
-        if kind != "inp":
-            raise ValueError(f"hold and load are written to .inp, not .{kind}; the method forces has them at nodes")
-        if not held or not loads:
-            raise ValueError("give both hold and load: a step needs sets that do not move and forces on others")
+    def _check_loads(self) -> None:
+        """Refuses a mesh that takes no step of what is held and loaded."""
 
 
 class VolumeMesh(FiniteElements):
@@ -231,8 +228,7 @@ class VolumeMesh(FiniteElements):
         {"depth": solid.field(mesh.nodes)}.
         """
         kind = extension(path, VOLUME_WRITES)
-        if kind in ("foam", "mesh") and self._figures.order == 2:
-            raise ValueError(f".{kind} takes linear tetrahedra; make the mesh with order 1")
+        check_order(kind, self._figures.order)
         if kind == "foam":
             if hold or load or fields:
                 raise ValueError("hold, load and fields are not for .foam; give them to the solver")
@@ -242,8 +238,7 @@ class VolumeMesh(FiniteElements):
     def _of_elements(self) -> dict[str, NDArray]:
         return {"domain": self.domain}
 
-    def _check_loads(self, kind: str, held: list, loads: list) -> None:
-        super()._check_loads(kind, held, loads)
+    def _check_loads(self) -> None:
         if self._figures.pairs:
             raise ValueError("a periodic mesh has steps of its own; leave out hold and load")
         if self.domains not in (["SOLID"], ["WALL"]):
@@ -385,6 +380,22 @@ class ShellMesh(FiniteElements):
         of ``VolumeMesh.write``, for .vtu.
         """
         self._write(path, extension(path, SHELL_WRITES), (E, nu), (hold, load), fields)
+
+
+def check_order(kind: str, order: int) -> None:
+    """Refuses quadratic tetrahedra where a format has none."""
+    if kind in ("foam", "mesh") and order == 2:
+        raise ValueError(f".{kind} takes linear tetrahedra; make the mesh with order 1")
+
+
+def check_steps(kind: str, hold: Sequence[str], load: Mapping[str, Sequence[float]] | None) -> None:
+    """Whether what is held and loaded makes a step in a file."""
+    if not hold and not load:
+        return
+    if kind != "inp":
+        raise ValueError(f"hold and load are written to .inp, not .{kind}; the method forces has them at nodes")
+    if not hold or not load:
+        raise ValueError("give both hold and load: a step needs sets that do not move and forces on others")
 
 
 def _resultant(name: str, value: Sequence[float]) -> list[float]:
