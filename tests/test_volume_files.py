@@ -413,6 +413,12 @@ def test_calculix_runs_a_periodic_cell_as_it_is(tmp_path):
     assert (np.diag(C) > limit).all() and (np.diag(C) < 1.12 * limit).all()
 
 
+def measured(path):
+    """What `measure` gives of a file."""
+    words = [sys.executable, "-m", "trabecula", "measure", str(path), "--json"]
+    return json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+
+
 def test_a_file_of_tetrahedra_is_measured(tmp_path):
     pytest.importorskip("meshio")
     mesh = solid().volume_mesh(per_cell=12)
@@ -426,6 +432,29 @@ def test_a_file_of_tetrahedra_is_measured(tmp_path):
         "SOLID": report.elements,
         **{name: of.elements for name, of in report.sets.items()},
     }
+
+
+def test_a_periodic_mesh_with_reference_nodes_is_measured(tmp_path):
+    pytest.importorskip("meshio")
+    mesh = solid().volume_mesh(per_cell=14, periodic=True)
+    mesh.write(tmp_path / "rve.inp")
+    assert (tmp_path / "rve.inp").read_text().count("*NODE, ") == 2
+    report, figures = mesh.report(), measured(tmp_path / "rve.inp")
+    assert (figures["elements"], figures["nodes"]) == (report.elements, report.nodes)
+    assert figures["volume"] == pytest.approx(report.volume, rel=1e-12)
+    assert {"SOLID", "X0", "LATTICE"} <= set(figures["sets"])
+
+
+def test_nodes_in_several_blocks_are_read_and_parts_are_not_mixed_up(tmp_path):
+    pytest.importorskip("meshio")
+    first = "*NODE\n1, 0, 0, 0\n2, 3, 0, 0\n*NODE, NSET=MORE\n3, 0, 3, 0\n4, 0, 0, 3\n"
+    tet = "*ELEMENT, TYPE=C3D4, ELSET=ALL\n1, 1, 2, 3, 4\n"
+    (tmp_path / "a.inp").write_text(first + tet + "*NODE, NSET=REF\n1, 9, 9, 9\n")
+    figures = measured(tmp_path / "a.inp")
+    assert figures["nodes"] == 4 and figures["volume"] == pytest.approx(4.5, rel=1e-12)
+    (tmp_path / "b.inp").write_text("*PART, NAME=A\n" + first + tet + "*END PART\n*PART, NAME=B\n" + first + tet)
+    with pytest.raises(ValueError, match="its parts have nodes of the same numbers"):
+        lt.TetMesh.read(tmp_path / "b.inp")
 
 
 def test_fields_say_what_the_design_does_at_nodes(tmp_path):

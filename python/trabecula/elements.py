@@ -100,7 +100,7 @@ def child(name: str, made: str, memory: str) -> None:
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # it talks, and leaves with sys.exit
-            mesh = meshio.read(name)
+            mesh = meshio.read(with_all_nodes(name) if kind_of(name) == "inp" else name)
         arrays = volumes(mesh)
     except MemoryError:
         sys.exit(f"it takes more than {float(memory) / 1e9:.1f} GB of memory")
@@ -112,6 +112,44 @@ def child(name: str, made: str, memory: str) -> None:
         # What else goes wrong quotes the file, which may be another than was meant.
         sys.exit(f"meshio finds no mesh in it ({type(error).__name__}); is it damaged?")
     np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+
+
+def with_all_nodes(name: str) -> str:
+    """An Abaqus file, or in the working folder a copy of it with all nodes in the first block: of several meshio keeps the
+    last alone. Reference nodes often have a block of their own. Of two nodes of one number the first counts.
+    """
+
+    def keyword(line: str) -> str:
+        return line.partition(",")[0].strip().upper() if line.startswith("*") and not line.startswith("**") else ""
+
+    with open(name, encoding="utf-8", errors="replace") as file:
+        words = [word for word in map(keyword, file) if word in ("*NODE", "*INCLUDE")]
+    # Included files are found from the file's own folder.
+    if words.count("*NODE") < 2 or "*INCLUDE" in words:
+        return name
+    nodes: dict[int, str] = {}
+    before: list[str] = []
+    rest: list[str] = []
+    with open(name, encoding="utf-8", errors="replace") as file:
+        within, twice = False, False
+        for line in file:
+            word = keyword(line)
+            if line.startswith("*"):
+                within = word == "*NODE"
+                if word == "*ELEMENT" and twice:
+                    raise NoVolume("its parts have nodes of the same numbers; write one part, or the mesh without parts")
+                if not within or not nodes:
+                    (rest if nodes else before).append(line)
+            elif not within:
+                (rest if nodes else before).append(line)
+            elif line.strip():
+                number = int(line.partition(",")[0])
+                twice = twice or number in nodes
+                nodes.setdefault(number, line if line.endswith("\n") else line + "\n")
+    with open("gathered.inp", "w", encoding="utf-8") as file:
+        for lines in (before, nodes.values(), rest):
+            file.writelines(lines)
+    return os.path.abspath("gathered.inp")
 
 
 def without_contents(text: str) -> str:
