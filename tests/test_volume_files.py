@@ -13,6 +13,7 @@ import trabecula as lt
 from conftest import in_process
 from finite_elements import area_of, faces_of, solid
 from trabecula.local_fields import FIELDS, fields_at
+from trabecula.quadratic import curved
 
 
 def slab(**more):
@@ -432,6 +433,47 @@ def test_a_file_of_tetrahedra_is_measured(tmp_path):
         "SOLID": report.elements,
         **{name: of.elements for name, of in report.sets.items()},
     }
+
+
+@pytest.mark.parametrize("kind", ["inp", "msh", "vtu", "bdf"])
+def test_quadratic_tetrahedra_are_measured_as_they_are(tmp_path, kind):
+    pytest.importorskip("meshio")
+    mesh = solid().volume_mesh(per_cell=12, order=2)
+    mesh.write(tmp_path / f"part.{kind}")
+    report, figures = mesh.report(), measured(tmp_path / f"part.{kind}")
+    assert (figures["order"], figures["elements"], figures["nodes"]) == (2, report.elements, report.nodes)
+    assert figures["volume"] == pytest.approx(report.volume, rel=1e-9 if kind != "bdf" else 1e-6)
+
+
+def test_the_volume_of_a_curved_tetrahedron_is_exact():
+    """That of x → x + bump, whose Jacobian is known in full."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    edges = [0.5 * (corners[a] + corners[b]) for a, b in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))]
+    x, y, z = np.vstack([corners, edges]).T
+    # (x + y²/2 + z²/3, y + z²/2, z + 1.5 x²): a determinant 1 - 3 x (2 z / 3 - y z).
+    nodes = np.stack([x + y * y / 2 + z * z / 3, y + z * z / 2, z + 1.5 * x * x], axis=-1)
+    # Integrals over the tetrahedron: 1/6, x z 1/120, x y z 1/720.
+    assert curved(nodes[None])[0] == pytest.approx(1 / 6 - 2 / 120 + 3 / 720, rel=1e-13)
+
+
+def test_a_file_in_two_components_is_not_taken_for_a_lattice(tmp_path):
+    mesh = lt.TetMesh.read(two_tetrahedra(tmp_path / "two.vtu"), split=True)
+    assert mesh.report().quality.pieces == 2
+    words = [sys.executable, "-m", "trabecula", "measure", str(tmp_path / "two.vtu")]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stderr
+    assert said == "warning: the tetrahedra are 2 pieces that share no faces\n"
+
+
+def two_tetrahedra(path):
+    """A file of two tetrahedra that do not touch."""
+    points = "0 0 0 1 0 0 0 1 0 0 0 1 5 0 0 6 0 0 5 1 0 5 0 1"
+    arrays = f'<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{points}</DataArray></Points><Cells>'
+    for name, numbers in (("connectivity", "0 1 2 3 4 5 6 7"), ("offsets", "4 8"), ("types", "10 10")):
+        arrays += f'<DataArray type="Int64" Name="{name}" format="ascii">{numbers}</DataArray>'
+    head = '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>'
+    piece = f'<Piece NumberOfPoints="8" NumberOfCells="2">{arrays}</Cells></Piece>'
+    path.write_text(f"{head}{piece}</UnstructuredGrid></VTKFile>")
+    return path
 
 
 def test_a_periodic_mesh_with_reference_nodes_is_measured(tmp_path):

@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from . import children
@@ -49,6 +50,10 @@ KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names")
 BASE, PER_BYTE = 3e9, 100.0
 
 
+#: Where what is read is kept as well.
+kept: list[NDArray] | None = None
+
+
 def needed(kind: str = ""):
     """The package meshio; one clear error if it, or what it needs for files of this ``kind``, is missing."""
     try:
@@ -82,11 +87,29 @@ def read(
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     needed(kind)
+    *arrays, named, names = arrays_of(name, limit)
+    if kept is not None:
+        kept[:] = arrays
+    return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
+
+
+@contextlib.contextmanager
+def keeping() -> Iterator[list[NDArray]]:
+    """A list in which are, once a file has been read within, the arrays that the core took the corners of."""
+    global kept
+    kept = found = []
+    try:
+        yield found
+    finally:
+        kept = None
+
+
+def arrays_of(path: str, limit: float | None = None) -> list[NDArray]:
+    """The arrays ``KEYS`` of a file that meshio reads, which is there."""
+    name = os.path.abspath(path)
     size = os.path.getsize(name)
     seconds = 20 + 2e-6 * size if limit is None else limit
-    memory = BASE + PER_BYTE * size
-    *arrays, named, names = children.arrays("elements", KEYS, [name], name, "meshio", memory, seconds)
-    return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
+    return children.arrays("elements", KEYS, [name], name, "meshio", BASE + PER_BYTE * size, seconds)
 
 
 def child(name: str, made: str, memory: str) -> None:
