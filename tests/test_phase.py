@@ -248,3 +248,31 @@ def test_a_stack_of_pictures_is_a_grid(tmp_path):
     (tmp_path / "slice3.png").write_bytes(grey_png([[1, 2], [3, 4]]))
     with pytest.raises(lt.DesignError, match="2 × 2 pixels among those of 13 × 9"):
         solid("slice*.png")
+
+
+def test_walls_of_given_thickness_have_the_fraction_of_each_place():
+    grow = lt.grade.linear(along=[1, 0, 0], stops={0: 2.5, 12: 5})
+    solid = design(lt.map.phase(wavelength=grow), lt.level.thickness(0.3)).build()
+    points = np.random.default_rng(1).uniform(0.5, 11.5, (200, 3))
+    cell = solid.cell_at(points)
+    # Of a thin wall the fraction is its area times the thickness: one over the cells' size.
+    ratio = cell["fraction"] / (1 / cell["wavelength"]).mean(axis=1)
+    assert ratio.max() / ratio.min() < 1.05 and cell["fraction"].max() / cell["fraction"].min() > 1.2
+    core = solid.report().lattices["core"]
+    low, high = core.fraction
+    assert low - 0.01 < cell["fraction"].min() and cell["fraction"].max() < high + 0.01
+    assert core.wavelengths == pytest.approx([2.5, 5], rel=1e-6)
+    assert "wavelength 2.5 to 5 mm" in str(solid.report())
+
+
+def test_what_a_map_misses_is_said_of_the_worst_axes():
+    slab = lt.region.box(min=[-5, 0, 0], max=[5, 14, 12])
+    ends = [lt.region.box(min=[x - 0.1, -1, -1], max=[x + 0.1, 15, 13]) for x in (-5, 5)]
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.phase(wavelength=3, fix=ends), level=lt.level.fraction(0.3))
+    fixed = lt.Design(region=slab, lattice={"core": core}).build().report()
+    assert "cells per mm 0.90 of what was asked for" in str(fixed)  # three in 10 mm
+    off = fixed.lattices["core"].distortion
+    spread = type(off.angle[0])
+    few, far = (spread({"mean": mean, "p95": mean, "max": most}) for mean, most in ((8.72, 60.0), (6.1, 70.0)))
+    worst = type(off)(dict(off) | {"angle": [few, few, far]})
+    assert "off by 8.7° on average, 70.0° at most" in str(worst)

@@ -553,6 +553,9 @@ class LatticeReport(Report):
     """Root mean square share of a cell from a file that the kept terms leave out."""
     wavelength: float
     """The smallest wavelength, mm."""
+    wavelengths: list[float] | None
+    """The least and the greatest wavelength over the region, mm, where a solved map is asked for one that varies; of
+    unequal edges, the smallest. None elsewhere."""
 
 
 class LayersReport(Report):

@@ -66,7 +66,8 @@ def _design(it: Report) -> Iterator[str]:
         name = os.path.basename(part.path)
         yield f"  {name}: {part.triangles} triangles within {figure(part.chord)} mm of {part.faces} faces{off}"
     for name, lattice in it.lattices.items():
-        yield f"lattice {name}: {lattice.part}, wavelength {figure(lattice.wavelength)} mm"
+        ends = dict.fromkeys(figure(w) for w in lattice.wavelengths or [lattice.wavelength])
+        yield f"lattice {name}: {lattice.part}, wavelength {' to '.join(ends)} mm"
         yield from _lattice(lattice)
     for name, beams in it.beams.items():
         yield f"beams {name}: {_beams_title(beams)}"
@@ -172,12 +173,13 @@ def _tiling(it: Report) -> Iterator[str]:
 
 
 def _distortion(it: Report) -> Iterator[str]:
-    worst = max(it.angle, key=lambda a: a.max)
-    yield f"  angle      off by {worst.mean:.1f}° on average, {worst.max:.1f}° at most, along the worst axis"
-    farthest = max(it.spacing, key=lambda s: abs(s.max - 1))
+    mean, most = max(a.mean for a in it.angle), max(a.max for a in it.angle)
+    yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most, each of the axis where that is greatest"
+    ratio = max((s.mean for s in it.spacing), key=lambda mean: max(mean, 1 / mean))
+    farthest = max(s.max for s in it.spacing)
     yield (
-        f"  spacing    {farthest.mean:.2f} of what was asked for on average, off by a factor of {farthest.max:.2f} at "
-        f"most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
+        f"  spacing    cells per mm {ratio:.2f} of what was asked for on average, off by a factor of "
+        f"{farthest:.2f} at most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
     )
     yield f"  turn       {it.turn:.1f}° per cell at most"
 

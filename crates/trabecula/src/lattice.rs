@@ -258,18 +258,26 @@ impl Lattice {
         Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
     }
 
-    /// Fills the solid fraction of the cell at points (mm).
+    /// Fills the solid fraction of the cell at points (mm). A wall of given thickness is more of a cell where the map makes cells smaller.
     pub fn fractions(&self, points: &[Vec3], out: &mut [f64]) {
         if let Level::Fraction(g) = &self.level {
             return g.values(points, out);
         }
         self.isos(points, out);
-        for t in out.iter_mut() {
-            *t = self.fraction(*t);
+        match &self.distance {
+            Some(d) if self.map.affine().is_none() => {
+                let n = points.len();
+                let (mut u, mut j) = (vec![[0.0; 3]; n], vec![[[0.0; 3]; 3]; n]);
+                self.map.phases_and_jacobians(points, &mut u, &mut j);
+                for (t, j) in out.iter_mut().zip(&j) {
+                    *t = d.fraction(self.part, *t * d.pace(j));
+                }
+            }
+            _ => out.iter_mut().for_each(|t| *t = self.fraction(*t)),
         }
     }
 
-    /// The solid fraction of the cell where the core's level is t.
+    /// The solid fraction of the cell where the core's level is t; of a wall of given thickness, in cells of the map's mean size.
     pub fn fraction(&self, t: f64) -> f64 {
         match &self.distance {
             Some(d) => d.fraction(self.part, t),

@@ -15,7 +15,7 @@ use super::periodic_spline::Spline;
 use super::quantile::Quantile;
 use super::series::Series;
 use super::thickness::least;
-use geometry::math::{Interval, Mat3, Vec3, add, apply, inverse, norm, scale, transpose};
+use geometry::math::{Interval, Mat3, Vec3, add, apply, determinant, inverse, norm, scale, transpose};
 
 /// On creases the gradient may vanish and has no direction: with this the ratio of distances goes to one there, so that it is
 /// continuous.
@@ -24,6 +24,9 @@ const SMALL: f64 = 1e-4;
 const FINE: f64 = 8.0;
 /// Nodes on the finest wave along an axis.
 const WAVE: f64 = 16.0;
+/// Points along an axis at which normals of walls are taken, and how near the mid-surface these are, of the greatest distance.
+const SIDE: usize = 12;
+const NEAR: f64 = 0.3;
 /// Fewest and most nodes along an axis; the second most only for the sake of fine waves.
 const NODES: [f64; 3] = [36.0, 72.0, 96.0];
 
@@ -39,6 +42,7 @@ pub struct Distance {
     /// Largest distance found on the mid-surface itself, mm.
     error: f64,
     table: OnceLock<Quantile>,
+    normals: OnceLock<Vec<Vec3>>,
     connected: [OnceLock<Vec<[f64; 2]>>; 3],
 }
 
@@ -74,6 +78,7 @@ impl Distance {
             radius,
             error,
             table: OnceLock::new(),
+            normals: OnceLock::new(),
             connected: Default::default(),
         }
     }
@@ -120,6 +125,32 @@ impl Distance {
         let (a, b) =
             ((3.0 * own - 2.0 * ratio * here) / below, -ratio * own * own / (here.max(f64::MIN_POSITIVE) * below));
         (ratio, add(scale(apply(&self.to_phase, flat), a), scale(apply(jacobian, w), b)), b)
+    }
+
+    /// The factor that turns lengths across walls under another Jacobian du/dx into those that leave as much of the cell solid where
+    /// it was measured: the mean of |∇ₓd| over normals of walls. Exact where cells are scaled and turned, for others of first order in
+    /// the thickness.
+    pub fn pace(&self, jacobian: &Mat3) -> f64 {
+        let (normals, back) = (self.normals(), transpose(jacobian));
+        if normals.is_empty() {
+            return (determinant(jacobian) / determinant(&self.to_phase)).abs().cbrt();
+        }
+        normals.iter().map(|g| norm(apply(&back, *g))).sum::<f64>() / normals.len() as f64
+    }
+
+    /// Unit normals of the mid-surface and of what is near it, per turn.
+    fn normals(&self) -> &[Vec3] {
+        self.normals.get_or_init(|| {
+            let at = |i: usize| (i as f64 + 0.5) / SIDE as f64;
+            let u: Vec<Vec3> =
+                (0..SIDE * SIDE * SIDE).map(|i| [at(i % SIDE), at(i / SIDE % SIDE), at(i / (SIDE * SIDE))]).collect();
+            let (mut d, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
+            self.gradients(&u, &mut d, &mut g);
+            let (near, back) = (NEAR * self.range().abs().hi, transpose(&self.to_phase));
+            let long = |g: Vec3| norm(apply(&back, g));
+            let some = d.iter().zip(g).filter(|(d, g)| d.abs() <= near && long(*g) > 0.5);
+            some.map(|(_, g)| scale(g, 1.0 / long(g))).collect()
+        })
     }
 
     /// A Lipschitz bound: an upper bound of |∂d/∂x| (mm per mm). A distance's own is one; the spline oscillates near
@@ -262,6 +293,23 @@ pub(super) mod tests {
             }
             println!("{wavelength:?}: {worst:.1e}");
             assert!(worst < tolerance, "{wavelength:?} {worst}");
+        }
+    }
+
+    /// The factor of lengths is that of the scale, whatever the rotation; of stretched cells, that of the distances themselves: by it
+    /// the fraction of a wall is the one that its own table has.
+    #[test]
+    fn fractions_under_other_jacobians_are_those_of_their_own_tables() {
+        for name in ["gyroid", "diamond", "primitive"] {
+            let s = series(name);
+            let d = Distance::new(&s, &stretched([1.0; 3], [0.0; 3]));
+            assert!((d.pace(&stretched([2.5; 3], [20.0, 35.0, 50.0])) - 0.4).abs() < 1e-12, "{name}");
+            let j = stretched([1.0, 1.15, 1.3], [20.0, 35.0, 50.0]);
+            let own = Distance::new(&s, &j);
+            for half in [0.02, 0.05] {
+                let (found, exact) = (d.fraction(Part::Sheet, half * d.pace(&j)), own.fraction(Part::Sheet, half));
+                assert!((found / exact - 1.0).abs() < 0.02, "{name} {half} {found} {exact}");
+            }
         }
     }
 

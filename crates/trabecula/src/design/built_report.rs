@@ -17,6 +17,9 @@ use crate::report::*;
 use crate::truss::Beams;
 use geometry::math::Mat3;
 
+/// Fractions that differ by less are one.
+const SAME: f64 = 1e-6;
+
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Varied {
@@ -52,6 +55,11 @@ impl Varied {
                 None => Varied::of(&sample::values(points, |points, out| g.values(points, out))),
             },
             // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
+            Level::Thickness(_) if lattice.map.affine().is_none() => {
+                let found = Varied::of(&sample::values(points, |points, out| lattice.fractions(points, out)));
+                // Cells of a map that was solved are alike but for rounding.
+                if found.max - found.min < SAME { Varied { max: found.min, ..found } } else { found }
+            }
             Level::Iso(_) | Level::Thickness(_) => Varied::of_iso(lattice, points).map(|t| lattice.fraction(t)),
         }
     }
@@ -152,6 +160,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
     LatticeReport {
         part: word(lattice.part),
         wavelength: lattice.map.wavelength(),
+        wavelengths: lattice.map.solved().map(Phase::edges).filter(|[a, b]| a < b),
         // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
         iso: Some(match lattice.distance() {
             Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).varying(),
@@ -228,6 +237,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let lattice = LatticeReport {
         part: word(part),
         wavelength: tiling.wavelength(),
+        wavelengths: None,
         iso: None,
         fraction: Varying::Number(it.finished.unwrap_or(solid / volume)),
         porosity: Varying::Number(1.0 - it.finished.unwrap_or(solid / volume)),

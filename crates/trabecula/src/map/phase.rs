@@ -139,6 +139,8 @@ pub struct Phase {
     shift: Vec3,
     /// Least and greatest target wavelength, mm.
     wavelengths: [f64; 2],
+    /// Least and greatest of the smallest target wavelength at nodes in the region, mm.
+    edges: [f64; 2],
     /// The greatest difference of two principal values of a stress, at the nodes.
     stress_range: f64,
     /// The mean wavelengths along the three axes of the cell, mm.
@@ -226,6 +228,7 @@ impl Phase {
     ) -> Result<Phase, Fault> {
         let wavelength = found.target.wavelength(&laid);
         let mean_length = mean_within(&laid.inside, wavelength);
+        let edges = edges_within(&laid.inside, wavelength);
         let lengths_range =
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
@@ -254,6 +257,7 @@ impl Phase {
             wanted: wanted.clone(),
             shift,
             wavelengths: lengths_range,
+            edges,
             stress_range,
             mean: mean_length,
             max_lipschitz,
@@ -285,6 +289,14 @@ impl Phase {
     /// The whole numbers of cells round the holes of the region, one for each hole that the grid sees.
     pub fn periods(&self) -> &[Period] {
         &self.periods
+    }
+
+    /// The least and the greatest of the smallest wavelength that is asked for in the region, mm; the same where none varies.
+    pub fn edges(&self) -> [f64; 2] {
+        match self.lengths.is_none() && self.wanted.wavelength.iter().all(|w| w.constant().is_some()) {
+            true => [self.wavelengths[0]; 2],
+            false => self.edges,
+        }
     }
 
     /// Whether phases grow round a hole, so that one place has many phases.
@@ -418,6 +430,13 @@ fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
     let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
     if count == 0 { of[0] } else { scale(sum, 1.0 / f64::from(count)) }
+}
+
+/// The least and the greatest of the smallest lengths at the nodes in a region.
+fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
+    let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
+    let smallest = within.map(|(_, w)| w.iter().copied().fold(f64::INFINITY, f64::min));
+    smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
 }
 
 /// What may keep a map from folding.

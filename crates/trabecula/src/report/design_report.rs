@@ -38,6 +38,10 @@ pub struct LatticeReport {
     pub part: &'static str,
     /// The smallest wavelength, mm.
     pub wavelength: f64,
+    /// The least and the greatest wavelength over the region, mm, where a solved map is asked for one that varies; of unequal edges,
+    /// the smallest. None elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wavelengths: Option<[f64; 2]>,
     /// The level t. Where the thickness is given: the constant level of equal fraction. None for cells by zones.
     pub iso: Option<Varying>,
     /// Solid fraction of the cell, 0 to 1.

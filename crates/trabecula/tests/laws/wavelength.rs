@@ -115,6 +115,30 @@ fn graded_fractions_and_lengths_are_graded_wavelengths() {
     }
 }
 
+/// Of walls of given thickness in cells whose size varies the report has the range of the fraction and of the wavelength, and each
+/// point its own fraction: near the one asked for, where that gave the wavelength.
+#[test]
+fn walls_in_cells_that_grow_have_the_fraction_of_each_place() {
+    let graded = "{ linear = { along = [1, 0, 0], stops = [[-4.5, 0.35], [4.5, 0.45]] } }";
+    let made = built("gyroid", "sheet", "map.phase = {}", &format!("fraction = {graded}, thickness = 0.3"));
+    let made = made.expect("built");
+    let core = &made.report().lattices["core"];
+    let (Varying::Range([low, high]), Varying::Range([full, empty])) = (core.fraction, core.porosity) else {
+        panic!("ranges, found {:?} and {:?}", core.fraction, core.porosity);
+    };
+    assert!(0.34 < low && low < 0.39 && 0.41 < high && high < 0.46, "{low} {high}");
+    assert!((low + empty - 1.0).abs() < 1e-12 && (high + full - 1.0).abs() < 1e-12);
+    let [short, long] = core.wavelengths.expect("a range");
+    assert!((long / short - 0.45 / 0.35).abs() < 0.1, "{short} {long}");
+    let mut found = [0.0; 2];
+    made.lattices[0].1.fractions(&[[-4.0, 0.0, 0.0], [4.0, 0.0, 0.0]], &mut found);
+    assert!(found[1] - found[0] > 0.02 && low <= found[0] && found[1] <= high, "{found:?}");
+
+    let alike = built("gyroid", "sheet", "map.phase.wavelength = 3", "thickness = 0.3").expect("built").report();
+    assert!(matches!(alike.lattices["core"].fraction, Varying::Number(_)));
+    assert!(alike.lattices["core"].wavelengths.is_none());
+}
+
 #[test]
 fn what_contradicts_is_refused() {
     let refused = |map: &str, level: &str| built("gyroid", "sheet", map, level).err().expect("refused").to_string();
