@@ -31,6 +31,7 @@ mod poisson;
 mod principal;
 mod principal_lengths;
 mod region_holes;
+mod remedy;
 mod round;
 mod round_kind;
 mod singular_lines;

@@ -33,6 +33,9 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         header[at..].trim_start().strip_prefix(':').map(str::trim_start)
     };
     let malformed = || fault(format!("the header of the NPY file is malformed: {}", header.trim()));
+    if after("descr").is_some_and(|t| t.starts_with('[')) {
+        return Err(fault("an array of records holds no plain numbers; save one of their fields as float64".into()));
+    }
     let quoted = after("descr").and_then(|t| t.strip_prefix('\'')).ok_or_else(malformed)?;
     let kind = &quoted[..quoted.find('\'').ok_or_else(malformed)?];
     let fortran = after("fortran_order").ok_or_else(malformed)?.starts_with("True");
@@ -59,9 +62,7 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         "u1" | "b1" => Scalar::Unsigned(1),
         "f2" => return Err(fault("half precision is not read; save the array as float32 or float64".into())),
         _ => {
-            let message =
-                format!("an array of type {} holds no plain numbers; save it as float64", shown(kind.as_bytes()));
-            return Err(fault(message));
+            return Err(fault(no_numbers(kind)));
         }
     };
     let need = count.checked_mul(scalar.width()).ok_or_else(cut)?;
@@ -84,6 +85,21 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         }
     }
     Ok((shape, values))
+}
+
+/// Explains that an array of a type, such as `<c16`, holds no plain numbers.
+fn no_numbers(kind: &str) -> String {
+    // Without the mark of the order of bytes.
+    let name = kind.trim_start_matches(['<', '>', '|', '=']);
+    let of = match name.as_bytes().first() {
+        Some(b'c') => "complex numbers",
+        Some(b'O') => "Python objects",
+        Some(b'U' | b'S' | b'a') => "texts",
+        Some(b'M' | b'm') => "times",
+        Some(b'V') => "raw bytes",
+        _ => return format!("an array of type {} holds no plain numbers; save it as float64", shown(name.as_bytes())),
+    };
+    format!("an array of {of} (type {}) holds no plain numbers; save real numbers as float64", shown(name.as_bytes()))
 }
 
 /// Writes bytes that run with x fastest as an array that NumPy indexes `[x, y, z]` (`uint8`, Fortran order).
@@ -143,6 +159,15 @@ mod tests {
         assert_eq!(read_npy(&of_kind(b"<f4")).unwrap().1, [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]);
         for kind in [&b"\xe9f4"[..], b"", b"<", b"<f3"] {
             assert!(read_npy(&of_kind(kind)).unwrap_err().message.contains("no plain numbers"));
+        }
+        for (kind, found) in [
+            (&b"<c16"[..], "of complex numbers (type \"c16\")"),
+            (b"|O", "of Python objects (type \"O\")"),
+            (b"<U3", "of texts (type \"U3\")"),
+            (b"<f3", "of type \"f3\""),
+        ] {
+            let why = read_npy(&of_kind(kind)).unwrap_err().message;
+            assert!(why.contains(found) && why.contains("no plain numbers"), "{why}");
         }
     }
 

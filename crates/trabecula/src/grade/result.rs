@@ -223,7 +223,7 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
         let bad = array.values.iter().filter(|v| !v.is_finite()).count();
         let what = if array.of_cells { "cell" } else { "point" };
         let message = format!(
-            "{}: {bad} of {} of the array \"{}\" are not finite, the first at {what} {}",
+            "{}: {bad} of {} of the array \"{}\" are not finite, the first at {what} {}; fill them before use",
             spec.path,
             counted(array.values.len(), "number"),
             array.name,

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
 use super::frame::in_mm;
+use super::phase::Wanted;
 use super::phase_target::{Laid, Target};
 use super::singular_lines::Alike;
 use geometry::fault::Fault;
@@ -55,9 +56,9 @@ pub(super) fn rotations(
     target: &Target,
     count: &[bool],
     cuts: &mut BranchCuts,
-    alike: &Alike,
+    wanted: &Wanted,
 ) -> Result<(), Fault> {
-    let (grid, frames, turns) = (&laid.grid, &target.frames, alike.turns());
+    let (grid, frames, turns) = (&laid.grid, &target.frames, wanted.alike().turns());
     let edges = (0..grid.len()).into_par_iter().filter(|n| count[*n]).flat_map_iter(|n| {
         let above = grid.neighbours(n).filter(move |m| *m > n && count[*m]);
         let turns = &turns;
@@ -74,11 +75,11 @@ pub(super) fn rotations(
     for Turned { node, turn, cuts } in &some {
         let at = grid.node(*node);
         match cuts[..] {
-            [] => return Err(unlike(at)),
+            [] => return Err(unlike(at, wanted)),
             [(line, sense)] => {
                 let turn = if sense > 0 { *turn } else { transpose(turn) };
                 if *found[line].get_or_insert(turn) != turn {
-                    return Err(unlike(at));
+                    return Err(unlike(at, wanted));
                 }
             }
             _ => {}
@@ -117,11 +118,12 @@ fn check_lengths(laid: &Laid, target: &Target, turns: &[Mat3]) -> Result<(), Fau
 }
 
 /// Explains that axes do not agree at a place without a cut.
-fn unlike(at: Vec3) -> Fault {
+fn unlike(at: Vec3, wanted: &Wanted) -> Fault {
     let message = format!(
         "axes do not come back to themselves round a hole of the part, or round a place that is too short for a line, near {}: core covers \
-         lines alone. Smooth directions over more than a wavelength (smooth, in mm), or leave core out",
-        in_mm(at)
+         lines alone; {}, or leave core out",
+        in_mm(at),
+        wanted.smoother()
     );
     Fault::new("core", message)
 }

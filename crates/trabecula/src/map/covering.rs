@@ -26,7 +26,7 @@ const FINE: f64 = 4.0;
 /// Nodes of the grid beyond the part.
 const PADDING: usize = 3;
 /// The most lines that are covered: each but the first takes two more solutions.
-const MOST: usize = 12;
+pub(super) const MOST: usize = 12;
 /// How deep the end of a line may lie in the part, in steps: lines are found between nodes in the part.
 const END: f64 = 3.0;
 
@@ -90,7 +90,7 @@ impl Covering {
         let least_length = 0.5 * shortest(&laid);
         let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
         let pieces =
-            lines.iter().map(|l| Ok((path(l, &laid, settings)?, l.turn))).collect::<Result<Vec<_>, Fault>>()?;
+            lines.iter().map(|l| Ok((path(l, &laid, wanted, settings)?, l.turn))).collect::<Result<Vec<_>, Fault>>()?;
         let mut paths = joined(pieces);
         paths.iter_mut().for_each(|p| lead_on(p, radius + END * laid.longest()));
         if paths.is_empty() {
@@ -98,10 +98,9 @@ impl Covering {
         }
         if paths.len() > MOST {
             let message = format!(
-                "axes do not come back to themselves round {} lines; {MOST} at most are covered. Smooth the {} over more than a wavelength, \
-                 or leave core out",
+                "axes do not come back to themselves round {} lines; {MOST} at most are covered: {}, or leave core out",
                 paths.len(),
-                wanted.orientation.key()
+                wanted.smoother()
             );
             return Err(Fault::new("core", message));
         }
@@ -117,7 +116,7 @@ impl Covering {
         let alike = wanted.alike();
         let labels = labels(&laid, &target, &outside, &cuts, &alike);
         target.relabel(&labels, &laid.given);
-        rotations(&laid, &target, &outside, &mut cuts, &alike)?;
+        rotations(&laid, &target, &outside, &mut cuts, wanted)?;
         let cores = Cores { fill: self.fill, tube };
         let found = found(Laid { inside: outside, ..laid }, wanted, settings, target, cuts, &cores)?;
         Ok(Some(Covered { laid: found.0, found: found.1, lines, cores }))
@@ -147,7 +146,7 @@ fn too_fine(radius: f64) -> Fault {
 }
 
 /// Refuses what does not go with cores.
-fn refuse(wanted: &Wanted) -> Result<(), Fault> {
+pub(super) fn refuse(wanted: &Wanted) -> Result<(), Fault> {
     let clash = |key: &str, why: &str| {
         let message = format!("core covers singular lines here, and {why}; leave {key} or core out");
         Err(Fault::new(key, message))
@@ -173,12 +172,12 @@ fn refuse(wanted: &Wanted) -> Result<(), Fault> {
 }
 
 /// A smooth polyline along a singular line, from surface to surface.
-fn path(line: &SingularLine, laid: &Laid, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
+fn path(line: &SingularLine, laid: &Laid, wanted: &Wanted, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
     if line.is_closed() {
         let message = format!(
-            "a singular line is closed, {}: core covers lines from surface to surface. Smooth directions over more than a wavelength (smooth, \
-             in mm), or leave core out",
-            line.words(1)
+            "a singular line is closed, {}: core covers lines from surface to surface; {}, or leave core out",
+            line.words(1),
+            wanted.smoother()
         );
         return Err(Fault::new("core", message));
     }
@@ -189,8 +188,9 @@ fn path(line: &SingularLine, laid: &Laid, settings: &Settings) -> Result<Vec<Vec
         if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * laid.longest() {
             let message = format!(
                 "a singular line ends within the part at {}, where lines meet or directions are not clear: core covers lines from surface to \
-                 surface. Smooth directions over more than a wavelength (smooth, in mm), or leave core out",
-                in_mm(p)
+                 surface; {}, or leave core out",
+                in_mm(p),
+                wanted.smoother()
             );
             return Err(Fault::new("core", message));
         }
@@ -276,7 +276,7 @@ fn found(
         steps = steps.max(taken);
         anchor(&mut values, &laid, &cuts, &mean, &roots);
         let (spline, branches) = cut_cells::through(laid.grid, &values, cuts.clone());
-        torn(&branches, &part, tube.radius)?;
+        torn(&branches, &part, tube.radius, wanted)?;
         let solution = Solution { spline, winding: Winding::default(), branches: Some(branches) };
         let fold = fold_at_node(&solution, &laid).or_else(|| fold_between(&solution, &laid.inside));
         if fold.is_none() || first.is_none() {
@@ -303,7 +303,7 @@ fn anchor(values: &mut [Vec3], laid: &Laid, cuts: &BranchCuts, mean: &Mat3, root
 }
 
 /// Refuses cells of the part that are torn: those next to lines that are not in the cores.
-fn torn(branches: &CutCells, part: &dyn Field, radius: f64) -> Result<(), Fault> {
+fn torn(branches: &CutCells, part: &dyn Field, radius: f64, wanted: &Wanted) -> Result<(), Fault> {
     // The corners and the middle of a cell, which is at most a fourth of the radius across.
     let out = branches.torn().find_map(|b| {
         let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] });
@@ -312,9 +312,10 @@ fn torn(branches: &CutCells, part: &dyn Field, radius: f64) -> Result<(), Fault>
     out.map_or(Ok(()), |p| {
         let message = format!(
             "{} mm; cells do not fit together at {}, outside the cores, where lines are near to each other or bend sharply: give a larger \
-             core_radius, or smooth directions over more than a wavelength (smooth, in mm)",
+             core_radius, or {}",
             number(radius),
-            in_mm(p)
+            in_mm(p),
+            wanted.smoother()
         );
         Err(Fault::new("core_radius", message))
     })

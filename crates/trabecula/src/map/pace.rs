@@ -293,19 +293,45 @@ impl<'a> Probe<'a> {
     }
 }
 
+/// Whether a wavelength that changes abruptly between two points still does within a thousandth of the way: no step carries that.
+fn jumps(of: &Grade, [mut a, mut b]: [Vec3; 2]) -> bool {
+    const HALVINGS: usize = 10;
+    let ratio = |v: f64, w: f64| v.max(w) / v.min(w);
+    for _ in 0..HALVINGS {
+        let middle = scale(add(a, b), 0.5);
+        let mut found = [0.0; 3];
+        of.values(&[a, middle, b], &mut found);
+        if ratio(found[0], found[1]) >= ratio(found[1], found[2]) {
+            b = middle;
+        } else {
+            a = middle;
+        }
+    }
+    let mut ends = [0.0; 2];
+    of.values(&[a, b], &mut ends);
+    ratio(ends[0], ends[1]) > ABRUPT
+}
+
 /// Refuses wavelengths that jump between nodes, or whose variation the nodes do not resolve.
 pub(super) fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
     if of.iter().all(|g| g.constant().is_some()) {
         return Ok(());
     }
-    let refuse = |a: f64, b: f64, p: Vec3, apart: f64| {
-        let message = format!(
-            "the wavelength goes from {} to {} mm within {} mm at {}: faster than the grid can carry; let it change over several cells, or give a smaller step",
-            number(a),
-            number(b),
-            number(apart),
-            in_mm(p)
-        );
+    let refuse = |i: usize, [a, b]: [f64; 2], p: Vec3, [from, to]: [Vec3; 2]| {
+        let [a, b, apart] = [a, b, norm(sub(to, from))].map(number);
+        let message = if jumps(&of[i], [from, to]) {
+            format!(
+                "the wavelength jumps from {a} to {b} mm within {apart} mm at {}: faster than the grid can carry at any step; let it change \
+                 over several cells",
+                in_mm(p)
+            )
+        } else {
+            format!(
+                "the wavelength goes from {a} to {b} mm within {apart} mm at {}: faster than the grid can carry; let it change over several \
+                 cells, or give a smaller step",
+                in_mm(p)
+            )
+        };
         Err(Fault::new("wavelength", message))
     };
     let strides = grid.strides();
@@ -317,7 +343,7 @@ pub(super) fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bo
             for i in 0..3 {
                 let (v, w) = (at[n][i], at[m][i]);
                 if inside[m] && v.max(w) > ABRUPT * v.min(w) {
-                    return refuse(v, w, grid.node(n), grid.step[a]);
+                    return refuse(i, [v, w], grid.node(n), [n, m].map(|n| grid.node(n)));
                 }
             }
         }
@@ -332,7 +358,7 @@ pub(super) fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bo
         for i in 0..3 {
             let (lo, hi) = (at[*n][i].min(at[far][i]), at[*n][i].max(at[far][i]));
             if inside[far] && (w[i] > ABRUPT * hi || w[i] < lo / ABRUPT) {
-                return refuse(at[*n][i], w[i], *p, 0.5 * norm(grid.step));
+                return refuse(i, [at[*n][i], w[i]], *p, [grid.node(*n), *p]);
             }
         }
     }

@@ -11,13 +11,14 @@ use super::covering::{Cores, Covered, Covering};
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
-use super::frame::{Orientation, cube, in_mm};
+use super::frame::{Orientation, cube};
 use super::integral::{Integral, Problem, Weights};
 use super::judged::{Judged, fold_at_node, fold_between, targets};
 use super::pace;
 use super::periods::{Angles, Period, tried};
 use super::phase_target::{Laid, Target};
 use super::region_holes::{MOST, Sought};
+use super::remedy::{folded, remedy};
 use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
@@ -165,6 +166,19 @@ impl Phase {
     /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
     /// grid that is too coarse or too large; a map that folds.
     pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
+        let made = Phase::solved_once(bounds, wanted, settings);
+        match (made, wanted.stretch) {
+            // The grid for a range is another one, and cells held in it may fold: then the map without is taken, if that does not.
+            (Err(folds), Some(_)) if folds.at.is_empty() => {
+                let free = Wanted { stretch: None, ..wanted.clone() };
+                let made = Phase::solved_once(bounds, &free, settings).map_err(|_| folds)?;
+                Ok(Phase { wanted: wanted.clone(), ..made })
+            }
+            (made, _) => made,
+        }
+    }
+
+    fn solved_once(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
         let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
         // A part mostly touches its bounds: there cells are held within a range only if the grid has some on both sides.
         let grid = match (wanted.stretch, settings.region) {
@@ -233,11 +247,12 @@ impl Phase {
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         if let (Some(p), false) = (found.judged.fold, settings.folds) {
             if found.solution.branches.is_some() {
-                let remedy = remedy(wanted, lengths_range[1], true);
+                let remedy = remedy(wanted, lengths_range[1], true, &[]);
                 return Err(folded(p, &remedy, ", outside the cores of its singular lines"));
             }
-            tried += &found.judged.distortion.winds();
-            return Err(folded(p, &remedy(wanted, lengths_range[1], false), &tried));
+            let distortion = &found.judged.distortion;
+            tried += &distortion.winds();
+            return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
         let stress_range = target.range;
@@ -439,21 +454,6 @@ fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
     smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
 }
 
-/// What may keep a map from folding.
-fn remedy(wanted: &Wanted, longest: f64, covered: bool) -> String {
-    let smoother = match (&wanted.orientation, wanted.smooth) {
-        (Orientation::Angles(_), _) => "Let".into(),
-        (of, None) => format!("Smooth the {} over a length, such as smooth = {}, let", of.key(), number(longest)),
-        (_, Some(length)) => format!("Use a smooth of more than {} mm, let", number(length)),
-    };
-    let more = match (covered, wanted.stretch) {
-        (true, _) => ", give a larger core_radius",
-        (false, None) => ", bound what cells are stretched by, such as stretch = [0.67, 1.5]",
-        (false, Some(_)) => "",
-    };
-    format!("{smoother} orientation and wavelength vary more slowly{more}")
-}
-
 /// A solution, and what it was found for.
 pub(super) struct Found {
     pub target: Target,
@@ -484,21 +484,26 @@ impl Found {
         Ok(Found { target, weights, solution, periods, mean, steps, judged })
     }
 
-    /// The solution whose cells are stretched within a range.
+    /// The solution whose cells are stretched within a range; where that folds and the one without a range does not, the latter.
     fn bounded(self, laid: &Laid, wanted: &Wanted, region: Option<&dyn Field>, range: Stretch) -> Result<Found, Fault> {
         let [least, most] = range.range();
         let [low, high] = self.judged.distortion.stretch;
         if self.judged.fold.is_none() && low >= least && high <= most {
             return Ok(self);
         }
-        let Found { target, weights, solution, periods, mean, steps, .. } = self;
+        let Found { target, weights, solution, periods, mean, steps, judged: before } = self;
         let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
         // The cells of the grid that the region reaches into.
         let reach = norm(laid.grid.step);
         let counts: Vec<bool> = laid.depth.iter().map(|d| *d <= reach).collect();
-        let solution = bounded(&problem, &counts, range, solution);
+        let held = bounded(&problem, &counts, range, &solution);
         let weights = problem.weights;
-        let judged = Judged::of(laid, wanted, region, &target, &solution)?;
+        let judged = Judged::of(laid, wanted, region, &target, &held)?;
+        // What keeps to no range is no worse than what folds.
+        let (solution, judged) = match (before.fold, judged.fold) {
+            (None, Some(_)) => (solution, before),
+            _ => (held, judged),
+        };
         Ok(Found { target, weights, solution, periods, mean, steps, judged })
     }
 }
@@ -547,15 +552,6 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
     }
     let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
     Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words))
-}
-
-/// A map that folds at a place.
-fn folded(p: Vec3, remedy: &str, tried: &str) -> Fault {
-    let message = format!(
-        "the map folds at {}: cells turn inside out there{tried}. {remedy}, or allow it with folds = true",
-        in_mm(p)
-    );
-    Fault::new("", message)
 }
 
 #[cfg(test)]

@@ -329,8 +329,15 @@ impl PhaseKind {
         let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, weight_key));
         if let (Some(length), OrientationKind::Axes(_) | OrientationKind::Rotate(_)) = (self.smooth, &self.orientation)
         {
-            let message =
-                "smooth is for a direction, a frame or a stress; angles are followed as they are given: leave it out";
+            let message = match (self.align, self.orientation == OrientationKind::default()) {
+                (Some(_), true) => {
+                    "smooth is for a direction, a frame or a stress; what align = \"surface\" alone gives is averaged over half of \
+                     align_depth: give a larger align_depth, and leave smooth out"
+                }
+                _ => {
+                    "smooth is for a direction, a frame or a stress; angles are followed as they are given: leave it out"
+                }
+            };
             return Err(DesignError::new(below("smooth"), message).found(number(length)));
         }
         let align = self.aligned(&wavelength).map_err(|f| DesignError::fault(path, f))?;

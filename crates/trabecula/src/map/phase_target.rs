@@ -82,6 +82,14 @@ impl Laid {
 
     fn closeness(&self, weight: Option<&Grade>, steps: f64) -> Result<Option<Vec<f64>>, Fault> {
         let mut roots = vec![1.0; self.grid.len()];
+        let even = weight.and_then(Grade::constant);
+        if let Some(wrong) = even.filter(|w| !(*w >= 0.0 && w.is_finite())) {
+            let message = format!("{}; a weight is a finite number from 0 up", number(wrong));
+            return Err(Fault::new("weight", message));
+        }
+        if even == Some(0.0) {
+            return Err(no_weight());
+        }
         if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
             weight.values(self.asked_at(), &mut roots);
             let most = roots.iter().copied().fold(0.0, f64::max);
@@ -95,8 +103,7 @@ impl Laid {
                 return Err(Fault::new("weight", message));
             }
             if most == 0.0 {
-                let message = "the weight is zero everywhere: nothing is asked for";
-                return Err(Fault::new("weight", message));
+                return Err(no_weight());
             }
             roots.iter_mut().for_each(|w| *w = (*w / most).sqrt());
         } else if self.depth.iter().all(|d| *d <= 1e-6 * self.longest()) {
@@ -105,6 +112,13 @@ impl Laid {
         let roots = roots.iter().enumerate().map(|(n, w)| (w * self.nearness(steps, n)).max(LEAST_ROOT));
         Ok(Some(roots.collect()))
     }
+}
+
+/// Explains that a weight is zero everywhere.
+fn no_weight() -> Fault {
+    let message = "the weight is 0 everywhere, and no direction or wavelength is followed anywhere: give one above 0 where cells \
+                   matter, or leave weight out";
+    Fault::new("weight", message)
 }
 
 /// The frames at the nodes, and the gradients of the three phases that they and the wavelengths ask for.

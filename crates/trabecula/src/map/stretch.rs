@@ -103,8 +103,8 @@ impl Stretch {
         };
         let [least, most] = self.range().map(number);
         Some(format!(
-            "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map with a smaller stretch there was \
-             found. Give a wider range, or let orientation and wavelength vary more slowly",
+            "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map that keeps to that range \
+             without folding was found. Give a wider range, or let orientation and wavelength vary more slowly",
             in_mm(at)
         ))
     }
@@ -132,7 +132,7 @@ fn any_normal(v: Vec3) -> Vec3 {
 }
 
 /// The map near to `solution` whose stretches are in a range in the cells of the grid of which a node `counts`.
-pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: Solution) -> Solution {
+pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: &Solution) -> Solution {
     let grid = *solution.grid();
     let mut values = solution.spline.at_nodes();
     let cells = GridCells::new(grid);
@@ -179,5 +179,5 @@ pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, soluti
             values.par_iter_mut().zip(&change).for_each(|(v, d)| *v += d);
         }
     }
-    Solution { spline: Spline::through(grid, values), winding: solution.winding, branches: None }
+    Solution { spline: Spline::through(grid, values), winding: solution.winding.clone(), branches: None }
 }

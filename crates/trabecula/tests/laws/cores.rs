@@ -279,6 +279,14 @@ fn what_is_not_possible_is_said() {
         ),
         (odd, &wedge, ", core = \"void\"", "lattice.a.cell: axes come back turned by 180 degrees"),
         (GYROID, RING, ", core = \"solid\"", "lattice.a.map.phase.core: a singular line is closed, a ring through"),
+        (
+            GYROID,
+            RING,
+            ", core = \"solid\"",
+            "smooth directions over more than a wavelength (smooth, in mm), or leave core out",
+        ),
+        (GYROID, "align = \"surface\"", ", smooth = 3", "give a larger align_depth, and leave smooth out"),
+        (GYROID, "rotate_z = 3", ", smooth = 3, align = \"surface\"", "angles are followed as they are given"),
     ] {
         let why = built(&design(cell, orientation, keys)).err().map(|e| e.to_string()).unwrap_or_default();
         println!("{why}");

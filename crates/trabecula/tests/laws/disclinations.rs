@@ -78,4 +78,12 @@ fn what_folds_names_its_line() {
     let message = built("stress = [{ formula = \"x\" }, { formula = \"-x\" }, -20, 0, 0, { formula = \"y\" }]", false);
     let message = message.err().expect("it folds").to_string();
     assert!(message.contains("axes do not come back to themselves round a line from"), "{message}");
+    // What covers it comes first; a range of stretches helps where nothing winds.
+    assert!(message.contains(". Cover the line with core = \"solid\" or \"void\", smooth"), "{message}");
+    assert!(!message.contains("stretch"), "{message}");
+    let line =
+        built("direction = [{ formula = \"cos(atan2(y, x)/2)\" }, { formula = \"sin(atan2(y, x)/2)\" }, 0]", false);
+    if let Err(why) = line {
+        assert!(!why.to_string().contains("core"), "no core serves a direction: {why}");
+    }
 }

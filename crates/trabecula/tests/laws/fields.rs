@@ -217,7 +217,12 @@ fn bad_files_are_refused_with_what_is_wrong() {
         "level.fraction.field.path",
         &["does not cover", "% of the region", "[6.0, 8.0, 8.0]"],
     );
-    says(&field("nan.vtu", "rho"), PLAIN, "level.fraction.field.array", &["125 of 125 numbers", "not finite"]);
+    says(
+        &field("nan.vtu", "rho"),
+        PLAIN,
+        "level.fraction.field.array",
+        &["125 of 125 numbers", "not finite", "fill them before use"],
+    );
     says(&field("broken.vtu", "rho"), PLAIN, "level.fraction.field.path", &["PolyData"]);
     let stress = |array: &str| {
         format!("phase = {{ wavelength = 2, stress = {{ field = {{ path = \"result.vtu\", array = \"{array}\" }} }} }}")

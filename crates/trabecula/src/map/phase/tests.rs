@@ -242,6 +242,14 @@ fn what_cannot_be_solved_is_refused_with_its_place() {
     let jump = Linear::new([1.0, 0.0, 0.0], vec![[5.0, 2.0], [5.001, 4.0]]).expect("grade");
     refused(&about_z("0*x", jump.into()), "wavelength", "faster than the grid");
     refused(&about_z("0*x", formula("4 + 3*sin(40*x*y*z)")), "wavelength", "faster than the grid");
+    let step = crate::grade::Steps::new([1.0, 0.0, 0.0], vec![[0.0, 2.0], [5.1, 5.0]]).expect("grade");
+    let leap = solve(&about_z("0*x", step.into()), None).expect("refused").message;
+    assert!(leap.contains("jumps from 2 to 5 mm") && !leap.contains("smaller step"), "{leap}");
+    let steep = solve(&about_z("0*x", formula("3 + 2*tanh(8*(x-5.1))")), Some(0.5)).expect("refused").message;
+    assert!(steep.contains("smaller step"), "{steep}");
+    let weighed = |w: f64| Wanted { weight: Some(Grade::Constant(w)), ..about_z("x", Grade::Constant(2.0)) };
+    refused(&weighed(-1.0), "weight", "-1; a weight is a finite number from 0 up");
+    refused(&weighed(0.0), "weight", "0 everywhere");
     let fine = solve(&about_z("x", Grade::Constant(2.0)), Some(1e-4)).expect("refused");
     assert!(fine.at == "step" && fine.message.contains("use a step above"));
     // Half a turn within half a cell.
