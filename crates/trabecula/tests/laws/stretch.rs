@@ -2,6 +2,7 @@
 
 use crate::common::{campaign, points};
 use geometry::math::{Aabb, Vec3, determinant};
+use trabecula::design::{Built, Design, NoFiles};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
 use trabecula::map::{Mapping, Orientation, Phase, Settings, Stretch, Wanted};
@@ -77,4 +78,23 @@ fn a_map_within_the_range_is_that_of_least_squares() {
             assert_eq!(free.jacobian(p), held.jacobian(p));
         }
     }
+}
+
+/// A range never makes of a map that does not fold one that does: round a singular line, where cells cannot be held in it, the map
+/// without a range is taken, and a warning says where the range is left.
+#[test]
+fn a_range_that_folds_is_left_out() {
+    let built = |more: &str| {
+        let text = format!(
+            "schema = 1\nregion.box = {{ min = [-4.3, -5.1, 0], max = [5.2, 4.4, 3] }}\n[lattice.a]\ncell = \"primitive\"\npart = \"upper\"\n\
+             level.fraction = 0.4\n[lattice.a.map.phase]\nwavelength = 3\nstep = 1.4\nstress = [{{ formula = \"x\" }}, \
+             {{ formula = \"-x\" }}, -20, 0, 0, {{ formula = \"y\" }}]\n{more}"
+        );
+        Design::from_toml(&text).expect("text").build(&NoFiles).expect("no fold")
+    };
+    let [free, held] = ["", "stretch = [0.67, 1.5]"].map(built);
+    let told = held.warnings.iter().find(|w| w.message.contains("stretch = [0.67, 1.5]")).expect("a warning");
+    assert!(told.message.contains("times as long as asked for at (") && told.message.contains("folding"), "{told:?}");
+    let density = |made: &Built| made.report().lattices["a"].distortion.as_ref().expect("solved").density;
+    assert!(density(&free)[0] > 0.0 && density(&held)[0] > 0.0);
 }
