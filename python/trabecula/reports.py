@@ -554,8 +554,8 @@ class LatticeReport(Report):
     wavelength: float
     """The smallest wavelength, mm."""
     wavelengths: list[float] | None
-    """The least and the greatest wavelength over the region, mm, where a solved map is asked for one that varies; of
-    unequal edges, the smallest. None elsewhere."""
+    """The least and the greatest wavelength over the region, mm, where a solved map is asked for one that varies; of unequal
+    edges, the smallest. None elsewhere."""
 
 
 class LayersReport(Report):

@@ -162,9 +162,9 @@ mod tests {
         }
         for (kind, found) in [
             (&b"<c16"[..], "of complex numbers (type \"c16\")"),
-            (b"|O", "of Python objects (type \"O\")"),
-            (b"<U3", "of texts (type \"U3\")"),
-            (b"<f3", "of type \"f3\""),
+            (&b"|O"[..], "of Python objects (type \"O\")"),
+            (&b"<U3"[..], "of texts (type \"U3\")"),
+            (&b"<f3"[..], "of type \"f3\""),
         ] {
             let why = read_npy(&of_kind(kind)).unwrap_err().message;
             assert!(why.contains(found) && why.contains("no plain numbers"), "{why}");
