@@ -295,9 +295,9 @@ impl<'a> Probe<'a> {
 
 /// Whether a wavelength that changes abruptly between two points still does within a four-thousandth of the way: no step carries that.
 fn jumps(of: &Grade, [mut a, mut b]: [Vec3; 2]) -> bool {
-    const HALVINGS: usize = 12;
+    const BISECTIONS: usize = 12;
     let ratio = |v: f64, w: f64| v.max(w) / v.min(w);
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let middle = scale(add(a, b), 0.5);
         let mut found = [0.0; 3];
         of.values(&[a, middle, b], &mut found);
