@@ -44,7 +44,7 @@ def test_an_image_that_leaves_some_of_the_region_out_is_refused(tmp_path, step):
         f"{values}</DataArray></PointData></Piece></ImageData></VTKFile>"
     )
     field = lt.grade.field(str(tmp_path / "field.vti"), array="f")
-    with pytest.raises(lt.DesignError, match="the grid does not cover .* of the region; .* give another as unit"):
+    with pytest.raises(lt.DesignError, match=r"the grid does not cover .* of the region; .* give another as unit"):
         design(lt.map.affine(wavelength=3), lt.level.fraction(field)).build()
     whole = {"field": {**field["field"], "unit": "cm"}}
     assert design(lt.map.affine(wavelength=3), lt.level.fraction(whole)).build().report()["lattices"]["core"]["fraction"] == 0.3

@@ -112,10 +112,10 @@ class Layers(Sequence):
         """Writes all layers to a file and gives its figures; a few layers are held in memory at a time.
 
         ``path`` ends in .cli (``binary`` or text), .svg, .3mf (slices), or for pictures in .zip (PNG and a manifest), .sl1
-        (resin printers), .tif or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey is the
-        exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without it they
-        are as large as the region. ``exposure`` (s, of layers and of the first ones; 8 and 35 unless given) is
-        for .sl1.
+        (resin printers), .tif or .npy (uint8, indexed [x, y, layer]). Pictures need ``pixel``, the edge of a pixel in mm; grey
+        is the exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without
+        it they are as large as the region. ``exposure`` (s, of layers and of the first ones; 8 and 35 unless given) is for
+        .sl1.
         """
         kind = extension(path, LAYER_WRITES)
         row = LAYERS[kind]

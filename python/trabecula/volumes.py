@@ -407,18 +407,15 @@ def _resultant(name: str, value: Sequence[float]) -> list[float]:
 
 
 def warn_flaws(made: VolumeMesh, one: bool) -> None:
-    """Warns of several components, if there should be ``one``, of what was left out, of faces far from the surface, of surfaces that
-    cross, and of badly shaped tetrahedra."""
+    """Warns of what was left out, of faces far from the surface, of several components, if there should be ``one``, of surfaces
+    that cross, and of badly shaped tetrahedra."""
     figures, found = made.report(), []
     if figures.dropped > LEFT_OUT * figures.volume:
-        share = 100 * figures.dropped / (figures.volume + figures.dropped)
-        found += [
-            f"{figures.dropped:.3g} mm³ ({share:.2g} %) is left out where the solid is thinner than an edge; use a smaller edge"
-        ]
+        out = f"{figures.dropped:.3g} mm³ ({100 * figures.dropped / (figures.volume + figures.dropped):.2g} %)"
+        found += [f"{out} is left out where the solid is thinner than an edge; use a smaller edge"]
     if figures.deviation > FAR * max(figures.edge):
-        found += [
-            f"the boundary is up to {figures.deviation:.2g} mm off the surface: the edge is too long for it; use a smaller one"
-        ]
+        off = f"the boundary is up to {figures.deviation:.2g} mm off the surface"
+        found += [f"{off}: the edge is too long for it; use a smaller one"]
     if one and figures.pieces > 1:
         found += [f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another"]
     crossing = made.boundary().self_intersections
