@@ -1,6 +1,6 @@
 //! From any triangles to the boundary of a solid: the order of the repairs, a report of them, and when they are refused.
 
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::math::{add, cross, norm, scale, sub};
 use crate::mesh::{Mesh, self_intersections};
 use crate::progress::checkpoint;
@@ -124,8 +124,10 @@ fn refuse(message: impl Into<String>) -> Fault {
 }
 
 /// Refuses holes whose caps are too great a part of the surface: a cap is a guess.
-fn check_caps(done: &Repaired, repair: Repair, given: usize, found: Option<&str>) -> Result<(), Fault> {
+fn check_caps(done: &Repaired, repair: Repair, capped: &Mesh, given: usize, found: Option<&str>) -> Result<(), Fault> {
     let (most, allow) = match repair {
+        // With caps of any size it would still be no solid.
+        Repair::Caps(share) if validity::thick(capped).is_err() => (share, String::new()),
         Repair::Caps(share) => {
             let enough = ((20.0 * done.hole_share).ceil() / 20.0).min(1.0);
             (share, format!(", or allow more with caps = {enough}"))
@@ -201,7 +203,7 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
                 found.unwrap_or_default()
             )));
         }
-        check_caps(&done, repair, given, found.as_deref())?;
+        check_caps(&done, repair, &mesh, given, found.as_deref())?;
         stitch::drop_degenerate(&mut mesh);
     }
     checkpoint();
@@ -235,8 +237,8 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     }
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
         return Err(refuse(format!(
-            "the mesh of {given} triangles holds no solid: its volume is {:e} mm³",
-            mesh.volume()
+            "the mesh of {given} triangles holds no solid: its volume is {} mm³",
+            number(mesh.volume())
         )));
     }
     Ok(Boundary { mesh, pairs, done })

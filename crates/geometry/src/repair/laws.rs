@@ -147,11 +147,17 @@ fn too_many_holes_are_refused_in_numbers() {
         vertices: (0..300).map(|_| [0; 3].map(|_| random(&mut seed))).collect(),
         triangles: (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
     };
+    // More caps are offered only where they make a solid.
+    let said = refused(soup.clone(), Repair::Caps(0.2));
+    assert!(said.contains("at most 20 %") && !said.contains("caps ="), "{said}");
+    let said = refused(soup.clone(), Repair::Caps(1.0));
+    assert!(said.contains("flat and bounds no solid") && !said.contains("0e0"), "{said}");
     let said = refused(soup, Repair::Auto);
     assert!(said.contains("100 holes") && said.contains("50.0 %") && said.contains("300 open edges"), "{said}");
     let mut lid = Mesh::cuboid([0.0; 3], [1.0; 3]);
     lid.triangles.truncate(10);
-    assert!(refused(lid, Repair::Auto).contains("16.7 %"));
+    assert!(refused(lid.clone(), Repair::Auto).contains("16.7 %"));
+    assert!(refused(lid, Repair::Caps(0.1)).contains("allow more with caps = 0.2;"));
 }
 
 #[test]

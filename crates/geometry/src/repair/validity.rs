@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::half_edges::{components, halves, rises};
 use super::stitch::flat;
 use crate::distance::winding::turn;
-use crate::fault::Fault;
+use crate::fault::{self, Fault};
 use crate::math::{cross, dot, norm, sub};
 use crate::mesh::Mesh;
 use crate::union_find::{labels, singles, unite};
@@ -115,7 +115,8 @@ pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
         return Ok(());
     }
     let volume: f64 = sums.iter().map(|s| s.0.abs()).sum();
-    Err(refuse(format!("the volume of the mesh is {volume:e} mm³, zero to rounding: it is flat and bounds no solid")))
+    let volume = fault::number(volume);
+    Err(refuse(format!("the volume of the mesh is {volume} mm³, zero to rounding: it is flat and bounds no solid")))
 }
 
 /// Whether a closed mesh (edges `pairs`) that does not cross itself is one component with cavities inside it.
