@@ -200,6 +200,8 @@ def test_faces_without_solids_are_sewn(tmp_path):
     part = tessellated(write(cad.compound(list(cad.parts(box, "face"))), tmp_path / "faces.step"))
     mesh = lt.Mesh.of(part.points, part.triangles)
     assert part.volume is None and mesh.closed and abs(mesh.volume) == pytest.approx(60)
+    with pytest.raises(ValueError, match="it holds no solid, only open faces; save the part as a solid"):
+        tessellated(write(next(cad.parts(box, "face")), tmp_path / "face.step"))
 
 
 def test_iges(tmp_path):

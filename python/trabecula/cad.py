@@ -175,6 +175,8 @@ def tessellated(path: str, chord: float | None, angle: float, solid: str | None)
         mesh.add(one, document)
     if not mesh.triangles:
         raise Refused("its faces could not be divided into triangles")
+    if not whole and len(mesh.triangles) < 4:
+        raise Refused("it holds no solid, only open faces; save the part as a solid in the program it came from")
     facts = {
         "labels": mesh.labels,
         "solids": [s.names[0] if s.names else "" for s in solids],
