@@ -29,6 +29,11 @@ pub(super) fn write(
         let volume = quadors.volume().map_err(Stopped::Refused)?;
         return Ok(StepReport { solids, faces, edges, vertices, volume, deviation: 0.0, angle: None });
     }
+    if !built.beams.is_empty() {
+        let message = "a STEP file has beams alone, with their exact surface, or a lattice in a box, as patches; this design has \
+                       both; write a mesh instead, such as .3mf or .stl";
+        return refuse("beams", message);
+    }
     if !built.tilings.is_empty() {
         let message = "a STEP file has patches of smooth surfaces, and a lattice over tetrahedra has creases between them; \
                        write a mesh instead, such as .3mf or .stl";
