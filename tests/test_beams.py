@@ -315,7 +315,7 @@ CASES = [
     (but(GOOD, fillet={"tau": 1}), "fillet.tau", ["tau is 1", "at least 0 and less than 1"]),
     (but(GOOD, fillet="round"), "fillet", ["unknown fillet", "none, auto"]),
     (but(GOOD, profile="tube"), "profile", ["unknown profile"]),
-    (but(GOOD, profile={"waist": 2}), "profile", ["must be between", "the beam from"]),
+    (but(GOOD, profile={"waist": 2}), "profile", ["must be more than", "the beam from"]),
     (but(GOOD, merge=-1), "merge", ["at least 0"]),
     (but(GOOD, trim="clip"), "trim", ["unknown trim", "cut, drop, snap"]),
     (but(GOOD, map={"affine": {"wavelength": 0.001}}, radius=0.0001), "map", ["the maximum is 10000000"]),

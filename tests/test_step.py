@@ -49,7 +49,22 @@ def test_a_file_has_what_the_report_says(tmp_path):
     [
         (
             lambda: lt.Design(region=lt.region.box(size=[10, 60, 60]), beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8)),
-            "exact surface of beams alone, and .*the region cuts some.*write a mesh",
+            r"exact surface of beams alone, and .*the region cuts some .*trim = \"drop\"\).*write a mesh",
+        ),
+        (
+            lambda: lt.Design(
+                region=lt.region.sphere(radius=8), beams=lt.Beams(cell="bcc", radius=0.4, trim="drop", map=lt.map.affine(wavelength=4))
+            ),
+            r"the region cuts some \(make it larger by a hub's radius\); write a mesh",
+        ),
+        (
+            lambda: lt.Design(
+                region=ROOM,
+                lattice={"a": lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=20), level=lt.level.fraction(0.3))},
+                beams={"b": lt.Beams(cell="octet", radius=2, map=lt.map.affine(wavelength=20))},
+                blend=lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-6: 0, 6: 1})),
+            ),
+            "a STEP file has beams alone.*or a lattice in a box.*this design has both; write a mesh",
         ),
         (
             lambda: lt.Design(region=ROOM, beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8), skin={"thickness": 1.0}),

@@ -67,6 +67,29 @@ impl Similarity {
         std::iter::successors(Some(Similarity::IDENTITY), next).take(count).collect()
     }
 
+    /// Angle of the rotation, degrees.
+    pub fn angle(&self) -> f64 {
+        let r = &self.rotation;
+        let sine = geometry::math::norm([r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]);
+        sine.atan2(r[0][0] + r[1][1] + r[2][2] - 1.0).to_degrees()
+    }
+
+    /// The first power below `count` that is the identity, within rounding at points up to `size` (mm) from the origin.
+    pub fn period(&self, count: u32, size: f64) -> Option<u32> {
+        if self.scale != 1.0 || self.is_translation() && self.shift != [0.0; 3] {
+            return None;
+        }
+        let far = size + geometry::math::norm(self.shift);
+        let mut power = *self;
+        (1..count.min(LONGEST_PERIOD)).find(|n| {
+            let off = 1e-12 + 1e-15 * f64::from(*n);
+            let turned = (0..9).any(|i| (power.rotation[i / 3][i % 3] - IDENTITY[i / 3][i % 3]).abs() > off);
+            let same = !turned && power.shift.iter().all(|t| t.abs() <= off * far);
+            power = self.after(&power);
+            same
+        })
+    }
+
     /// Whether the two commute, within rounding at points up to `size` (mm) from the origin.
     pub fn commutes(&self, other: &Similarity, size: f64) -> bool {
         let (a, b) = (self.after(other), other.after(self));
@@ -98,6 +121,9 @@ pub struct Pattern {
     pub steps: [(Similarity, u32); 3],
 }
 
+/// Repeats after which no step is looked at for whether it has come back to where it began.
+const LONGEST_PERIOD: u32 = 100_000;
+
 /// Maximum number of distinct hubs.
 const MAX_DISTINCT_HUBS: f64 = 1e6;
 
@@ -115,13 +141,23 @@ impl Pattern {
     /// Checks the pattern.
     ///
     /// # Errors
-    /// A strut that names an unknown node or joins a node with itself; a scale or repeat count of zero.
+    /// A strut that names an unknown node or joins a node with itself; a scale or repeat count of zero; repeats that
+    /// coincide.
     pub fn check(&self) -> Result<(), Fault> {
+        let size = self.nodes.iter().map(|h| geometry::math::norm(h.center)).fold(0.0, f64::max);
         for (a, (step, count)) in self.steps.iter().enumerate() {
             if !(step.scale > 0.0 && step.scale.is_finite()) || *count == 0 {
                 let message =
                     format!("repeat count and scale must be positive, found {count} and {}", number(step.scale));
                 return Err(Fault::new(format!("repeat[{a}]"), message));
+            }
+            if let Some(period) = step.period(*count, size) {
+                let steps = match period {
+                    1 => "steps that move nothing coincide".into(),
+                    n => format!("steps of {} degrees coincide after {n}", number(step.angle())),
+                };
+                let message = format!("{steps}: count must be at most {period}, found {count}");
+                return Err(Fault::new(format!("repeat[{a}].count"), message).found(count.to_string()));
             }
         }
         for (i, s) in self.struts.iter().enumerate() {

@@ -8,7 +8,7 @@ mod fill_region;
 pub use fill_region::fill;
 
 use crate::implicit::Implicit;
-use beams::graph::{Cleaned, Graph, Trimmed, WireframeReport};
+use beams::graph::{Cleaned, Graph, Trim, Trimmed, WireframeReport};
 use beams::pattern::PatternField;
 use beams::quador::{Collision, Quadors, Shortfall};
 
@@ -55,6 +55,8 @@ pub struct Truss {
     pub solved_radius: Option<f64>,
     /// Length scale for grids, mm: the minimum wavelength of the map, or the mean strut length.
     pub wavelength: f64,
+    /// Whether that is of what repeats, rather than of struts listed one by one, whose length says nothing of their detail.
+    pub repeats: bool,
     /// Statistics of the wireframe.
     pub report: WireframeReport,
     /// Minimum and maximum fillet radius in the tightest crotches of hubs inside the region, mm; `None` without
@@ -66,6 +68,8 @@ pub struct Truss {
     pub whole: bool,
     /// Counts of the clean-up.
     pub cleaned: Cleaned,
+    /// What is done with struts that leave the region.
+    pub trim: Trim,
     /// Counts of the trim.
     pub trimmed: Trimmed,
     /// Number of nodes inside the region with a single strut.

@@ -60,23 +60,40 @@ impl Pencil {
         if lambda > lo && lambda < hi {
             return Ok(Pencil { lambda, ..pencil });
         }
-        let (quantity, found, range) = match profile {
-            Profile::Mid(r) => ("radius at mid length (mm)", r, pencil.mid_radius_range()),
-            Profile::Waist(r) => ("waist (mm)", r, (0.0, pencil.max_waist())),
-            _ => ("lambda", lambda, (lo, hi)),
+        Err(pencil.outside(profile, lambda))
+    }
+
+    /// What is wrong with a profile that no member has: the allowed range.
+    fn outside(&self, profile: Profile, lambda: f64) -> Fault {
+        let hubs = format!(
+            "hubs of radius {} and {} mm that are {} mm apart",
+            number(self.radii[0]),
+            number(self.radii[1]),
+            number(self.length)
+        );
+        let (at, quantity, found, (least, most), end) = match profile {
+            Profile::Mid(r) => ("radius", "radius at mid length (mm)", r, self.mid_radius_range(), "less than"),
+            Profile::Waist(w) => match self.waist_range() {
+                Some(range) => ("profile", "waist (mm)", w, range, "at most"),
+                None => {
+                    let message = format!(
+                        "no beam has a waist between {hubs}, found waist = {} mm: they overlap too far; reduce the larger one or leave the \
+                         waist out",
+                        number(w)
+                    );
+                    return Fault::new("profile", message);
+                }
+            },
+            _ => ("profile", "lambda", lambda, self.lambda_range(), "less than"),
         };
-        Err(Fault::new(
-            "profile",
-            format!(
-                "{quantity} must be between {} and {} for hubs of radius {} and {} mm that are {} mm apart, found {}",
-                number(range.0),
-                if range.1.is_finite() { number(range.1) } else { "infinity".into() },
-                number(radii[0]),
-                number(radii[1]),
-                number(length),
-                number(found)
-            ),
-        ))
+        // Rounded inwards, so that what is said is allowed.
+        let digits = if most - least < 1e-3 * most { 11 } else { 6 };
+        let upper = match most.is_finite() {
+            true => format!(" and {end} {}", within(most, -1.0, digits)),
+            false => String::new(),
+        };
+        let least = within(least, 1.0, digits);
+        Fault::new(at, format!("{quantity} must be more than {least}{upper} for {hubs}, found {}", number(found)))
     }
 
     /// The open interval of λ in which the quadric touches both balls along real circles and has no apex between them:
@@ -134,9 +151,10 @@ impl Pencil {
             // e²λ² − bλ + L² = 0: the root that stays finite as the radii become equal, if it is in the interval.
             Profile::Mid(r) => {
                 let b = 4.0 * (self.power() + r * r) - e * e;
-                let root = (b * b - 4.0 * e * e * l2).sqrt();
+                let root = (b * b - 4.0 * e * e * l2).max(0.0).sqrt();
                 let least = 2.0 * l2 / (b + root);
-                if !(r > 0.0 && b > 0.0) {
+                let (thin, thick) = self.mid_radius_range();
+                if !(r > thin && r < thick && b > 0.0) {
                     f64::NAN
                 } else if least > self.lambda_range().0 || e == 0.0 {
                     least
@@ -149,21 +167,25 @@ impl Pencil {
                 let p = 4.0 * (self.power() + w * w);
                 let b = l2 + p - e * e;
                 let lambda = (b + (b * b - 4.0 * p * l2).max(0.0).sqrt()) / (2.0 * p);
-                let least = self.length / (self.length - e.abs());
                 // Between equal hubs the waist of the cylinder is a double root, accurate to half the digits only.
                 let cylinder = self.radii[0] == self.radii[1] && w == self.radii[0];
-                if cylinder {
-                    1.0
-                } else if w > 0.0 && w <= self.max_waist() * (1.0 + 1e-12) && p > 0.0 {
-                    lambda.max(least)
-                } else {
-                    f64::NAN
+                match self.waist_range() {
+                    _ if cylinder => 1.0,
+                    Some((least, most)) if w > least && w <= most * (1.0 + 1e-12) && p > 0.0 => {
+                        lambda.max(self.length / (self.length - e.abs()))
+                    }
+                    _ => f64::NAN,
                 }
             }
         })
     }
 
-    /// Range of radii at mid length, mm.
+    /// Radius of the circle in which the balls meet, mm; 0 if they do not.
+    fn common_circle(&self) -> f64 {
+        (-self.power()).max(0.0).sqrt()
+    }
+
+    /// The open interval of radii at mid length, mm.
     pub fn mid_radius_range(&self) -> (f64, f64) {
         let (lo, hi) = self.lambda_range();
         let e = self.skew();
@@ -173,7 +195,7 @@ impl Pencil {
         let end = if hi.is_finite() {
             at(hi)
         } else if e == 0.0 {
-            0.0
+            self.common_circle()
         } else {
             f64::INFINITY
         };
@@ -181,15 +203,11 @@ impl Pencil {
         (least, at(lo).max(end))
     }
 
-    /// Maximum waist radius between the contact circles, mm.
-    pub fn max_waist(&self) -> f64 {
-        let e = self.skew();
-        if e == 0.0 {
-            return self.radii[0];
-        }
-        let lambda = self.length / (self.length - e.abs());
-        let w2 = self.length * self.length / (4.0 * lambda) - self.power() - e * e / (4.0 * (lambda - 1.0));
-        w2.max(0.0).sqrt()
+    /// Radii at a waist between the contact circles, mm: more than the first, at most the second. From λ = L/(L − |e|), where
+    /// the waist is the equator of the smaller ball, it decreases with λ, to nothing at the double cone or, where the balls
+    /// overlap, to the circle in which they meet. `None` where the small ball lies beyond that circle: no member has a waist.
+    pub fn waist_range(&self) -> Option<(f64, f64)> {
+        (self.skew().abs() < self.length).then(|| (self.common_circle(), self.radii[0].min(self.radii[1])))
     }
 
     /// Position of the contact plane of an end on the axis, from that end's centre towards the other, mm.
@@ -227,6 +245,20 @@ impl Pencil {
         let ends = self.radius_squared(z1).min(self.radius_squared(z2));
         let vertex = -b / (2.0 * a);
         if a > 0.0 && vertex > z1 && vertex < z2 { ends.min(self.radius_squared(vertex)) } else { ends }.max(0.0).sqrt()
+    }
+}
+
+/// A limit as text for a message, its first digits where it is long, rounded up (1) or down (−1).
+fn within(limit: f64, toward: f64, digits: i32) -> String {
+    let unit = 10f64.powf(limit.abs().log10().floor() - f64::from(digits - 1));
+    let rounded = unit * (limit / unit).round();
+    // What differs by rounding is the same.
+    let off = (rounded - limit) * toward < -1e-12 * limit;
+    let said = if off { rounded + toward * unit } else { rounded };
+    if limit == 0.0 {
+        number(limit)
+    } else {
+        number(format!("{said:.*e}", digits as usize - 1).parse().unwrap_or(said))
     }
 }
 
@@ -310,8 +342,8 @@ mod tests {
                 let r = thin + s * (thick.min(3.0) - thin);
                 let p = Pencil::new(length, radii, Profile::Mid(r)).expect("in the range");
                 assert!((p.radius_squared(length / 2.0).sqrt() - r).abs() < 1e-9 * r, "{p:?} {r}");
-                let w = s * pencil.max_waist();
-                if length > (radii[0] + radii[1]) * 1.001 && w > 1e-6 {
+                if let Some((least, most)) = pencil.waist_range() {
+                    let w = least + s * (most - least);
                     let p = Pencil::new(length, radii, Profile::Waist(w)).expect("in the range");
                     assert!((p.waist() - w).abs() < 1e-6 * w.max(1e-3), "{p:?} {w}");
                 }
@@ -320,8 +352,67 @@ mod tests {
             let [a, b, c] = Pencil::new(length, radii, Profile::Cone).expect("always").meridian(0);
             assert!((b * b - 4.0 * a * c).abs() < 1e-12 * (1.0 + b * b));
             assert!(Pencil::new(length, radii, Profile::Mid(thick * 1.01)).is_err());
-            assert!(Pencil::new(length, radii, Profile::Waist(pencil.max_waist() * 1.01)).is_err());
+            assert!(Pencil::new(length, radii, Profile::Waist(radii[0].min(radii[1]) * 1.01)).is_err());
         }
+    }
+
+    #[test]
+    fn a_profile_is_allowed_if_and_only_if_it_is_within_the_interval_that_is_said() {
+        let mut seed = 11;
+        let (mut overlapping, mut allowed, mut refused) = (0, 0, 0);
+        for (length, radii) in pairs() {
+            overlapping += usize::from(length < radii[0] + radii[1]);
+            for profile in [Profile::Mid, Profile::Waist, Profile::Lambda] {
+                // Something below any interval, whose refusal says it.
+                let said = Pencil::new(length, radii, profile(-1.0)).expect_err("below").message;
+                let after = |word: &str| -> Option<f64> {
+                    let rest = said.split_once(word)?.1;
+                    Some(rest.split(' ').next()?.parse().expect("a number"))
+                };
+                let Some(least) = after("must be more than ") else {
+                    assert!(said.starts_with("no beam has a waist"), "{said}");
+                    let r = radii[0].min(radii[1]);
+                    assert!((1..20).all(|k| Pencil::new(length, radii, profile(r * f64::from(k) / 10.0)).is_err()));
+                    continue;
+                };
+                let most = after("and less than ").or(after("and at most ")).unwrap_or(f64::INFINITY);
+                assert!(least < most, "{said}");
+                let top = most.min(4.0 * (least + 1.0));
+                for _ in 0..8 {
+                    let v = 1.3 * top * random(&mut seed);
+                    // Limits are said to six digits.
+                    let near = |limit: f64| (v - limit).abs() < 2e-5 * limit;
+                    if v > 0.0 && !near(least) && !near(most) {
+                        let inside = v > least && v < most;
+                        assert_eq!(Pencil::new(length, radii, profile(v)).is_ok(), inside, "{v}: {said}");
+                        (allowed, refused) = (allowed + usize::from(inside), refused + usize::from(!inside));
+                    }
+                }
+                let nearly = least + 1e-5 * (top - least);
+                assert!(Pencil::new(length, radii, profile(nearly)).is_ok(), "{nearly}: {said}");
+            }
+        }
+        assert!(overlapping > 500 && allowed > 10_000 && refused > 10_000, "{overlapping} {allowed} {refused}");
+    }
+
+    #[test]
+    fn beams_between_overlapping_hubs_are_thicker_than_the_circle_in_which_they_meet() {
+        let said = |profile| Pencil::new(0.784947, [0.8, 0.8], profile).expect_err("too thin");
+        let message = "must be more than 0.697112 and at most 0.8 for hubs of radius 0.8 and 0.8 mm that are 0.784947 mm apart, found 0.4";
+        let fault = said(Profile::Waist(0.4));
+        assert_eq!((fault.at.as_str(), fault.message), ("profile", format!("waist (mm) {message}")));
+        let fault = said(Profile::Mid(0.5));
+        assert_eq!(fault.at, "radius");
+        assert!(fault.message.starts_with("radius at mid length (mm) must be more than 0.697112 and less than 0.976"));
+        for w in [0.7, 0.75, 0.79, 0.8] {
+            let p = Pencil::new(0.784947, [0.8, 0.8], Profile::Waist(w)).expect("in the range");
+            assert!((p.waist() - w).abs() < 1e-9);
+        }
+        // The smaller ball lies beyond the circle in which it meets the other one.
+        let fault = Pencil::new(0.7, [1.0, 0.5], Profile::Waist(0.4)).expect_err("no waist");
+        assert!(
+            fault.message.starts_with("no beam has a waist between hubs of radius 1 and 0.5 mm that are 0.7 mm apart")
+        );
     }
 
     #[test]

@@ -28,8 +28,8 @@ use geometry::progress::checkpoint;
 
 pub(super) use beam_report::{held, inside, lone, report, share};
 use beam_report::{warn, warn_cleaned};
-pub(super) use wire::given;
 use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
+pub(super) use wire::{given, key_of_fault};
 
 /// Nodes within this share of the mean length of struts are one.
 const ONE: f64 = 1e-6;
@@ -54,6 +54,7 @@ pub(super) fn beams(
         GraphSpec::Cell(of) => graph::named(&of.cell.0),
         _ => None,
     };
+    let explicit = matches!(spec.graph, GraphSpec::Nodes(_) | GraphSpec::File(_));
     let source = match &spec.graph {
         GraphSpec::Cell(_) => "map",
         GraphSpec::File(_) => "path",
@@ -112,7 +113,9 @@ pub(super) fn beams(
         quadors: Arc::new(quadors),
         wavelength,
         cleaned,
+        trim,
         trimmed,
+        repeats: !explicit,
         dangling: wire.dangling(&held),
     };
     check_open(&*truss.quadors, environment)?;
@@ -178,9 +181,12 @@ fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quador
         return refuse("some of these run into each other without a common node");
     }
     if !whole {
-        return refuse(
-            "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")",
-        );
+        return refuse(match beams {
+            Beams::Truss(t) if t.trim != Trim::Drop => {
+                "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")"
+            }
+            _ => "the region cuts some (make it larger by a hub's radius)",
+        });
     }
     Ok(quadors)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::build_beams::{check_open, fillet, given, inside, share};
+use super::build_beams::{check_open, fillet, given, inside, key_of_fault, share};
 use super::data::*;
 use super::{Built, Warning};
 use crate::environment::Environment;
@@ -64,7 +64,13 @@ pub(super) fn laid(
     }
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;
-    let laid = PatternField::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
+    let laid = PatternField::new(pattern, fillet(spec.fillet)).map_err(|f| {
+        // The number of a beam about one hub of each kind is none of the design.
+        match f.at.strip_prefix("beams[").and_then(|rest| rest.split_once("].")) {
+            Some((_, of)) => DesignError { path: below(key_of_fault(of, spec)), ..DesignError::fault(&at, f.clone()) },
+            None => DesignError::fault(&at, f),
+        }
+    })?;
     let region = environment.region.bounds();
     if laid.bounds().intersection(region).is_empty() {
         let (b, r) = (laid.bounds(), region);

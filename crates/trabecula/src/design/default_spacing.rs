@@ -7,8 +7,9 @@ use super::Built;
 use super::coarse_steps::LEAST;
 use crate::report::{BeamsReport, LatticeReport};
 use crate::tiling::steps_enough;
+use crate::truss::Beams;
 
-/// Grid steps on the smallest wavelength, at least.
+/// Grid steps on the smallest wavelength, at least, but for struts listed one by one.
 const PER_CELL: f64 = 32.0;
 /// Grid steps on a cell's finest wave, at least.
 const PER_WAVE: f64 = 24.0;
@@ -46,6 +47,7 @@ impl Built {
     pub fn coarser_spacing(&self) -> Option<Coarser> {
         let report = self.report();
         let (wanted, wavelength) = (report.spacing, self.solid.wavelength);
+        let repeat = smallest_repeat(self);
         let counted = wanted.max(wavelength / COUNTED);
         // What cannot be estimated cannot be meshed: the mesh says why.
         let found = self.surface().estimate(counted).ok()?;
@@ -56,7 +58,7 @@ impl Built {
         let gridded = report.lattices.values().filter(|l| l.tets.is_none());
         let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least());
         let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
-        let limits = necks.map(|t| t / COARSE_PER_WALL).chain([wavelength / COARSE_PER_CELL]);
+        let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL]);
         let limits = limits.chain(self.skin).chain(self.solid.transition).chain(self.whole_steps());
         let most = limits.fold(f64::INFINITY, f64::min);
         let spacing = rounded_down((wanted * (triangles / TRIANGLES).sqrt()).min(most));
@@ -69,6 +71,19 @@ impl Built {
         let steps = steps_enough(&only.tiling, LEAST as usize).filter(|_| only.explicit)?;
         Some(only.tiling.map.mean_edge() / steps as f64)
     }
+}
+
+/// The smallest wavelength, mm, but for struts listed one by one, which may be as short as they are numerous along one line;
+/// infinite if there is no other.
+fn smallest_repeat(built: &Built) -> f64 {
+    let lattices = built.lattices.iter().map(|(_, l)| l.map.wavelength());
+    let tilings = built.tilings.iter().map(|t| t.tiling.wavelength());
+    let repeats = |b: &&Beams| match b {
+        Beams::Truss(truss) => truss.repeats,
+        Beams::Pattern(_) => true,
+    };
+    let beams = built.beams.iter().map(|(_, b)| b).filter(repeats).map(Beams::wavelength);
+    lattices.chain(tilings).chain(beams).fold(f64::INFINITY, f64::min)
 }
 
 /// v, rounded down to three digits.
@@ -93,5 +108,5 @@ pub(super) fn spacing(
     let beams = beams.values().map(|b| b.thickness / PER_BEAM);
     let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
     let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
-    (wavelength / PER_CELL).min(waves).min(walls)
+    (smallest_repeat(built) / PER_CELL).min(waves).min(walls)
 }

@@ -325,3 +325,23 @@ fn lattices_that_grow_into_each_other_are_not_told() {
     let [one] = &blended(gyroid, "0.5", "fraction").transitions()[..] else { panic!("one transition") };
     assert!(one.gap.is_none());
 }
+
+/// A rod in short pieces has the spacing of a rod: the pieces are no cells.
+#[test]
+fn struts_in_short_pieces_are_resolved_by_their_thickness() {
+    let spacing = |pieces: u32| {
+        let nodes: Vec<String> =
+            (0..=pieces).map(|i| format!("[{}, 0, 0]", 10.0 * f64::from(i) / f64::from(pieces) - 5.0)).collect();
+        let struts: Vec<String> = (0..pieces).map(|i| format!("[{i}, {}]", i + 1)).collect();
+        let text = format!(
+            "schema = 1\nregion.box.size = [14, 8, 8]\n[beams.rod]\nnodes = [{}]\nstruts = [{}]\nradius = 0.6\n",
+            nodes.join(", "),
+            struts.join(", ")
+        );
+        let design = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        design.build(&NoFiles).unwrap_or_else(|e| panic!("{e}\n{text}")).report().spacing
+    };
+    for pieces in [2, 5, 40] {
+        assert!((spacing(pieces) - 0.2).abs() < 1e-9, "{pieces}: {}", spacing(pieces));
+    }
+}

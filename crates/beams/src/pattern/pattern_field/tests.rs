@@ -125,3 +125,33 @@ fn beams_that_run_into_each_other_are_found() {
         assert_eq!(found.count > 0, !all.is_empty(), "sample {n}: {found:?}");
     }
 }
+
+#[test]
+fn repeats_that_coincide_are_refused() {
+    let still = (Similarity::IDENTITY, 1);
+    let ring = |step, count| {
+        let strut = Strut { ends: [0, 0], offset: [1, 0, 0], profile: Profile::Mid(0.2) };
+        let nodes = vec![Hub { center: [18.0, 0.0, 0.0], radius: 0.25 }];
+        Pattern { nodes, struts: vec![strut], steps: [(step, count), still, still] }
+    };
+    let turn = |s, degrees, up| Similarity::new(s, [0.0, 0.0, degrees], [3.0, 1.0, 0.0], [0.0, 0.0, up]);
+    for (degrees, period) in [(22.5, 16), (135.0, 8), (-7.2, 50), (0.01, 36_000), (180.0, 2)] {
+        let step = turn(1.0, degrees, 0.0);
+        assert_eq!(ring(step, period).check(), Ok(()), "{degrees}");
+        for count in [period + 1, 2_000_000] {
+            let fault = ring(step, count).check().expect_err("coincide");
+            assert_eq!(fault.at, "repeat[0].count");
+            let angle = number(f64::abs(degrees));
+            let said = format!(
+                "steps of {angle} degrees coincide after {period}: count must be at most {period}, found {count}"
+            );
+            assert_eq!(fault.message, said);
+        }
+    }
+    let fault = ring(turn(1.0, 0.0, 0.0), 2).check().expect_err("coincide");
+    assert_eq!(fault.message, "steps that move nothing coincide: count must be at most 1, found 2");
+    // A step that shrinks, shifts along its axis, or has no whole number of steps in a turn.
+    for step in [turn(0.999, 22.5, 0.0), turn(1.0, 22.5, 0.01), turn(1.0, 137.507_764_050_037_85, 0.0)] {
+        assert_eq!(ring(step, 2000).check(), Ok(()));
+    }
+}

@@ -30,16 +30,34 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
         1 => String::new(),
         n => format!(" ({} in all)", counted(n, "such beam")),
     };
-    // The design gives the profile, or else the radii.
-    let key = match (spec.profile, &spec.hub) {
-        (Some(_), _) if fault.at == "profile" => "profile",
-        (_, Some(_)) => "hub",
-        _ if spec.radius.is_some() => "radius",
-        _ if matches!(spec.graph, GraphSpec::File(_)) => "path",
-        _ => "nodes",
-    };
+    let key = key_of_fault(&fault.at, spec);
     let message = format!("the beam from {from} to {to}: {}{more}", fault.message);
     Err(Fault::new(key, message))
+}
+
+/// The key of a design that gives what is wrong with a beam: the profile, the radius at mid length, or else that of hubs.
+pub(in crate::design) fn key_of_fault(at: &str, spec: &BeamsSpec) -> &'static str {
+    match at {
+        "profile" if spec.profile.is_some() => return "profile",
+        "radius" if spec.radius.is_some() => return "radius",
+        "radius" if spec.fraction.is_some() => return "fraction",
+        "hub" if own_radii(spec) => return "pattern.nodes",
+        _ => {}
+    }
+    match spec.graph {
+        _ if spec.hub.is_some() => "hub",
+        _ if spec.radius.is_some() => "radius",
+        _ if spec.fraction.is_some() => "fraction",
+        GraphSpec::File(_) => "path",
+        GraphSpec::Pattern(_) => "pattern.nodes",
+        _ => "nodes",
+    }
+}
+
+/// Whether nodes of a pattern have radii of their own.
+fn own_radii(spec: &BeamsSpec) -> bool {
+    let GraphSpec::Pattern(of) = &spec.graph else { return false };
+    of.pattern.nodes.0.iter().any(|row| matches!(row, RowSpec::Ball(_)))
 }
 
 pub(super) fn radii(spec: &BeamsSpec, environment: &Environment) -> Result<Radii<Grade>, DesignError> {
