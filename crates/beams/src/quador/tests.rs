@@ -283,7 +283,7 @@ fn faults_say_what_is_wrong() {
         let f = r.expect_err("refused");
         assert!(f.at == at && f.message.contains(words), "{f}");
     };
-    says(Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto), "beams[0].profile", "between");
+    says(Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto), "beams[0].profile", "more than");
     says(Quadors::new(&two(Profile::Cylinder), Fillet::Auto), "beams[0].profile", "equal radius");
     says(Quadors::new(&two(Profile::Cone), Fillet::Tau(1.0)), "fillet", "tau");
     says(Quadors::new(&two(Profile::Cone), Fillet::Radius(f64::NAN)), "fillet", "radius");

@@ -20,6 +20,9 @@ const PER_BEAM: f64 = 6.0;
 /// Grid steps on the smallest wavelength, at most: for waves, and for walls, necks, beams and the skin.
 const AT_MOST: [f64; 2] = [128.0, 64.0];
 
+/// Grid steps on the smallest wavelength, of struts listed one by one as well: a grid of fewer is refused.
+const FEWEST: f64 = 2.0;
+
 /// Most triangles of a mesh for which no spacing is asked: 1 GB of binary STL.
 const TRIANGLES: f64 = 20e6;
 /// Grid steps that are left for it on the smallest wavelength, and across the thinnest wall, neck or beam: fewer break up.
@@ -58,7 +61,7 @@ impl Built {
         let gridded = report.lattices.values().filter(|l| l.tets.is_none());
         let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least());
         let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
-        let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL]);
+        let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL, wavelength / FEWEST]);
         let limits = limits.chain(self.skin).chain(self.solid.transition).chain(self.whole_steps());
         let most = limits.fold(f64::INFINITY, f64::min);
         let spacing = rounded_down((wanted * (triangles / TRIANGLES).sqrt()).min(most));
@@ -108,5 +111,5 @@ pub(super) fn spacing(
     let beams = beams.values().map(|b| b.thickness / PER_BEAM);
     let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
     let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
-    (smallest_repeat(built) / PER_CELL).min(waves).min(walls)
+    (smallest_repeat(built) / PER_CELL).min(waves).min(walls).min(wavelength / FEWEST)
 }

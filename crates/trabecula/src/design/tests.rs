@@ -341,7 +341,7 @@ fn struts_in_short_pieces_are_resolved_by_their_thickness() {
         let design = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
         design.build(&NoFiles).unwrap_or_else(|e| panic!("{e}\n{text}")).report().spacing
     };
-    for pieces in [2, 5, 40] {
-        assert!((spacing(pieces) - 0.2).abs() < 1e-9, "{pieces}: {}", spacing(pieces));
+    for (pieces, wanted) in [(2, 0.2), (5, 0.2), (20, 0.2), (40, 0.125)] {
+        assert!((spacing(pieces) - wanted).abs() < 1e-9, "{pieces}: {}", spacing(pieces));
     }
 }
