@@ -121,7 +121,7 @@ pub struct Pattern {
     pub steps: [(Similarity, u32); 3],
 }
 
-/// Repeats after which no step is looked at for whether it has come back to where it began.
+/// Most repeats among which a step is searched for one that comes back to where it began.
 const LONGEST_PERIOD: u32 = 100_000;
 
 /// Maximum number of distinct hubs.

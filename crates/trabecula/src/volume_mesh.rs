@@ -5,19 +5,20 @@
 
 use geometry::fault::{Fault, number};
 use geometry::fe_mesh::FeMesh;
-use geometry::math::{Aabb, Vec3, norm, sub};
+use geometry::math::{Aabb, Vec3};
 use geometry::progress::{Progress, Stopped};
 use geometry::tetmesh::FACES;
 use rayon::prelude::*;
 
 use crate::conforming_tets::{
-    GONE, MOST, Partition, Shaping, SurfaceSet, Tet, components, distances, images, interfaces, members, only, prepared,
+    GONE, MOST, Partition, Shaping, SurfaceSet, Tet, components, images, interfaces, only, prepared,
 };
 use crate::region::Region;
 use crate::solid::Solid;
 
 mod body_centred;
 mod cyclic_nodes;
+mod deviation;
 mod domains;
 mod mid_nodes;
 mod named_sets;
@@ -233,7 +234,7 @@ fn assembled(
     if let (Some(fault), Of::Solid | Of::All) = (empty, options.of) {
         return Err(fault);
     }
-    let deviation = deviation(&mesh, &faces, domains);
+    let deviation = deviation::deviation(&mesh, &faces, domains);
     let pieces = components(&mesh.tets, mesh.nodes.len());
     Ok(Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] })
 }
@@ -271,52 +272,6 @@ fn faces_on_surfaces(tets: &[[u32; 4]], domain: &[u8], on: &[SurfaceSet]) -> Vec
         .collect();
     found.par_sort_unstable_by_key(|f| f.0);
     found
-}
-
-/// The greatest distance of faces from their surfaces, at corners, edges and centroids: to first order, and at most the longest edge
-/// of the face, whose corners were put on the surface.
-fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], domains: &Domains) -> f64 {
-    let mut by_surface: Vec<(usize, (u32, u8))> = faces
-        .iter()
-        .filter_map(|(f, set, _)| {
-            let curved = |s: &usize| domains.surfaces[*s].plane.is_none();
-            members(*set).find(curved).filter(|_| members(*set).all(|s| curved(&s))).map(|s| (s, *f))
-        })
-        .collect();
-    by_surface.par_sort_unstable();
-    let greatest = |chunk: &[(usize, (u32, u8))]| {
-        let mut most = 0.0f64;
-        for same in chunk.chunk_by(|a, b| a.0 == b.0) {
-            let points: Vec<Vec3> = same
-                .iter()
-                .flat_map(|(_, f)| {
-                    let [p, q, r] = mesh.face(*f).map(|n| mesh.nodes[n as usize]);
-                    let mean = |of: &[Vec3]| -> Vec3 {
-                        core::array::from_fn(|k| of.iter().map(|p| p[k]).sum::<f64>() / of.len() as f64)
-                    };
-                    match mesh.face_middles(*f) {
-                        Some(m) => {
-                            let [a, b, c] = m.map(|n| mesh.nodes[n as usize]);
-                            // The centroid of a quadratic triangle.
-                            let at = core::array::from_fn(|k| (4.0 * (a[k] + b[k] + c[k]) - p[k] - q[k] - r[k]) / 9.0);
-                            [p, q, r, a, b, c, at]
-                        }
-                        None => [p, q, r, mean(&[p, q]), mean(&[q, r]), mean(&[p, r]), mean(&[p, q, r])],
-                    }
-                })
-                .collect();
-            let per = points.len() / same.len();
-            let limits = same.iter().flat_map(|(_, f)| {
-                let [p, q, r] = mesh.face(*f).map(|n| mesh.nodes[n as usize]);
-                let longest = norm(sub(p, q)).max(norm(sub(q, r))).max(norm(sub(p, r)));
-                core::iter::repeat_n(longest, per)
-            });
-            let off = distances(&domains.surfaces[same[0].0], &points);
-            most = off.zip(limits).fold(most, |m, (d, limit)| m.max(d.abs().min(limit)));
-        }
-        most
-    };
-    by_surface.par_chunks(256).map(greatest).reduce(|| 0.0, f64::max)
 }
 
 #[cfg(test)]

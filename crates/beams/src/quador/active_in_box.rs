@@ -62,7 +62,7 @@ impl Hub<'_> {
         }
     }
 
-    /// Whether half-beam k is surely not active beside i alone, by which it is smaller too.
+    /// Whether half-beam k is surely not active where i alone is, and smaller.
     #[inline]
     fn is_below(&self, k: usize, i: usize, around: &Around) -> bool {
         let (of, leader) = (&self.g[k], &self.g[i]);
