@@ -182,7 +182,7 @@ def test_flat_faces_of_a_mesh_at_its_bounds_are_sets(tmp_path):
             assert area_of(mesh, name) == pytest.approx(area_of(own, name), rel=0.03)
 
 
-def test_what_is_left_out_and_far_from_the_surface_is_warned_of():
+def test_what_is_left_out_and_far_from_the_surface_is_warned_of(tmp_path):
     text = """
         schema = 1
         [region]
@@ -196,8 +196,10 @@ def test_what_is_left_out_and_far_from_the_surface_is_warned_of():
         map.tets.size = 4
         level.fraction = 0.3
     """
+    (tmp_path / "ring.toml").write_text(text)
+    part = lt.load(tmp_path / "ring.toml").build()
     with pytest.warns(lt.DesignWarning) as found:
-        mesh = lt.Design.from_toml(text).build().volume_mesh(edge=0.4)
+        mesh = part.volume_mesh(edge=0.4)
     words = " ".join(str(w.message) for w in found)
     assert (
         mesh.report().dropped > 0.005 * mesh.report().volume and "is left out where the solid is thinner than an edge" in words

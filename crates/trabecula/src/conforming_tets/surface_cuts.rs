@@ -59,12 +59,14 @@ impl Partition<'_> {
     pub fn cut_where(&mut self, surface: usize, dependent: &[bool], step: f64) {
         let mut values = self.values(surface, dependent, step);
         let crossings = self.crossings(surface, dependent, &values);
+        checkpoint();
         if !crossings.is_empty() {
             self.snap(surface, &crossings, &mut values, step);
         }
         checkpoint();
         let marks = self.mark(surface, &crossings, &mut values);
         let straight = self.project(surface, &marks);
+        checkpoint();
         self.bisect(surface, dependent, &marks, &values);
         self.straighten(&straight);
     }
@@ -242,6 +244,7 @@ impl Partition<'_> {
         let shared: Vec<SurfaceSet> = edges.par_iter().map(|e| self.shared(e.2)).collect();
         let mut marks: Vec<Mark> = Vec::with_capacity(edges.len());
         for (rank, (e, shared)) in (0..).zip(edges.iter().zip(shared)) {
+            checkpoint();
             let node = self.nodes.len() as u32;
             // Images follow each other.
             let before = marks.last().filter(|_| rank > 0 && edges[rank as usize - 1].1 == e.1).map(|m| m.node);
@@ -301,11 +304,12 @@ impl Partition<'_> {
             marks[start[a] as usize..start[a + 1] as usize].iter().find(|m| m.ends[1] == b)
         };
         let bit = only(surface);
-        let old = core::mem::take(&mut self.tets);
+        let (old, request) = (core::mem::take(&mut self.tets), Cancellation::current());
         let mut tets: Vec<Tet> = old
             .par_iter()
             .zip(dependent)
             .flat_map_iter(|(t, dependent)| {
+                request.enter(checkpoint);
                 let mut found: Vec<&Mark> =
                     EDGES.into_iter().filter_map(|[a, b]| mark(t.nodes[a], t.nodes[b])).collect();
                 found.sort_unstable_by_key(|m| m.rank);

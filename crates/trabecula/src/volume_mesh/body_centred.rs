@@ -6,6 +6,7 @@
 //! number of them lies between two planes.
 
 use geometry::math::{Aabb, Vec3};
+use geometry::progress::checkpoint;
 use rayon::prelude::*;
 
 /// Cubes along each edge of a block that is kept or skipped as a whole.
@@ -105,6 +106,7 @@ impl Cubes {
         };
         let on = |c: [usize; 3]| active[(c[2] * ny + c[1]) * nx + c[0]];
         for z in 0..nz {
+            checkpoint();
             if z > 0 {
                 made.corners.swap(0, 1);
                 made.centres.swap(0, 1);
