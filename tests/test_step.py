@@ -53,14 +53,15 @@ def test_a_file_has_what_the_report_says(tmp_path):
         ),
         (
             lambda: lt.Design(
-                region=lt.region.sphere(radius=8), beams=lt.Beams(cell="bcc", radius=0.4, trim="drop", map=lt.map.affine(wavelength=4))
+                region=lt.region.sphere(radius=8),
+                beams=lt.Beams(cell="bcc", radius=0.4, trim="drop", map=lt.map.affine(wavelength=4)),
             ),
             r"the region cuts some \(make it larger by a hub's radius\); write a mesh",
         ),
         (
             lambda: lt.Design(
                 region=ROOM,
-                lattice={"a": lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=20), level=lt.level.fraction(0.3))},
+                lattice={"a": lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=20), lt.level.fraction(0.3))},
                 beams={"b": lt.Beams(cell="octet", radius=2, map=lt.map.affine(wavelength=20))},
                 blend=lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-6: 0, 6: 1})),
             ),
