@@ -17,7 +17,7 @@ def row(name):
     low, high = it["fraction"] if isinstance(it["fraction"], list) else (it["fraction"],) * 2
     asked = f"{low:.3f}" if high - low < 5e-4 else f"{low:.3f} to {high:.3f}"
     d = it.get("distortion")
-    angle = max(d["angle"], key=lambda a: a["max"]) if d else None
+    angle = {key: max(a[key] for a in d["angle"]) for key in ("mean", "max")} if d else None
     spacing = [s["max"] for s in d["spacing"]] if d else None
     cells = [
         f"[{name}](../../examples/{name}.toml)",
@@ -40,8 +40,8 @@ def main():
     about = (
         "# Cells that turn, by numbers",
         "",
-        "Written by `scripts/turning_tables.py`, at 24 samples a cell. Angles and spacings are those of solved maps, along",
-        "the worst axis; see [cells that turn](../concepts/phase.md). A part holds few whole cells, so its solid fraction need",
+        "Written by `scripts/turning_tables.py`, at 24 samples a cell. Angles and spacings are those of solved maps, each of",
+        "the axis where it is greatest; see [cells that turn](../concepts/phase.md). A part holds few whole cells, so its solid fraction need",
         "not be its cells'.",
         "",
     )
