@@ -6,6 +6,7 @@ use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, sub};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// A tetrahedron, positively oriented, and the surfaces of which it is known on which side it lies.
 #[derive(Clone, Copy, Debug)]
@@ -58,22 +59,33 @@ impl Tet {
     }
 }
 
+/// What follows from the sides of each tetrahedron alone: it is found once for those that are alike.
+fn by_sides<T: Copy + Send>(tets: &[Tet], of: impl Fn(&Tet) -> T + Sync) -> Vec<T> {
+    const BATCH: usize = 4096;
+    let found = tets.par_chunks(BATCH).flat_map_iter(|tets| {
+        let (of, mut known) = (&of, FxHashMap::default());
+        tets.iter().map(move |t| *known.entry((t.negative, t.positive)).or_insert_with(|| of(t)))
+    });
+    found.collect()
+}
+
 impl Partition<'_> {
     /// Which tetrahedra depend on the side of a surface.
     pub fn dependent(&self, surface: usize) -> Vec<bool> {
-        self.tets.par_iter().map(|t| t.depends_on(surface, self.trees)).collect()
+        by_sides(&self.tets, |t| t.depends_on(surface, self.trees))
     }
 
     /// Removes tetrahedra that lie in no domain.
     pub fn drop_outside(&mut self) {
-        let kept = |t: &Tet| self.trees.iter().any(|tree| t.may_be_in(tree));
-        self.tets = core::mem::take(&mut self.tets).into_par_iter().filter(kept).collect();
+        let tets = core::mem::take(&mut self.tets);
+        let kept = by_sides(&tets, |t| self.trees.iter().any(|tree| t.may_be_in(tree)));
+        self.tets = tets.into_par_iter().zip(kept).filter_map(|(t, kept)| kept.then_some(t)).collect();
     }
 
     /// The domain of each tetrahedron, when all surfaces are known that decide it.
     pub fn domains(&self) -> Vec<u8> {
         let of = |t: &Tet| self.trees.iter().position(|tree| t.may_be_in(tree)).unwrap_or(0) as u8;
-        self.tets.par_iter().map(of).collect()
+        by_sides(&self.tets, of)
     }
 
     /// The corners of a tetrahedron.

@@ -304,12 +304,11 @@ impl Partition<'_> {
             marks[start[a] as usize..start[a + 1] as usize].iter().find(|m| m.ends[1] == b)
         };
         let bit = only(surface);
-        let (old, request) = (core::mem::take(&mut self.tets), Cancellation::current());
+        let old = core::mem::take(&mut self.tets);
         let mut tets: Vec<Tet> = old
             .par_iter()
             .zip(dependent)
             .flat_map_iter(|(t, dependent)| {
-                request.enter(checkpoint);
                 let mut found: Vec<&Mark> =
                     EDGES.into_iter().filter_map(|[a, b]| mark(t.nodes[a], t.nodes[b])).collect();
                 found.sort_unstable_by_key(|m| m.rank);
