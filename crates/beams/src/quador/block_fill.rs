@@ -145,8 +145,16 @@ impl Fill<'_> {
             }
         }
         let mut least = [self.quadors.cap; MOST_POINTS];
-        for hub in &self.hubs[first..] {
+        // Values that take few operations first: most others need not be found then.
+        let (simple, rest): (Vec<&HubInBox>, Vec<&HubInBox>) = self.hubs[first..].iter().partition(|h| h.is_simple());
+        for hub in simple {
             self.quadors.lower(hub, points.each_ref().map(|p| &p[..n]), &mut least[..n]);
+        }
+        let rest: Vec<u32> = rest.iter().map(|h| h.hub).collect();
+        if !rest.is_empty() {
+            for (k, least) in least[..n].iter_mut().enumerate() {
+                *least = self.quadors.value_among([0, 1, 2].map(|a| points[a][k]), &rest, *least);
+            }
         }
         let mut rows = least.chunks(hi[0] - lo[0]);
         for k in lo[2]..hi[2] {

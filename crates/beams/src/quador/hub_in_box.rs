@@ -25,6 +25,11 @@ impl HubInBox {
     pub(super) fn anywhere(hub: u32) -> HubInBox {
         HubInBox { hub, active: ActiveInBox::Any, past: f64::INFINITY, contains: false }
     }
+
+    /// Whether its values in the box take few operations.
+    pub(super) fn is_simple(&self) -> bool {
+        self.active != ActiveInBox::Any
+    }
 }
 
 impl Quadors {
@@ -94,7 +99,7 @@ impl Quadors {
         (within, Interval::new(lo - slack, hi + slack))
     }
 
-    /// Lowers values at positions in a box (at most `MOST_POINTS`, by coordinate) to those of a hub of which this matters there.
+    /// Lowers values at positions in a box (at most `MOST_POINTS`, by coordinate) to those of a hub that is simple there.
     /// They are the least of the same values as one by one, to the last bit.
     pub(super) fn lower(&self, within: &HubInBox, points: [&[f64]; 3], least: &mut [f64]) {
         let (ball, hub) = (&self.balls[within.hub as usize], self.hub(within.hub as usize));
@@ -102,7 +107,7 @@ impl Quadors {
         let values = &mut values[..least.len()];
         let square = hub.radius * hub.radius;
         match within.active {
-            ActiveInBox::Any => values.fill(f64::NEG_INFINITY),
+            ActiveInBox::Any => return,
             ActiveInBox::None => self.lengths(ball.center, points, square, values, |_| 0.0),
             ActiveInBox::One(i) => {
                 let g = hub.g[i];
@@ -125,12 +130,7 @@ impl Quadors {
             if outside > 0.0 && outside >= *least {
                 continue;
             }
-            let x = sub(p, ball.center);
-            let v = match within.active {
-                ActiveInBox::Any => self.below(&hub, x, *least),
-                _ if *v < within.past => hub.past_cut(x, *v).0,
-                _ => *v,
-            };
+            let v = if *v < within.past { hub.past_cut(sub(p, ball.center), *v).0 } else { *v };
             *least = least.min(if outside > 0.0 { v.max(outside) } else { v });
         }
     }

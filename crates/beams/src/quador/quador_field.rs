@@ -25,19 +25,19 @@ impl Quadors {
     /// The field at one point, mm.
     #[inline]
     pub fn value(&self, p: Vec3) -> f64 {
-        self.value_among(p, self.index.near(p))
+        self.value_among(p, self.index.near(p), self.cap)
     }
 
-    /// The field at one point of which all hubs that can matter there are known, mm.
+    /// The least value of some hubs at one point, mm; at most `most`.
     #[inline]
-    pub(super) fn value_among(&self, p: Vec3, hubs: &[u32]) -> f64 {
-        self.least_among(p, hubs).0
+    pub(super) fn value_among(&self, p: Vec3, hubs: &[u32], most: f64) -> f64 {
+        self.least_among(p, hubs, most).0
     }
 
-    /// The field at one point, and the first of the given hubs that has this value there; none where it is the upper limit.
+    /// The least value of some hubs at one point, and the first of them that has it; none where it is the given upper limit.
     #[inline]
-    fn least_among(&self, p: Vec3, hubs: &[u32]) -> (f64, Option<u32>) {
-        let mut least = (self.cap, None);
+    fn least_among(&self, p: Vec3, hubs: &[u32], most: f64) -> (f64, Option<u32>) {
+        let mut least = (most, None);
         // Where one value is small, most others need not be found: mostly the nearest hub has the smallest.
         let (mut nearest, mut away) = (0, f64::INFINITY);
         for (n, &i) in hubs.iter().enumerate() {
@@ -78,7 +78,7 @@ impl Quadors {
     }
 
     fn value_and_gradient(&self, p: Vec3) -> (f64, Vec3) {
-        let (value, Some(i)) = self.least_among(p, self.index.near(p)) else {
+        let (value, Some(i)) = self.least_among(p, self.index.near(p), self.cap) else {
             return (self.cap, [0.0; 3]);
         };
         let (ball, hub) = (&self.balls[i as usize], self.hub(i as usize));
