@@ -100,11 +100,11 @@ GIGABYTES = number("a size in GB", lambda v: 0.001 <= v <= 1e6, " from 0.001 to 
 TRIANGLES = number("a whole number", lambda v: 4 <= v <= 2**32, " from 4 to 4294967296", int)
 
 
-def pixels(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT in pixels."""
+def pixels(text: str, otherwise: str = "") -> tuple[int, int]:
+    """WIDTHxHEIGHT in pixels; ``otherwise`` is what else is allowed."""
     parts = text.lower().split("x")
     if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, found {text!r}")
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384{otherwise}, found {text!r}")
     return int(parts[0]), int(parts[1])
 
 
@@ -112,10 +112,7 @@ def size(text: str) -> tuple[float, float, str]:
     """WIDTHxHEIGHT in pixels, or with mm behind it in mm, where the height is three quarters of the width unless given."""
     small = text.lower()
     if not small.endswith("mm"):
-        try:
-            return *pixels(text), "px"
-        except argparse.ArgumentTypeError as e:
-            raise argparse.ArgumentTypeError(str(e).replace(", found", ", or WIDTHmm, found", 1)) from None
+        return *pixels(text, ", or WIDTHmm"), "px"
     parts = small.removesuffix("mm").split("x")
     try:
         wide, high = [float(p) for p in parts] if len(parts) == 2 else (float(parts[0]), 0.75 * float(parts[0]))
