@@ -41,8 +41,8 @@ def main():
         "# Cells that turn, by numbers",
         "",
         "Written by `scripts/turning_tables.py`, at 24 samples a cell. Angles and spacings are those of solved maps, each of",
-        "the axis where it is greatest; see [cells that turn](../concepts/phase.md). A part holds few whole cells, so its solid fraction need",
-        "not be its cells'.",
+        "the axis where it is greatest; see [cells that turn](../concepts/phase.md). A part holds few whole cells, so its",
+        "solid fraction need not be its cells'.",
         "",
     )
     OUT.write_text("\n".join([*about, *head, *map(row, EXAMPLES)]) + "\n", encoding="utf-8", newline="\n")
