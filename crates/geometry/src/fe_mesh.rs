@@ -5,11 +5,13 @@ use rayon::prelude::*;
 use crate::math::{Mat3, Vec3, determinant, sub};
 use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
 
+mod fraction_classes;
 mod hex_mesh;
 mod poly_faces;
 mod shell_mesh;
 mod surface_load;
 
+pub use fraction_classes::fraction_classes;
 pub use hex_mesh::{HEX_FACES, HexMesh};
 pub use poly_faces::{Patch, PolyFaces};
 pub use shell_mesh::ShellMesh;
@@ -27,6 +29,8 @@ pub struct FeMesh {
     pub domain: Vec<u8>,
     /// Names of the domains.
     pub domains: Vec<String>,
+    /// The solid fraction of each tetrahedron where it is of a lattice; empty where tetrahedra are solid or pore.
+    pub fraction: Vec<f64>,
     /// Named sets.
     pub sets: Vec<FeSet>,
     /// Nodes on upper bounding planes of a periodic cell, each with its image on the lower ones.

@@ -14,6 +14,7 @@ mod graphs;
 mod indexed;
 mod join;
 mod layer_files;
+mod nastran_fields;
 mod npy;
 mod number;
 mod obj;
@@ -40,7 +41,7 @@ pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, 
 pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
-pub use threemf::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
+pub use threemf::{BeamLattice, Cap, Companions, Frustum, object_names, read_object, write_beam_lattice};
 pub use vti::{vti_frame, write_vti};
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;

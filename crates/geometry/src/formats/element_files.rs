@@ -26,14 +26,23 @@ pub use voxel_elements::{HEX_FORMATS, HexFormat};
 pub struct FeText {
     /// The first line: what it is.
     pub title: String,
-    /// Young's modulus (MPa) and Poisson's ratio of the first domain's material.
-    pub elastic: [f64; 2],
+    /// Young's modulus (MPa) and Poisson's ratio: of all domains, or of each if they have materials of their own.
+    pub elastic: Vec<[f64; 2]>,
+    /// Whether domains have materials of their own, which are then written whether or not there is a step.
+    pub own_materials: bool,
     /// Names of sets whose nodes are held in all directions.
     pub held: Vec<String>,
     /// Names of sets and the resultant (N) of a uniform traction on their faces.
     pub loads: Vec<(String, Vec3)>,
     /// Further numbers of nodes and elements, in formats that have them.
     pub fields: Vec<FeField>,
+}
+
+impl FeText {
+    /// Young's modulus and Poisson's ratio of a domain.
+    fn elastic(&self, domain: usize) -> [f64; 2] {
+        self.elastic.get(domain).or(self.elastic.last()).copied().unwrap_or([1.0, 0.3])
+    }
 }
 
 /// Numbers at nodes or in elements.
@@ -144,7 +153,7 @@ mod tests {
             let mut bytes = Vec::new();
             (format.write)(
                 &two(),
-                &FeText { title: "two".into(), elastic: [1.0, 0.3], ..FeText::default() },
+                &FeText { title: "two".into(), elastic: vec![[1.0, 0.3]], ..FeText::default() },
                 &mut bytes,
             )
             .unwrap();

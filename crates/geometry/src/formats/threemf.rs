@@ -19,7 +19,7 @@ pub use beam_lattice::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice
 pub use beam_lattice_read::read_beam_lattice;
 use package::Entry;
 pub use package::Piece;
-pub use read::read;
+pub use read::{object_names, read, read_object};
 
 const MODEL: &str = "3D/3dmodel.model";
 const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";

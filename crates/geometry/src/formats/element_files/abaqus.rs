@@ -40,6 +40,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
     match (mesh.pairs.is_empty(), text.held.is_empty() && text.loads.is_empty()) {
         (false, _) => periodic(mesh, text, out),
         (true, false) => loaded(mesh, text, out),
+        (true, true) if text.own_materials => materials(mesh, text, out),
         (true, true) => Ok(()),
     }
 }
@@ -92,16 +93,23 @@ pub(super) fn decimal(text: &mut String, x: f64) {
     }
 }
 
-/// The material of all domains.
-fn material(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
-    let [e, nu] = text.elastic;
-    writeln!(out, "*MATERIAL, NAME=SOLID\n*ELASTIC\n{e:?}, {nu:?}")?;
-    mesh.domains.iter().try_for_each(|name| writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL=SOLID"))
+/// The materials of the domains: one of all, or one of each.
+fn materials(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    let own = text.own_materials;
+    for (d, name) in mesh.domains.iter().enumerate() {
+        let material = if own { name } else { "SOLID" };
+        if own || d == 0 {
+            let [e, nu] = text.elastic(d);
+            writeln!(out, "*MATERIAL, NAME={material}\n*ELASTIC\n{e:?}, {nu:?}")?;
+        }
+        writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL={material}")?;
+    }
+    Ok(())
 }
 
-/// Material and a step.
+/// Materials and a step.
 fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
-    material(mesh, text, out)?;
+    materials(mesh, text, out)?;
     let names: Vec<&str> = mesh.domains.iter().map(String::as_str).collect();
     let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
     step(text, (&names, 3), &forces, out)
@@ -147,7 +155,7 @@ pub(super) fn step(
     writeln!(out, "*END STEP")
 }
 
-/// Equations, material and six steps of a periodic cell.
+/// Equations, materials and six steps of a periodic cell.
 fn periodic(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     let reference = mesh.nodes.len() + 1;
     writeln!(
@@ -182,7 +190,7 @@ fn periodic(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()>
             text.push('\n');
         }
     })?;
-    material(mesh, text, out)?;
+    materials(mesh, text, out)?;
     let dependent: std::collections::HashSet<u32> = mesh.pairs.iter().map(|p| p.node).collect();
     let held = mesh.tets.iter().flatten().copied().filter(|n| !dependent.contains(n)).min().unwrap_or(0);
     writeln!(out, "*BOUNDARY\n{}, 1, 3", held + 1)?;

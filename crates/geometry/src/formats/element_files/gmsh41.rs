@@ -88,5 +88,20 @@ pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Resul
             text.push('\n');
         })?;
     }
-    writeln!(out, "$EndElements")
+    writeln!(out, "$EndElements")?;
+    if mesh.fraction.is_empty() {
+        return Ok(());
+    }
+    // In the order of the elements above, by which some readers go. Some take no data of a part of the elements: faces have the fraction
+    // of their tetrahedron.
+    writeln!(out, "$ElementData\n1\n\"fraction\"\n1\n0.0\n3\n0\n1\n{total}")?;
+    let of_faces: Vec<u32> = surfaces.values().flatten().map(|f| f.0).collect();
+    lines(out, total, |i, text| {
+        let (number, tet) = match of_faces.get(i) {
+            Some(tet) => (mesh.tets.len() + i, *tet as usize),
+            None => (i - of_faces.len(), i - of_faces.len()),
+        };
+        let _ = writeln!(text, "{} {:?}", number + 1, mesh.fraction[tet]);
+    })?;
+    writeln!(out, "$EndElementData")
 }

@@ -7,9 +7,11 @@ use std::io::{self, Write};
 
 use super::{FeText, lines};
 use crate::fe_mesh::{FeMesh, FeSet, MIDDLES};
+use crate::formats::nastran_fields::{check_numbers, grid, real};
 use crate::math::Vec3;
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    check_numbers([mesh.nodes.len(), mesh.tets.len()])?;
     writeln!(out, "$ {}\n$ mm, N, MPa\nBEGIN BULK", text.title)?;
     nodes(&mesh.nodes, out)?;
     lines(out, mesh.tets.len(), |i, text| {
@@ -24,9 +26,13 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         }
         text.push('\n');
     })?;
-    material(text.elastic, out)?;
+    let own = text.own_materials;
     for (d, name) in mesh.domains.iter().enumerate() {
-        writeln!(out, "$ domain {name}\nPSOLID  {:>8}{:>8}", d + 1, 1)?;
+        let number = if own { d + 1 } else { 1 };
+        if own || d == 0 {
+            material(number, text.elastic(d), out)?;
+        }
+        writeln!(out, "$ domain {name}\nPSOLID  {:>8}{number:>8}", d + 1)?;
     }
     sets(&mesh.sets, out)?;
     writeln!(out, "ENDDATA")
@@ -35,14 +41,13 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
 /// Nodes, in large fields.
 pub(super) fn nodes(nodes: &[Vec3], out: &mut dyn Write) -> io::Result<()> {
     lines(out, nodes.len(), |i, text| {
-        let [x, y, z] = nodes[i].map(field);
-        let _ = writeln!(text, "GRID*   {:>16}{:>16}{x:>16}{y:>16}\n*       {z:>16}", i + 1, "");
+        text.push_str(&grid(i + 1, nodes[i]));
     })
 }
 
-/// The material, by Young's modulus and Poisson's ratio.
-pub(super) fn material([e, nu]: [f64; 2], out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "MAT1*   {:>16}{:>16}{:>16}{:>16}\n*       ", 1, field(e), "", field(nu))
+/// A material by its number, Young's modulus and Poisson's ratio.
+pub(super) fn material(number: usize, [e, nu]: [f64; 2], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "MAT1*   {number:>16}{:>16}{:>16}{:>16}\n*       ", real(e, 16), "", real(nu, 16))
 }
 
 /// Sets of nodes.
@@ -62,13 +67,4 @@ pub(super) fn sets(sets: &[FeSet], out: &mut dyn Write) -> io::Result<()> {
         })?;
     }
     Ok(())
-}
-
-/// A number in at most sixteen characters, with a point.
-fn field(x: f64) -> String {
-    let plain = format!("{x:?}");
-    if plain.len() <= 16 && !plain.contains('e') {
-        return plain;
-    }
-    (0..=10).rev().map(|digits| format!("{x:.digits$E}")).find(|t| t.len() <= 16).unwrap_or_default()
 }

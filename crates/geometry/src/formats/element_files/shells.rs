@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use super::{FeField, FeText, abaqus, lines, nastran, push};
 use crate::fe_mesh::ShellMesh;
+use crate::formats::nastran_fields::{check_numbers, real};
 use crate::formats::vtu::Cells;
 
 /// A format of shells: suffix, what it is, and what writes a mesh.
@@ -28,7 +29,7 @@ fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result
     })?;
     // Edges of shells have other names in each program: sets of nodes serve all.
     abaqus::sets(&mesh.sets, &[], out)?;
-    let [e, nu] = text.elastic;
+    let [e, nu] = text.elastic(0);
     writeln!(out, "*MATERIAL, NAME=SOLID\n*ELASTIC\n{e:?}, {nu:?}")?;
     let mean = mesh.thickness.iter().sum::<f64>() / mesh.thickness.len().max(1) as f64;
     writeln!(out, "*SHELL SECTION, ELSET=SHELL, MATERIAL=SOLID, NODAL THICKNESS\n{mean:.6}\n*NODAL THICKNESS")?;
@@ -46,20 +47,21 @@ fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result
 }
 
 fn write_bdf(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    check_numbers([mesh.nodes.len(), mesh.triangles.len()])?;
     writeln!(out, "$ {}\n$ mm, N, MPa\nBEGIN BULK", text.title)?;
     nastran::nodes(&mesh.nodes, out)?;
     let quadratic = !mesh.middles.is_empty();
     lines(out, mesh.triangles.len(), |i, text| {
         let _ = write!(text, "{:<8}{:>8}{:>8}", if quadratic { "CTRIA6" } else { "CTRIA3" }, i + 1, 1);
         mesh.nodes_of(i).for_each(|n| _ = write!(text, "{:>8}", n + 1));
-        // Thickness at the corners: from the fourth field of the second line on.
+        // Thickness at the corners: from the fourth field of the second line on. A blank between two is for those who read words.
         let fill = if quadratic { 0 } else { 24 };
         let _ = write!(text, "{:fill$}+\n+{:23}", "", "");
-        mesh.triangles[i].iter().for_each(|n| _ = write!(text, "{:>8.5}", mesh.thickness[*n as usize]));
+        mesh.triangles[i].iter().for_each(|n| _ = write!(text, "{:>8}", real(mesh.thickness[*n as usize], 7)));
         text.push('\n');
     })?;
-    let [e, nu] = text.elastic;
-    nastran::material([e, nu], out)?;
+    let [e, nu] = text.elastic(0);
+    nastran::material(1, [e, nu], out)?;
     writeln!(out, "PSHELL  {:>8}{:>8}{:>8}{:>8}{:>8}{:>8}", 1, 1, "1.0", 1, "", 1)?;
     nastran::sets(&mesh.sets, out)?;
     writeln!(out, "ENDDATA")

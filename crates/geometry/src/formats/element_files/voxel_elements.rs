@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::{FeText, abaqus, lines, push};
-use crate::fe_mesh::HexMesh;
+use crate::fe_mesh::{HexMesh, fraction_classes};
 use crate::formats::vtu::{Array, Cells};
 
 /// A format of voxels: suffix, what it is, and what writes a mesh.
@@ -18,21 +18,10 @@ pub const HEX_FORMATS: [HexFormat; 4] = [
     ("vtu", "VTK, ParaView", write_vtu),
 ];
 
-/// Classes of the solid fraction, each with a material of its own.
-const CLASSES: usize = 20;
-
-/// The class of a solid fraction, from 1: that from (class − 1) / `CLASSES` to class / `CLASSES`.
-fn class(fraction: f64) -> usize {
-    ((fraction * CLASSES as f64).ceil() as usize).clamp(1, CLASSES)
-}
-
 /// C3D8 elements in sets by their solid fraction, in twentieths; Young's modulus is that of the solid times the mean fraction of the set.
 fn write_inp(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     abaqus::nodes(&text.title, &mesh.nodes, out)?;
-    let mut classes: Vec<(String, Vec<usize>)> =
-        (1..=CLASSES).map(|c| (format!("FRACTION_{:03}", c * 100 / CLASSES), Vec::new())).collect();
-    (0..mesh.hexes.len()).for_each(|i| classes[class(mesh.fraction[i]) - 1].1.push(i));
-    classes.retain(|(_, of)| !of.is_empty());
+    let classes = fraction_classes(&mesh.fraction);
     for (name, of) in &classes {
         writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET={name}")?;
         lines(out, of.len(), |k, text| {
@@ -51,7 +40,7 @@ fn write_inp(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
     if text.held.is_empty() && text.loads.is_empty() {
         return Ok(());
     }
-    let [e, nu] = text.elastic;
+    let [e, nu] = text.elastic(0);
     for (name, of) in &classes {
         let mean = of.iter().map(|i| mesh.fraction[*i]).sum::<f64>() / of.len() as f64;
         writeln!(out, "*MATERIAL, NAME={name}\n*ELASTIC\n{:?}, {nu:?}", e * mean)?;
@@ -131,8 +120,13 @@ mod tests {
         let bounds = Aabb { min: [0.0; 3], max: [2.0, 2.0, 1.0] };
         let mesh = HexMesh::of(&bounds, [2, 2, 1], &[1.0, 0.5, 0.51, 0.0], 0.1);
         let loads = vec![("X1".to_string(), [1.0, 0.0, 0.0])];
-        let text =
-            FeText { title: "three".into(), elastic: [10.0, 0.3], held: vec!["X0".into()], loads, ..FeText::default() };
+        let text = FeText {
+            title: "three".into(),
+            elastic: vec![[10.0, 0.3]],
+            held: vec!["X0".into()],
+            loads,
+            ..FeText::default()
+        };
         for (suffix, _, write) in HEX_FORMATS {
             let mut bytes = Vec::new();
             write(&mesh, &text, &mut bytes).unwrap();

@@ -8,6 +8,10 @@ use crate::formats::vtu::{Array, Cells};
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     let width = if mesh.middles.is_empty() { 4 } else { 10 };
+    let mut data = vec![("domain", Array::Labels(&mesh.domain))];
+    if !mesh.fraction.is_empty() {
+        data.push(("fraction", Array::Numbers(&mesh.fraction)));
+    }
     let cells = Cells {
         note: &format!("domains, from 0: {}", mesh.domains.join(", ")),
         nodes: &mesh.nodes,
@@ -15,7 +19,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         kind: if width == 4 { 10 } else { 24 },
         width,
         count: mesh.tets.len(),
-        data: &[("domain", Array::Labels(&mesh.domain))],
+        data: &data,
         fields: &text.fields,
     };
     let corners = |i: usize| mesh.tets[i].into_iter();

@@ -85,7 +85,8 @@ impl<K: TiffKind> Pages<'_, K> {
         page.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter)?;
         if self.page == 0 {
             let (count, heights) = (self.stack.layers(), &self.stack.heights);
-            let spacing = (heights[count] - heights[0]) / count as f64;
+            // Layers are of one thickness, but for the last one.
+            let spacing = heights[1] - heights[0];
             let said =
                 format!("ImageJ=1.54f\nimages={count}\nslices={count}\nunit=mm\nspacing={spacing}\nloop=false\n");
             page.write_tag(Tag::ImageDescription, said.as_str())?;
@@ -122,7 +123,7 @@ mod tests {
     fn written<K: TiffKind>() -> Vec<u8> {
         let raster = Raster { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
         let stack = Stack {
-            heights: vec![0.0, 0.2, 0.4],
+            heights: vec![0.0, 0.2, 0.3],
             bounds: Aabb { min: [0.0; 3], max: [2.0, 1.5, 0.4] },
             title: "part".into(),
             application: "Trabecula ü".into(),

@@ -56,6 +56,10 @@ pub(super) struct Object {
     pub lattice: Option<Lattice>,
     /// The type: model, support and so on.
     pub kind: String,
+    /// Its name; empty without one.
+    name: String,
+    /// Whether its mesh only stands for slices.
+    slices: bool,
     /// Whether it has properties for what has none of its own.
     pub properties: bool,
 }
@@ -155,8 +159,33 @@ impl<'a> Package<'a> {
 
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
+    joined(bytes, Which::Placed)
+}
+
+/// Reads one of the objects that the build places, by its name, in mm.
+pub fn read_object(bytes: &[u8], name: &str) -> Result<Mesh, Fault> {
+    joined(bytes, Which::Named(name))
+}
+
+/// The names of the objects that the build places, in its order; empty where they have none.
+pub fn object_names(bytes: &[u8]) -> Result<Vec<String>, Fault> {
+    let mut package = Package::open(bytes)?;
+    let root = root_of(&mut package);
+    Ok(names(&package.file(&root, model)?))
+}
+
+fn names(main: &Model) -> Vec<String> {
+    main.items.iter().map(|i| main.objects.get(&i.id).map(|o| o.name.clone()).unwrap_or_default()).collect()
+}
+
+fn joined(bytes: &[u8], which: Which) -> Result<Mesh, Fault> {
     let mut joiner = Joiner::default();
-    let held = place_all(bytes, Which::Placed, &mut |placed| {
+    let held = place_all(bytes, which, &mut |placed| {
+        if placed.object.slices {
+            let message =
+                "the file holds slices, beside triangles that only stand for them; read the design or a mesh of it";
+            return Err(Fault::new("", message));
+        }
         let mirrored = determinant(&placed.matrix) < 0.0;
         for &[a, b, c] in &placed.object.triangles {
             let t = if mirrored { [a, c, b] } else { [a, b, c] };
@@ -177,9 +206,11 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
 
 /// Which objects of a file are given.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Which {
+pub(super) enum Which<'a> {
     /// Those that the build places.
     Placed,
+    /// Those of a name that it places.
+    Named(&'a str),
     /// Beam lattices, where they are defined.
     Lattices,
 }
@@ -201,10 +232,19 @@ pub(super) fn place_all(
     take: &mut dyn FnMut(&Placed) -> Result<(), Fault>,
 ) -> Result<Held, Fault> {
     let mut package = Package::open(bytes)?;
-    let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
-    let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
-    let root = root.or_else(models).unwrap_or_else(|| MODEL.to_string());
+    let root = root_of(&mut package);
     let mut main = package.file(&root, model)?;
+    if let Which::Named(name) = which {
+        let known = names(&main);
+        let mut of = known.iter().map(|n| n == name);
+        main.items.retain(|_| of.next().unwrap_or(false));
+        if main.items.is_empty() {
+            let listed = known.iter().filter(|n| !n.is_empty()).cloned().collect::<Vec<String>>().join(", ");
+            let there =
+                if listed.is_empty() { "its objects have no names".into() } else { format!("there are {listed}") };
+            return Err(Fault::new("", format!("no object is named {}; {there}", shown(name.as_bytes()))));
+        }
+    }
     if which == Which::Lattices {
         let mut ids: Vec<u32> = main.objects.iter().filter(|o| o.1.lattice.is_some()).map(|o| *o.0).collect();
         ids.sort_unstable();
@@ -228,6 +268,13 @@ pub(super) fn place_all(
         placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
     Ok(Held { objects, items, lattices: files.values().map(beam_lattice_read::count).sum() })
+}
+
+/// The name of the main model.
+fn root_of(package: &mut Package) -> String {
+    let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
+    let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
+    root.or_else(models).unwrap_or_else(|| MODEL.to_string())
 }
 
 /// The path of the model from the package's relationships.
@@ -335,7 +382,12 @@ impl Parsing {
             (Some("object"), None) => {
                 let kind = attribute(tag, "type").map_or("model".into(), Cow::into_owned);
                 let properties = attribute(tag, "pid").is_some() && attribute(tag, "pindex").is_some();
-                self.object = Some((s.required(tag, "id")?, Object { kind, properties, ..Object::default() }));
+                let name = attribute(tag, "name").map_or(String::new(), Cow::into_owned);
+                // Of the slice extension: the mesh is a coarse one beside the slices.
+                let slices = attribute_where(tag, |n| n.ends_with(":slicestackid")).is_some()
+                    && attribute_where(tag, |n| n.ends_with(":meshresolution")).is_some_and(|v| v == "lowres");
+                let object = Object { kind, name, slices, properties, ..Object::default() };
+                self.object = Some((s.required(tag, "id")?, object));
             }
             (_, Some((_, o))) if local == "beamlattice" => o.lattice = Some(Lattice::begin(s, tag)?),
             (Some("vertex"), Some((_, o))) => o.vertices.push(vertex(s, tag)?),
