@@ -284,3 +284,22 @@ def test_the_boundary_may_be_left_open(tmp_path):
     mesh.write(tmp_path / "a.stl")
     with pytest.raises(ValueError, match="within"):
         lt.Mesh.read(tmp_path / "a.stl").uncapped()
+
+
+@pytest.mark.parametrize("edge", [0.5, 0.3])
+@pytest.mark.parametrize("surface", ["net", "rounded"])
+def test_tiny_tetrahedra_at_fine_features_break_no_guarantee(tmp_path, surface, edge):
+    """A groove far finer than the cells: some tetrahedra are fifty times as steep as most, on grids that resolve neither."""
+    manifold3d = pytest.importorskip("manifold3d")
+    block = manifold3d.Manifold.cube((20, 14, 8))
+    block -= manifold3d.Manifold.cube((30, 0.3, 0.4)).rotate((0, 0, 7)).translate((-2, 5, 7.7))
+    block -= manifold3d.Manifold.cylinder(20, 1.2, 1.2, 24).rotate((20, 10, 0)).translate((12, 7, -5))
+    block -= manifold3d.Manifold.cube((30, 30, 10)).rotate((0, 14, 0)).translate((-3, -3, 7.5))
+    made = block.to_mesh()
+    lt.Mesh.of(made.vert_properties[:, :3], made.tri_verts).write(tmp_path / "block.stl")
+    cell, part, fraction = ("diamond", "lower", 0.25) if surface == "net" else ("diamond_sheet", "sheet", 0.12)
+    core = lt.Lattice(lt.cell.tet(cell), part, lt.map.tets(size=4, surface=surface), {"fraction": fraction})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lt.DesignWarning)
+        mesh = lt.Design(lt.region.mesh(tmp_path / "block.stl"), core).build().mesh(edge=edge)
+    assert mesh.closed and not mesh.defects and np.isfinite(mesh.vertices).all()

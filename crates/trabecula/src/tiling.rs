@@ -70,6 +70,15 @@ pub struct Tiling {
     cut: Cut,
     /// Shares of the blended function in the whole mesh, where tetrahedra of one cell overlap.
     blended: Option<Arc<FractionTable>>,
+    /// Factors of its values as a field, if they are lowered anywhere.
+    eased: Option<Arc<Eased>>,
+}
+
+/// Factors of a field's values at the nodes, linear between them, so that it is hardly steeper in some tetrahedra than in most.
+struct Eased {
+    at_nodes: Vec<f64>,
+    /// The steepness of the field at its zero set, per mm, at most.
+    limit: f64,
 }
 
 /// f, the level t, and their gradients (per mm) at a point.
@@ -79,6 +88,9 @@ struct Known {
     slope: Vec3,
     t: f64,
     slope_t: Vec3,
+    /// The factor of the field's value, less one.
+    eased: f64,
+    slope_eased: Vec3,
 }
 
 /// Largest number of tetrahedra that are evaluated for a bound.
@@ -86,6 +98,8 @@ const MOST: usize = 256;
 /// How far beyond a tetrahedron its function is followed, in barycentric coordinates, towards a surface that its mesh does not
 /// reach: farther out the lattice goes on straight.
 const BEYOND: f64 = 0.1;
+/// How steep an eased field may be, in the median over the volume: beyond what sizes and shapes do in a good mesh.
+const STEEP: f64 = 2.0;
 
 impl Tiling {
     /// A single cell over a mesh.
@@ -123,7 +137,40 @@ impl Tiling {
             own * more * spectral_norm(&j) * map.steeper(t) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
-        Tiling { map, cells, part, level, lipschitz: Arc::new(lipschitz), cut: Cut::new(part), blended: None }
+        Tiling {
+            map,
+            cells,
+            part,
+            level,
+            lipschitz: Arc::new(lipschitz),
+            cut: Cut::new(part),
+            blended: None,
+            eased: None,
+        }
+    }
+
+    /// The same lattice as a field that is nowhere much steeper than in most of the mesh: where tetrahedra are small or flat its values are
+    /// lowered, by factors that are linear in each tetrahedron. Its zero set is the same. Values of the order of one step of a grid then mean
+    /// about the same everywhere, by which the extractor keeps surfaces apart.
+    #[must_use]
+    pub fn eased(&self) -> Tiling {
+        let mut order: Vec<usize> = (0..self.map.len()).collect();
+        order.sort_unstable_by(|a, b| self.lipschitz[*a].total_cmp(&self.lipschitz[*b]));
+        let half = 0.5 * order.iter().map(|t| self.map.volume(*t)).sum::<f64>();
+        let mut below = 0.0;
+        let median = order.iter().find(|t| {
+            below += self.map.volume(**t);
+            below >= half
+        });
+        let limit = STEEP * median.map_or(f64::INFINITY, |t| self.lipschitz[*t]);
+        let mut at_nodes = vec![1.0f64; self.map.nodes().len()];
+        for t in order.into_iter().rev().take_while(|t| self.lipschitz[*t] > limit) {
+            for n in self.map.tet(t) {
+                at_nodes[n as usize] = at_nodes[n as usize].min(limit / self.lipschitz[t]);
+            }
+        }
+        let eased = at_nodes.iter().any(|v| *v < 1.0).then(|| Arc::new(Eased { at_nodes, limit }));
+        Tiling { eased, ..self.clone() }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.
@@ -170,6 +217,10 @@ impl Tiling {
             if let Level::Nodes(of) = &self.level {
                 k.slope_t = linear_slope(m, of, self.map.tet(*t));
             }
+            if let Some(eased) = &self.eased {
+                k.eased = self.linear(&eased.at_nodes, *t, within(*l, 0.0)) - 1.0;
+                k.slope_eased = linear_slope(m, &eased.at_nodes, self.map.tet(*t));
+            }
         }
         out
     }
@@ -195,7 +246,7 @@ impl Tiling {
             }
             // Σ w k / Σ w with w = Π b(λ_i), b rising smoothly from 0 at −overlap to 1 at overlap.
             let (mut sum, mut weight, mut slope) = (Known::default(), 0.0, [0.0; 3]);
-            let mut crossed = [0.0; 2].map(|_: f64| [0.0; 3]);
+            let mut crossed = [0.0; 3].map(|_: f64| [0.0; 3]);
             for i in here {
                 let (t, l) = at[i];
                 let (w, dw) = self.bump(t, l);
@@ -206,6 +257,9 @@ impl Tiling {
                 sum.slope_t = add(sum.slope_t, scale(k.slope_t, w));
                 crossed[0] = add(crossed[0], scale(dw, k.f));
                 crossed[1] = add(crossed[1], scale(dw, k.t));
+                sum.eased += w * k.eased;
+                sum.slope_eased = add(sum.slope_eased, scale(k.slope_eased, w));
+                crossed[2] = add(crossed[2], scale(dw, k.eased));
                 weight += w;
                 slope = add(slope, dw);
             }
@@ -215,7 +269,8 @@ impl Tiling {
             };
             let (f, slope) = mean(sum.f, sum.slope, crossed[0]);
             let (t, slope_t) = mean(sum.t, sum.slope_t, crossed[1]);
-            Known { f, slope, t, slope_t }
+            let (eased, slope_eased) = mean(sum.eased, sum.slope_eased, crossed[2]);
+            Known { f, slope, t, slope_t, eased, slope_eased }
         };
         ends.iter().map(mean).collect()
     }
@@ -312,7 +367,7 @@ fn linear_slope(m: &Mat3, of: &[f64], nodes: [u32; 4]) -> Vec3 {
 impl Field for Tiling {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, k) in out.iter_mut().zip(self.known(points)) {
-            *o = self.cut.value(k.f, k.t);
+            *o = self.cut.value(k.f, k.t) * (1.0 + k.eased);
         }
     }
 
@@ -320,6 +375,10 @@ impl Field for Tiling {
         let both = values.iter_mut().zip(gradients);
         for ((v, g), k) in both.zip(self.known(points)) {
             (*v, *g) = self.cut.gradient((k.f, k.slope), (k.t, k.slope_t));
+            if self.eased.is_some() {
+                *g = add(scale(*g, 1.0 + k.eased), scale(k.slope_eased, *v));
+                *v *= 1.0 + k.eased;
+            }
         }
     }
 
@@ -358,6 +417,7 @@ impl Field for Tiling {
                 }
             }
         } else {
+            near.clear();
             f = all;
         }
         let t = match &self.level {
@@ -365,7 +425,15 @@ impl Field for Tiling {
             Level::Nodes(_) if t.lo <= t.hi => t,
             Level::Nodes(_) => spread(self.levels()),
         };
-        self.cut.bound(f, t)
+        let all = self.cut.bound(f, t);
+        let Some(eased) = &self.eased else { return all };
+        // Factors are at most one.
+        let nodes = near.iter().flat_map(|t| self.map.tet(*t));
+        let least = match near[..] {
+            [] => eased.at_nodes.iter().copied().fold(1.0, f64::min),
+            _ => nodes.map(|n| eased.at_nodes[n as usize]).fold(1.0, f64::min),
+        };
+        Interval::new(all.lo.min(all.lo * least), all.hi.max(all.hi * least))
     }
 }
 
@@ -375,6 +443,7 @@ impl Implicit for Tiling {
     }
 
     fn lipschitz(&self) -> f64 {
-        self.lipschitz.iter().copied().fold(0.0, f64::max)
+        let most = self.lipschitz.iter().copied().fold(0.0, f64::max);
+        self.eased.as_ref().map_or(most, |eased| eased.limit)
     }
 }

@@ -197,7 +197,7 @@ fn only(
 ) -> Result<Arc<dyn Implicit>, DesignError> {
     match (lattices, tilings, graphs) {
         ([(_, one)], [], []) => Ok(one.clone()),
-        ([], [one], []) => Ok(one.field.clone()),
+        ([], [one], []) => Ok(one.alone_field()),
         ([], [], [(_, one)]) => Ok(one.field()),
         ([], [], []) => Err(DesignError::new("lattice", "no lattice given; give one")),
         _ => Err(DesignError::new("blend", "several lattices need a blend to say where each is")),

@@ -15,6 +15,9 @@ use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
 /// Values within this share of the cell's range are near the surface.
 const NEAR: f64 = 0.04;
 
+/// By how much a tetrahedron may be steeper than the mean of those about a node: more it is where one is much smaller or flatter than the rest.
+const SPREAD: f64 = 2.0;
+
 /// A lattice with rounded ends.
 pub struct Rounded {
     /// The lattice, or one side of its sheet.
@@ -47,14 +50,16 @@ impl Steepness {
             ratios.extend(near.map(|k| norm(k.slope) / tiling.lipschitz[t]));
         }
         let ratio = if ratios.is_empty() { 0.5 } else { ratios.iter().sum::<f64>() / ratios.len() as f64 };
-        let mut sums = vec![(0.0, 0.0); tiling.map.nodes().len()];
+        let mut sums = vec![(0.0, 0.0, 0.0f64); tiling.map.nodes().len()];
         for t in 0..tiling.map.len() {
             for n in tiling.map.tet(t) {
-                sums[n as usize].0 += ratio * tiling.lipschitz[t];
-                sums[n as usize].1 += 1.0;
+                let (sum, count, most) = &mut sums[n as usize];
+                *sum += ratio * tiling.lipschitz[t];
+                *count += 1.0;
+                *most = most.max(ratio * tiling.lipschitz[t]);
             }
         }
-        let mean = |(s, n): (f64, f64)| if n > 0.0 { s / n } else { 1.0 };
+        let mean = |(s, n, most): (f64, f64, f64)| if n > 0.0 { (s / n).max(most / SPREAD) } else { 1.0 };
         Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()) }
     }
 
@@ -123,8 +128,10 @@ impl Field for Rounded {
 
 impl Implicit for Rounded {
     fn lipschitz(&self) -> f64 {
-        let least = self.steepness.at_nodes.iter().copied().fold(f64::INFINITY, f64::min);
-        (self.of.lipschitz() / least).max(1.0)
+        let Steepness { tiling, at_nodes } = &self.steepness;
+        let least =
+            |t: usize| tiling.map.tet(t).map(|n| at_nodes[n as usize]).into_iter().fold(f64::INFINITY, f64::min);
+        (0..tiling.map.len()).map(|t| tiling.lipschitz[t] / least(t)).fold(1.0, f64::max)
     }
 
     fn has_creases(&self) -> bool {
