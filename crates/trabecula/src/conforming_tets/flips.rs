@@ -4,6 +4,7 @@
 //! The triangulation of the ring is optimal by dynamic programming (Klincsek 1980; Freitag, Ollivier-Gooch 1997).
 
 use super::node_surfaces::{HELD, SurfaceSet};
+use super::partition::SAGITTA;
 use super::shaping::{GONE, Shaping};
 use super::tet_shape::shape;
 use geometry::math::{norm, sub};
@@ -14,8 +15,6 @@ use geometry::tetmesh::{EDGES, FACES};
 const RING: usize = 8;
 /// The least relative gain.
 const GAIN: f64 = 1.02;
-/// Greatest distance of the midpoint of a new boundary edge from the surface, as a fraction of its length.
-const SAGITTA: f64 = 0.08;
 
 impl Shaping<'_> {
     /// Tries all changes at badly shaped tetrahedra; whether any was made.

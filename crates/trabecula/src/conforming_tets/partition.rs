@@ -8,6 +8,9 @@ use geometry::math::{Vec3, sub};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+/// Greatest distance of the midpoint of a boundary edge from its surface, as a fraction of the edge's length.
+pub(super) const SAGITTA: f64 = 0.08;
+
 /// A tetrahedron, positively oriented, and the surfaces of which it is known on which side it lies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tet {
@@ -105,8 +108,6 @@ impl Partition<'_> {
 
     /// The surfaces on which the midpoint of an edge whose ends lie on them is, by their values at it.
     pub fn shared(&self, [a, b]: [u32; 2]) -> SurfaceSet {
-        /// Greatest distance of the midpoint of a chord from its surface, as a fraction of its length.
-        const SAGITTA: f64 = 0.08;
         let both = self.on[a as usize] & self.on[b as usize];
         let (p, q) = (self.nodes[a as usize], self.nodes[b as usize]);
         let middle: Vec3 = core::array::from_fn(|k| 0.5 * (p[k] + q[k]));

@@ -14,9 +14,6 @@ use geometry::fault::{Fault, counted};
 use geometry::formats::{Aside, BeamGraph, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph};
 use geometry::progress::{Stopped, checkpoint};
 
-/// Errors of radii in the radius of the thinnest beam, unless another one is asked for.
-const PER_RADIUS: f64 = 50.0;
-
 /// The only beams of a design, and whether its region cuts some.
 struct Written<'a> {
     name: &'a str,
@@ -153,8 +150,7 @@ impl Built {
     ) -> Result<BeamsFileReport, Stopped> {
         let written = written(self).map_err(Stopped::Refused)?;
         let quadors = &written.quadors;
-        let thin = (0..quadors.beams()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
-        let mut made = quadors.frusta(tolerance.unwrap_or(thin / PER_RADIUS));
+        let mut made = quadors.frusta(tolerance.unwrap_or_else(|| build_beams::fine_error(quadors)));
         checkpoint();
         self.add_sets(&written, &mut made);
         write_beam_lattice(&made.lattice, meshes, meta, aside, out).map_err(Stopped::Io)?;

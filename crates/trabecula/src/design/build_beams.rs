@@ -191,8 +191,14 @@ fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quador
     Ok(quadors)
 }
 
-/// Chord errors in the radius of the thinnest beam, unless another resolution is asked for: a circle has eighteen edges.
+/// Errors in the radius of the thinnest beam, unless another resolution is asked for: a circle has eighteen edges.
 const PER_RADIUS: f64 = 50.0;
+
+/// The error (mm) of chords and of radii at which beams are made unless another is asked for; infinite where there is no beam.
+pub(super) fn fine_error(quadors: &Quadors) -> f64 {
+    let waists = (0..quadors.beams()).map(|b| quadors.pencil(b).waist());
+    waists.fold(f64::INFINITY, f64::min) / PER_RADIUS
+}
 
 /// The chord error (mm) at which the surface of beams is made unless another resolution is asked for; `None` for what is
 /// made on a grid: other solids, beams that the region cuts or that overlap, patterns of many beams.
@@ -203,8 +209,7 @@ pub(super) fn default_chord(built: &Built) -> Option<f64> {
         return None;
     }
     let quadors = alone(built).ok().filter(|q| q.overlaps().is_empty())?;
-    let thin = (0..quadors.beams()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
-    (thin < f64::INFINITY).then_some(thin / PER_RADIUS)
+    Some(fine_error(&quadors)).filter(|error| *error < f64::INFINITY)
 }
 
 /// A frame before it is cleaned and trimmed.

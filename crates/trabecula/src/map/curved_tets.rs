@@ -17,6 +17,7 @@ use super::tet_map::{NONE, Tets};
 use crate::field::Field;
 use crate::region::Region;
 use geometry::math::{Mat3, Vec3, add, apply, cross, dot, inverse, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::tetmesh::EDGES;
 
 /// The greatest norm κ of the derivative of A.
 const MOST: f64 = 0.85;
@@ -29,9 +30,6 @@ const FIT: f64 = 0.1;
 /// Iterations of the inverse, and the change at which it has converged.
 const ROUNDS: usize = 200;
 const NEAR: f64 = 1e-13;
-
-/// The corners at the ends of each edge.
-pub(crate) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// An edge of the mesh's boundary.
 pub(crate) struct BoundaryEdge {
@@ -96,7 +94,7 @@ impl Bent {
         let at_corner = |v: usize| {
             let out: Mat3 = core::array::from_fn(|r| {
                 core::array::from_fn(|c| {
-                    let of = PAIRS.iter().zip(&shift).filter(|(pair, _)| pair.contains(&v));
+                    let of = EDGES.iter().zip(&shift).filter(|(pair, _)| pair.contains(&v));
                     let one = |(pair, s): (&[usize; 2], &[f64; 4])| {
                         let other = if pair[0] == v { pair[1] } else { pair[0] };
                         4.0 * (0..4).map(|i| B[r][i] * s[i]).sum::<f64>() * B[c][other]
@@ -108,7 +106,7 @@ impl Bent {
         };
         let contraction = (0..4).map(at_corner).fold(0.0, f64::max);
         // The hull of the corners and the control points: middles of edges plus 2δ.
-        let control = PAIRS.iter().zip(&shift).map(|(pair, s)| {
+        let control = EDGES.iter().zip(&shift).map(|(pair, s)| {
             let l: [f64; 4] = core::array::from_fn(|i| 2.0 * s[i] + if pair.contains(&i) { 0.5 } else { 0.0 });
             l.iter().fold(0.0f64, |m, v| m.max(-v))
         });
@@ -121,7 +119,7 @@ impl Bent {
     fn shifted(&self, l: [f64; 4]) -> [f64; 4] {
         let l = within(l, 0.0);
         let mut out = [0.0; 4];
-        for ([i, j], s) in PAIRS.iter().zip(&self.shift) {
+        for ([i, j], s) in EDGES.iter().zip(&self.shift) {
             let w = 4.0 * l[*i] * l[*j];
             out.iter_mut().zip(s).for_each(|(o, s)| *o += w * s);
         }
@@ -137,7 +135,7 @@ impl Bent {
         }
         // Columns of A′ by three of the coordinates; the fourth is one less their sum, in all vectors zero less their sum.
         let mut columns = [[0.0; 4]; 4];
-        for ([i, j], s) in PAIRS.iter().zip(&self.shift) {
+        for ([i, j], s) in EDGES.iter().zip(&self.shift) {
             for k in 0..4 {
                 columns[*i][k] += 4.0 * l[*j] * s[k];
                 columns[*j][k] += 4.0 * l[*i] * s[k];
@@ -179,7 +177,7 @@ impl Curves {
     fn bend(&mut self, map: &Tets, moved: &mut HashMap<[u32; 2], Vec3>) {
         let keys = |t: usize| {
             let n = map.tet(t);
-            PAIRS.map(|[i, j]| [n[i], n[j]])
+            EDGES.map(|[i, j]| [n[i], n[j]])
         };
         let touched = (0..map.len()).filter(|t| keys(*t).iter().any(|k| moved.contains_key(k)));
         let touched: Vec<usize> = touched.collect();
@@ -248,7 +246,7 @@ impl Curves {
     /// How far (mm) bending moves the point of a tetrahedron whose coordinates are `l`.
     pub fn moved(&self, t: usize, l: [f64; 4]) -> Vec3 {
         let Some(bent) = self.of(t) else { return [0.0; 3] };
-        let edges = PAIRS.iter().zip(&bent.moved);
+        let edges = EDGES.iter().zip(&bent.moved);
         edges.fold([0.0; 3], |s, ([i, j], d)| add(s, scale(*d, 4.0 * l[*i] * l[*j])))
     }
 
@@ -300,7 +298,7 @@ impl Curves {
         let l = within(l, 0.0);
         // Rows: ∂x/∂λ_k with λ_3 = 1 − λ_0 − λ_1 − λ_2.
         let mut rows = transpose(to);
-        for ([i, j], d) in PAIRS.iter().zip(&bent.moved) {
+        for ([i, j], d) in EDGES.iter().zip(&bent.moved) {
             let partial = |k: usize| {
                 if k == *i {
                     l[*j]

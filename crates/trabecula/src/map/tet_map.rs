@@ -8,16 +8,13 @@ use super::curved_tets::{Curves, settled};
 use crate::region::Region;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
-use geometry::tetmesh::TetMesh;
+use geometry::tetmesh::{FACES, TetMesh};
 
 /// No tetrahedron.
 pub const NONE: u32 = u32::MAX;
 
 /// Maximum number of boxes of the index.
 const MOST: f64 = 4e6;
-
-/// The corners of the face opposite each corner of a positive tetrahedron, counter-clockwise seen from outside.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// A tetrahedral mesh with point location.
 pub struct Tets {

@@ -10,9 +10,8 @@ use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
+use geometry::tetmesh::FACES;
 
-/// The faces, counter-clockwise seen from outside where corners are in positive order.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 /// A height of less than this share of the longest edge is none.
 const FLAT: f64 = 1e-6;
 

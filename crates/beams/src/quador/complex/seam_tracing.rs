@@ -17,14 +17,14 @@ use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
 /// Size of the perturbation, in hub radii.
 const PERTURBATION: f64 = 2e-12;
 
-/// A pseudo-random factor of a half-beam, of order one and increasing with the seed, such that no small sum of them
+/// The perturbation of a half-beam, in hub radii: a pseudo-random number that increases with the seed, such that no small sum of them
 /// vanishes in a symmetric hub.
 pub(in crate::quador) fn perturbation(half_beam: usize, seed: u64) -> f64 {
     let hash = (half_beam as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let hash = (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let hash = (hash ^ hash >> 32).wrapping_mul(0x94D0_49BB_1331_11EB);
     let unit = (hash >> 11) as f64 / (1u64 << 53) as f64;
-    8f64.powi(seed as i32) * (0.5 + unit)
+    PERTURBATION * (8f64.powi(seed as i32) * (0.5 + unit))
 }
 
 pub(super) struct SeamTracer<'a> {
@@ -40,10 +40,8 @@ pub(super) struct SeamTracer<'a> {
 
 impl<'a> SeamTracer<'a> {
     pub(super) fn new(hub: &'a Hub<'a>, seed: u64) -> SeamTracer<'a> {
-        let shifted = |(i, s): (usize, &HalfBeam)| AffineFunction {
-            a: s.g.a,
-            b: s.g.b + PERTURBATION * perturbation(i, seed) * hub.radius,
-        };
+        let shifted =
+            |(i, s): (usize, &HalfBeam)| AffineFunction { a: s.g.a, b: s.g.b + perturbation(i, seed) * hub.radius };
         SeamTracer {
             hub,
             g: hub.half_beams.iter().enumerate().map(shifted).collect(),

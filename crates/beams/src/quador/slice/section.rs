@@ -90,8 +90,6 @@ struct Crossing {
     used: bool,
 }
 
-/// Size of the perturbation of G, in hub radii.
-const PERTURBATION: f64 = 2e-12;
 /// Tolerance of S − N in the middle of an arc, relative to its squared distance: far above rounding.
 const VALUE_TOLERANCE: f64 = 1e-10;
 
@@ -118,10 +116,8 @@ impl<'a> Section<'a> {
         disc_sections: &'a [DiscSection],
         seed: u64,
     ) -> Section<'a> {
-        let shifted = |(i, s): (usize, &HalfBeam)| AffineFunction {
-            a: s.g.a,
-            b: s.g.b + PERTURBATION * perturbation(i, seed) * hub.radius,
-        };
+        let shifted =
+            |(i, s): (usize, &HalfBeam)| AffineFunction { a: s.g.a, b: s.g.b + perturbation(i, seed) * hub.radius };
         Section {
             hub,
             g: hub.half_beams.iter().enumerate().map(shifted).collect(),

@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::small_simplices::{PAIRS, Small, Template};
+use super::small_simplices::{Small, Template};
 use crate::cell::tet::{Nodes, Subdivision};
 use crate::map::Tets;
 use crate::map::curved_tets::{BoundaryEdge, Curves};
@@ -19,6 +19,7 @@ use crate::map::surface_feet::{edge_feet, feet_facing};
 use crate::map::tet_map::NONE;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
+use geometry::tetmesh::EDGES;
 
 /// Moves below this share of an edge are rounding, and the most that are made.
 const FLAT: f64 = 1e-9;
@@ -51,7 +52,7 @@ impl Places {
     /// Whether the simplex on which these coordinates are zero is moved.
     pub fn moved(&self, zero: u8) -> bool {
         let on = |c: usize| zero >> c & 1 == 0;
-        let edge = PAIRS.iter().enumerate().any(|(e, [a, b])| self.edges >> e & 1 == 1 && on(*a) && on(*b));
+        let edge = EDGES.iter().enumerate().any(|(e, [a, b])| self.edges >> e & 1 == 1 && on(*a) && on(*b));
         edge || zero == 0 && self.faces != 0 || zero.count_ones() == 1 && self.faces & zero != 0
     }
 }
@@ -119,7 +120,7 @@ impl BentNodes {
         let place = |k: &[u16; 4]| {
             let sum = (0..4).fold([0.0; 3], |s, i| add(s, scale(corners[i], f64::from(k[i]))));
             let mut at = sum.map(|v| v / n);
-            for ([i, j], moves) in PAIRS.iter().zip(moves) {
+            for ([i, j], moves) in EDGES.iter().zip(moves) {
                 let (a, b) = (f64::from(k[*i]), f64::from(k[*j]));
                 if let (Some(moves), true) = (moves, a > 0.0 && b > 0.0) {
                     let w = (a + b) / n;
@@ -200,7 +201,7 @@ impl BentNodes {
 /// The edges of a tetrahedron by their nodes.
 fn keys(map: &Tets, t: usize) -> [[u32; 2]; 6] {
     let ids = map.tet(t);
-    PAIRS.map(|[i, j]| [ids[i], ids[j]])
+    EDGES.map(|[i, j]| [ids[i], ids[j]])
 }
 
 /// The moves of the nodes of some edges, of those that are moved.

@@ -4,12 +4,12 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::small_simplices::PAIRS;
 use super::tet_surface::{NONE as NOBODY, Run, TetSurface};
 use crate::map::Tets;
 use crate::map::tet_map::NONE;
 use crate::surface_maker::{ComponentGraph, Totals};
 use geometry::fault::Fault;
+use geometry::tetmesh::EDGES;
 use geometry::union_find::{find, unite};
 
 /// Components of the tetrahedra so far. Each tetrahedron adds its surface components, then those of its solid.
@@ -63,7 +63,7 @@ impl ComponentLinks {
         let ids = map.tet(t);
         // Whether vertices of caps on an edge of the boundary are ours to count.
         let mut caps = [false; 6];
-        for (e, [a, b]) in PAIRS.iter().enumerate() {
+        for (e, [a, b]) in EDGES.iter().enumerate() {
             let off = 15 ^ (1u8 << a | 1 << b);
             match (mask & off).count_ones() {
                 0 => {}

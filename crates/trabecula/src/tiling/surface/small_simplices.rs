@@ -1,6 +1,7 @@
 //! The small simplices of a tetrahedron cut into n steps, listed once.
 
 use crate::cell::tet::Subdivision;
+use geometry::tetmesh::{EDGES, FACES};
 
 /// A small tetrahedron: its nodes, its six edges (01, 02, 03, 12, 13, 23), and whether it is in positive order.
 pub(super) struct Small {
@@ -28,12 +29,6 @@ pub(super) struct Template {
     pub faces: [Vec<Tile>; 4],
 }
 
-/// The pair of corners at the ends of each edge of a tetrahedron.
-pub(super) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-/// The corners of the face opposite each corner, counter-clockwise from outside.
-pub(super) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
 /// The edge between two corners.
 pub(super) fn pair(a: usize, b: usize) -> usize {
     match (a.min(b), a.max(b)) {
@@ -50,7 +45,7 @@ impl Template {
         grid.each_tet(|at, even| {
             raw.push((at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32), even));
         });
-        let mut edges: Vec<[u32; 2]> = raw.iter().flat_map(|(n, _)| PAIRS.map(|[a, b]| [n[a], n[b]])).collect();
+        let mut edges: Vec<[u32; 2]> = raw.iter().flat_map(|(n, _)| EDGES.map(|[a, b]| [n[a], n[b]])).collect();
         edges.sort_unstable();
         edges.dedup();
         let edge = |a: u32, b: u32| edges.partition_point(|e| *e < [a.min(b), a.max(b)]) as u32;
@@ -69,7 +64,7 @@ impl Template {
                 faces[on.trailing_zeros() as usize]
                     .push(Tile { nodes: of, edges: [0, 1, 2].map(|i| edge(of[i], of[(i + 1) % 3])) });
             }
-            tets.push(Small { nodes, edges: PAIRS.map(|[a, b]| edge(nodes[a], nodes[b])), even });
+            tets.push(Small { nodes, edges: EDGES.map(|[a, b]| edge(nodes[a], nodes[b])), even });
         }
         Template { zero, edges, tets, faces }
     }

@@ -11,9 +11,10 @@
 //! from every tetrahedron that has the edge.
 
 use super::cubic_root::first_root;
-use super::small_simplices::{FACES, PAIRS, Template, Tile, pair};
+use super::small_simplices::{Template, Tile, pair};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
+use geometry::tetmesh::{EDGES, FACES};
 use geometry::union_find::{find, unite};
 
 /// Least distance of a corner of the surface from a node, in steps: a margin above rounding.
@@ -358,7 +359,7 @@ impl TetSurface {
             }
         }
         self.solids = solids;
-        for (e, [a, b]) in PAIRS.iter().enumerate() {
+        for (e, [a, b]) in EDGES.iter().enumerate() {
             let off = 15 ^ (1u8 << a | 1 << b);
             if mask & off == 0 {
                 continue;
@@ -385,7 +386,7 @@ fn crossing(inside: u8, even: bool) -> ([[[usize; 2]; 3]; 2], bool) {
             let s = (r + 1..4).find(|i| !within(*i)).unwrap_or(3);
             // (0, 1, 2, 3), (0, 2, 1, 3), … : positive if an even number of pairs is out of order.
             let order = [p, q, r, s];
-            let swaps = PAIRS.iter().filter(|[a, b]| order[*a] > order[*b]).count();
+            let swaps = EDGES.iter().filter(|[a, b]| order[*a] > order[*b]).count();
             let two = [[[p, r], [p, s], [q, s]], [[p, r], [q, s], [q, r]]];
             (two, true, swaps % 2 == 0)
         }
