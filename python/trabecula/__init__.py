@@ -32,11 +32,12 @@ if TYPE_CHECKING:
     from .thickness import Thickness
     from .transition import Transitions
     from .viewer import View, view
-    from .volumes import ShellMesh, VolumeMesh, VolumeSet, VoxelElements
+    from .volumes import Carrier, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
     "Beams",
+    "Carrier",
     "Design",
     "DesignError",
     "DesignWarning",
@@ -98,6 +99,7 @@ _HOMES = {
     "TetMesh": "tets",
     "Thickness": "thickness",
     "Transitions": "transition",
+    "Carrier": "volumes",
     "VolumeMesh": "volumes",
     "ShellMesh": "volumes",
     "VoxelElements": "volumes",

@@ -70,7 +70,7 @@ def law(args):
         check_place(name)
     with Progress("law", args.progress) as progress:
         settings = args.start, args.stop, args.count, args.n, args.nu, tuple(args.properties)
-        found = laws.law(args.cell, args.part, *settings, args.threads, progress)
+        found = laws.law(args.cell, args.part, *settings, args.threads, progress, args.tet)
     for fraction, messages in found.notes.items():
         for message in messages:
             warn(message, f"fraction {fraction:.4g}", not args.json)
@@ -117,7 +117,7 @@ def table(limit: Sequence[Sequence[float]], names: Sequence[str], finest: Sequen
 def matrix(rows: Sequence[Sequence[float]], names: Sequence[str]) -> list[str]:
     """A matrix in lines, its entries to six digits of the largest."""
     largest = max(abs(v) for row in rows for v in row) or 1.0
-    texts = [[figure(v) if abs(v) > 1e-6 * largest else "0" for v in row] for row in rows]
+    texts = [[figure(v, 1e-6 * largest) for v in row] for row in rows]
     wide = max(len(text) for row in texts for text in row)
     return ["    " + " ".join(name.rjust(wide) for name in names)] + [
         f"{name:>3} " + " ".join(text.rjust(wide) for text in row) for name, row in zip(names, texts, strict=True)
@@ -194,7 +194,7 @@ PRINTED = ("fraction", "E", "G", "nu", "zener", "k", "K", "tortuosity", "area")
 def lines_of_law(found) -> list[str]:
     """The figures for people."""
     shown = [name for name in PRINTED if name in found.columns]
-    rows = [[figure(v) if v == v else "-" for v in row] for row in zip(*(found.columns[name] for name in shown), strict=True)]
+    rows = [[figure(v, 0) for v in row] for row in zip(*(found.columns[name] for name in shown), strict=True)]
     wide = max(len(text) for row in [shown, *rows] for text in row)
     lines = [" ".join(text.rjust(wide) for text in row) for row in [shown, *rows]]
     for name, fit in found.fits.items():

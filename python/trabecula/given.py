@@ -6,7 +6,7 @@ import functools
 import math
 import operator
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ __all__ = [
     "numbered",
     "pairs",
     "plain",
+    "poisson",
     "positive",
     "settings",
     "thread_count",
@@ -102,8 +103,21 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     return found
 
 
+def poisson(name: str, value: Any) -> float:
+    """Poisson's ratio: greater than -1 and less than 0.5."""
+    found = number(name, value)
+    if not -1 < found < 0.5:
+        raise ValueError(
+            f"{name} is {found:g}; Poisson's ratio must be greater than -1 and less than 0.5 (of an incompressible solid take "
+            "0.49)"
+        )
+    return found
+
+
 def three(name: str, value: Any) -> list[float]:
-    """Three numbers, given as three or as one for all."""
+    """Three numbers, given as three or as one for all. A TypeError for a set, which has no order."""
+    if isinstance(value, (Set, Mapping)):
+        raise TypeError(f"{name} must be one number or three in order, found {value!r:.80}")
     try:
         items = [value] * 3 if isinstance(value, (str, bytes)) else list(value)
     except TypeError:

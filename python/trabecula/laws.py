@@ -13,12 +13,14 @@ import numpy as np
 
 from . import _core
 from . import beams as unit_cells
+from .cell import tet as tet_cell
+from .cell import tet_facts, tet_names
 from .design import Beams, Design, Lattice
 from .errors import DesignError, DesignWarning
 from .files import extension, whole_file
 from .formats import LAW_WRITES
-from .given import number, positive, whole
-from .map import affine
+from .given import number, poisson, positive, thread_count, whole
+from .map import affine, tets
 from .region import box
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PROPERTIES", "Law", "law", "monotone"]
 
-#: What a law may have, and the columns of each, with what they are. Lengths are in units of the wavelength.
+#: What a law may have, and the columns of each, with what they are. Lengths are in units of the wavelength; of tetrahedral
+#: cells, in units of the edge of a regular tetrahedron of the same volume.
 PROPERTIES: dict[str, dict[str, str]] = {
     "stiffness": {
         "C11": "stiffness over E of the solid, mean of 11, 22, 33",
@@ -60,6 +63,7 @@ class Law:
     cell: str
     #: What is solid; ``beams`` of a unit cell of beams.
     part: str
+    #: Voxels along the cell.
     n: int
     nu: float
     #: ``fraction``, ascending, and the columns of `PROPERTIES`.
@@ -69,6 +73,8 @@ class Law:
     fits: dict[str, dict[str, float]] = field(default_factory=dict)
     #: Why there is no number, or a doubtful one, by fraction.
     notes: dict[float, list[str]] = field(default_factory=dict)
+    #: Whether it is a tetrahedral cell.
+    tet: bool = False
 
     def at(self, column: str, fraction: Any) -> np.ndarray:
         """A column at fractions, by monotone cubics between those it was found at. Raises ValueError outside them."""
@@ -112,7 +118,7 @@ class Law:
         """As plain data, None where there is no number."""
         plain = {name: [float(v) if np.isfinite(v) else None for v in values] for name, values in self.columns.items()}
         notes = [{"fraction": p, "messages": said} for p, said in self.notes.items()]
-        head = {"cell": self.cell, "part": self.part, "n": self.n, "nu": self.nu}
+        head = {"cell": self.cell, "part": self.part, "tet": self.tet, "n": self.n, "nu": self.nu}
         return head | {"columns": plain, "fits": self.fits, "notes": notes}
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -150,6 +156,7 @@ def law(
     properties: Sequence[str] = tuple(PROPERTIES),
     threads: int | None = None,
     progress: Callable[[int, int], Any] | None = None,
+    tet: bool = False,
 ) -> Law:
     """What a named cell, or a unit cell of beams, does by its solid fraction: stiffness over E of a solid of Poisson's ratio
     ``nu``, conductivity over the solid's, permeability over the wavelength squared, area of the wall; at ``count`` fractions
@@ -159,6 +166,10 @@ def law(
     ``part`` is what is solid: "sheet" (the default), "lower" or "upper" of a named cell, "beams" of a cell of beams (the
     default for names that no other cell has). Of cells with unequal edges the wavelength is the first.
 
+    With ``tet`` it is a tetrahedral cell, in tetrahedra that fill space alike: those of the body-centred cubic lattice, which
+    meshes have where no surface is near. Its ``part`` is by default the one that it is meant for, and the unit of length the
+    edge of a regular tetrahedron of the same volume, the ``size`` of ``map.tets``.
+
     ``properties`` names fewer of "stiffness", "conductivity", "permeability", "area". Where a cell falls apart its stiffness is
     NaN, and ``notes`` says so. Raises ValueError for fractions outside 0 to 1 or out of order.
     """
@@ -166,25 +177,20 @@ def law(
     count = whole("count", count, 2, 1000)
     if not start < stop < 1:
         raise ValueError(f"fractions run from {start:g} to {stop:g}; expected ascending ones between 0 and 1")
+    if isinstance(properties, str):
+        raise TypeError(f"properties must be a list of names, such as [{properties!r}], found {properties!r}")
+    n, nu, threads = whole("n", n, 8, 4096), poisson("nu", nu), thread_count(threads)
     for name in properties:
         if name not in PROPERTIES:
             raise ValueError(f"no property {name!r}; there are {', '.join(PROPERTIES)}")
-    named = cell in (it[0] for it in _core.cells())
-    part = part or ("beams" if not named and cell in unit_cells.names() else "sheet")
-    if part == "beams":
-        try:
-            unit_cells.cell(cell)
-        except KeyError as why:
-            raise ValueError(why.args[0]) from None
-    elif not named and cell in unit_cells.names():
-        raise ValueError(f"{cell} is a cell of beams: its part is 'beams', found {part!r}")
+    part = _part_of(cell, part, tet)
     fractions = np.linspace(start, stop, count)
     names = [column for key, columns in PROPERTIES.items() if key in properties for column in columns]
     columns = {"fraction": fractions} | {name: np.full(count, np.nan) for name in names}
     notes: dict[float, list[str]] = {}
     for i, fraction in enumerate(fractions):
         try:
-            solid = _solid(cell, part, float(fraction))
+            solid = _solid(cell, part, float(fraction), tet)
         except DesignError as why:
             # Beams of no radius have this fraction.
             if part != "beams":
@@ -203,12 +209,36 @@ def law(
             if said:
                 notes.setdefault(float(fraction), []).extend(said)
     fits = {name: made for name in FITTED if name in columns and (made := _power(fractions, columns[name]))}
-    return Law(cell, part, n, nu, columns, fits, notes)
+    return Law(cell, part, n, nu, columns, fits, notes, tet)
 
 
-def _solid(cell: str, part: str, fraction: float) -> Solid:
-    """A cell of wavelength 1 at a fraction."""
+def _part_of(cell: str, part: str | None, tet: bool) -> str:
+    """What is solid. A ValueError for a part that the cell has not, and for a name that is none."""
+    if tet:
+        if cell not in tet_names():
+            raise ValueError(f"no tetrahedral cell is named {cell!r}; there are {', '.join(tet_names())}")
+        meant = tet_facts(cell)["part"]
+        if part == "beams":
+            raise ValueError("the part of a tetrahedral cell is sheet, lower or upper, found 'beams'")
+        return part or meant
+    named = cell in (it[0] for it in _core.cells())
+    part = part or ("beams" if not named and cell in unit_cells.names() else "sheet")
     if part == "beams":
+        try:
+            unit_cells.cell(cell)
+        except KeyError as why:
+            raise ValueError(why.args[0]) from None
+    elif not named and cell in unit_cells.names():
+        raise ValueError(f"{cell} is a cell of beams: its part is 'beams', found {part!r}")
+    return part
+
+
+def _solid(cell: str, part: str, fraction: float, tet: bool) -> Solid:
+    """A cell of wavelength 1, or about 1 in tetrahedra, at a fraction."""
+    if tet:
+        core = Lattice(tet_cell(cell), part, tets(size=1), {"fraction": fraction})
+        design = Design(box(size=[2, 2, 2]), core)
+    elif part == "beams":
         shape = np.array(unit_cells.cell(cell)["aspect"])
         shape = [float(v) for v in shape / shape[0]]
         design = Design(box(size=shape), beams=Beams(cell, affine(wavelength=shape), fraction=fraction))
@@ -234,6 +264,12 @@ def _part(progress: Callable[[int, int], Any] | None, done: int, total: int) -> 
     if progress is None:
         return None
     return lambda at, of: progress(round(1e6 * (done + at / max(of, 1))), 1_000_000 * total)
+
+
+def _unit(solid: Solid) -> float:
+    """The unit of length: 1, or in tetrahedra, twelve of which fill the cell, the edge of a regular one of the same volume."""
+    tilings = [it for it in solid.report().lattices.values() if it.tets is not None]
+    return (solid._cell.volume / np.sqrt(2)) ** (1 / 3) if tilings else 1.0
 
 
 def _mean(values: Sequence[float]) -> float:
@@ -263,17 +299,18 @@ def _conductivity(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float
 
 def _permeability(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
     found = solid.permeability(n, None, *work)
+    unit = _unit(solid)
     made = {
-        "K": _mean(np.diag(found.k)),
+        "K": _mean(np.diag(found.k)) / unit**2,
         "K_error": found.error,
-        "diameter": found.hydraulic_diameter,
+        "diameter": found.hydraulic_diameter and found.hydraulic_diameter / unit,
         "tortuosity": found.tortuosity,
     }
     return made, [f"permeability: {w['message']}" for w in found.warnings]
 
 
 def _area(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
-    return {"area": solid._cell.area(n, work[0]) / solid._cell.volume}, []
+    return {"area": solid._cell.area(n, work[0]) / solid._cell.volume * _unit(solid)}, []
 
 
 _FOUND = {"stiffness": _stiffness, "conductivity": _conductivity, "permeability": _permeability, "area": _area}

@@ -10,9 +10,9 @@ from functools import cached_property
 
 from . import _core
 from .errors import DesignWarning
-from .given import number, positive, thread_count, whole
+from .given import number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .volumes import OF, TET_BYTES, VOXEL_BYTES, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, Carrier, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Simulated:
         size = self._volume_edge(edge, per_cell, wall)
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
-        count = 12 * max(part, 0.02) * region / size**3
+        count = 12 * max(part, 0.02) * region / size / size / size
         if count > MOST_TETS and edge is None and per_cell is None and wall is None:
             usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
             used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
@@ -106,6 +106,17 @@ class Simulated:
         warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
         return made
 
+    def carrier(self, order: int = 1, threads: int | None = None) -> Carrier:
+        """The tetrahedra that carry a lattice over tetrahedra (``map.tets``) as finite elements, each a material by the solid
+        fraction of its cell: a model of the whole part by as few elements as there are cells.
+
+        ``order`` 2 gives quadratic tetrahedra, whose boundary edges are bent onto the region's surface. Raises ValueError for a
+        design that is more or other than one such lattice, and for an empty set.
+        """
+        if order not in (1, 2):
+            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        return Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
+
     def voxel_elements(
         self,
         step: float,
@@ -124,7 +135,7 @@ class Simulated:
         if not 0 < share <= 1:
             raise ValueError(f"least is {share:g}; it must be greater than 0 and at most 1")
         low, high = self.bounds
-        count = math.prod(math.ceil((b - a) / size) for a, b in zip(low, high, strict=True))
+        count = math.prod((b - a) / size + 1 for a, b in zip(low, high, strict=True))
         fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
         return VoxelElements(_core.VoxelElements.make(self._core, size, share, thread_count(threads), progress))
 
@@ -215,7 +226,7 @@ class Simulated:
         if given is not None and given.shape != (6, 6):
             raise ValueError(f"expected C of shape (6, 6), found {given.shape}")
         grid = _voxels(n, STIFFNESS_BYTES), voxels
-        solid = number("E", E), number("nu", nu)
+        solid = number("E", E), poisson("nu", nu)
         return self._cell.stiffness(grid, solid, None if given is None else given.tolist(), (thread_count(threads), progress))
 
     def conductivity(

@@ -17,7 +17,7 @@ from . import _core
 from .errors import DesignWarning
 from .files import extension, whole_file
 from .formats import SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
-from .given import number, positive
+from .given import number, poisson, positive, thread_count, whole
 from .mesh import Mesh
 from .texts import counted
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
+__all__ = ["Carrier", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
@@ -102,10 +102,15 @@ class FiniteElements:
         fields: Mapping[str, ArrayLike] | None,
     ) -> None:
         """Writes a file; ``steps`` is what is held and what is loaded."""
-        moduli = [positive("E", elastic[0]), number("nu", elastic[1])]
+        E, nu = positive("E", elastic[0]), poisson("nu", elastic[1])
         hold, load = ([steps[0]] if isinstance(steps[0], str) else list(steps[0])), steps[1]
         check_steps(kind, hold, load)
         held = [self._with_faces("hold", name) for name in hold]
+        for name in held:
+            if name in (load or {}):
+                raise ValueError(
+                    f"{name} is held and loaded: a force on what does not move does nothing; hold or load another set"
+                )
         loads = [(self._with_faces("load", k), _resultant(f"the force on {k}", v)) for k, v in (load or {}).items()]
         if held or loads:
             self._check_loads()
@@ -118,6 +123,7 @@ class FiniteElements:
             return write(os.fsdecode(path), self, self._of_elements(), further)  # type: ignore[arg-type]
         count = self._figures.nodes
         arrays = [(name, v[0].size, len(v) == count, v.ravel().tolist()) for name, v in further.items()]
+        moduli = self._materials(kind, E, nu)
         title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
         with whole_file(path) as temporary:
             self._core.write((temporary, kind, title), moduli, held, loads, arrays)
@@ -125,6 +131,10 @@ class FiniteElements:
     def _of_elements(self) -> dict[str, NDArray]:
         """What each element has."""
         return {}
+
+    def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
+        """Young's modulus (MPa) and Poisson's ratio in a file: of all domains."""
+        return [[E, nu]]
 
     def _field(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
         """A field of a file: a row for each node or element."""
@@ -261,6 +271,77 @@ class VolumeMesh(FiniteElements):
                 except OSError:
                     os.replace(old, whole)
                     raise
+
+
+class Carrier(VolumeMesh):
+    """The tetrahedra of a lattice over tetrahedra, each a material by the solid fraction of its cell: a model of the whole part
+    with as many elements as the lattice has cells. Made by ``Solid.carrier``.
+
+    Its domains are classes of the solid fraction, in twentieths: FRACTION_005 to FRACTION_100, or ZONE_NAME_FRACTION_005 in a
+    mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume`` is
+    that of the tetrahedra.
+    """
+
+    def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
+        super().__init__(core)
+        self._solid = solid
+        self._found: dict[tuple[float, int], list[list[float]]] = {}
+
+    def __repr__(self) -> str:
+        return super().__repr__().replace("VolumeMesh", "Carrier")
+
+    @cached_property
+    def fraction(self) -> NDArray[np.float64]:
+        """The solid fraction of each tetrahedron."""
+        return self._core.fraction
+
+    def moduli(
+        self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
+    ) -> dict[str, NDArray[np.float64]]:
+        """The material of each tetrahedron: ``young``, Young's modulus over that of the solid, and ``poisson``, Poisson's
+        ratio, where that of the solid is ``nu``.
+
+        A domain has that of its mean fraction: Hill's mean over all directions of the effective stiffness of the cell in equal
+        tetrahedra, those of the body-centred cubic lattice, found on ``n`` voxels along its edge as by ``Solid.stiffness``.
+        Tetrahedra whose edges are much longer one way are stiffer that way, which a mean does not show.
+
+        Raises ValueError for a cell that carries no load at the fraction of a domain, and for ``nu`` outside -1 to 0.5.
+        """
+        import numpy as np
+
+        found = np.array(self._moduli(poisson("nu", nu), whole("n", n, 8, 512), threads, progress))[self.domain]
+        return {"young": found[:, 0], "poisson": found[:, 1]}
+
+    def _moduli(self, nu: float, n: int, threads: int | None, progress: Progress | None) -> list[list[float]]:
+        """Of each domain."""
+        if (nu, n) not in self._found:
+            self._found[nu, n] = _core.VolumeMesh.carrier_moduli(self._solid, nu, n, thread_count(threads), progress)
+        return self._found[nu, n]
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Writes the files of ``VolumeMesh.write``, with fractions in .msh, .vtu and .xdmf. In .inp and .bdf each domain has a
+        material: ``moduli(nu)`` times the ``E`` (MPa) of the solid. ``fields`` may have them in .vtu: ``carrier.moduli()``.
+        """
+        super().write(path, E, nu, hold, load, fields)
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return super()._of_elements() | {"fraction": self.fraction}
+
+    def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
+        if kind not in ("inp", "bdf"):
+            return []
+        return [[E * young, poisson] for young, poisson in self._moduli(nu, 32, None, None)]
+
+    def _check_loads(self) -> None:
+        """All of it is solid."""
 
 
 class VoxelElements(FiniteElements):

@@ -95,7 +95,7 @@ impl Shells {
         &self,
         py: Python<'_>,
         file: (PathBuf, String, String),
-        elastic: [f64; 2],
+        elastic: Vec<[f64; 2]>,
         held: Vec<String>,
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,

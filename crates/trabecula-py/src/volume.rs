@@ -56,6 +56,34 @@ impl VolumeMesh {
         Ok(VolumeMesh { made: made.map_err(error::stopped)? })
     }
 
+    /// The carrier of a solid's lattice over tetrahedra, linear or quadratic.
+    #[staticmethod]
+    #[pyo3(signature = (solid, order=1, threads=None))]
+    fn carrier(py: Python<'_>, solid: &Solid, order: u8, threads: Option<usize>) -> PyResult<VolumeMesh> {
+        let made = run(py, threads, None, |_| solid.built().carrier(order))?;
+        Ok(VolumeMesh { made: made.map_err(error::fault)? })
+    }
+
+    /// Young's modulus, over that of the solid, and Poisson's ratio of each domain of the carrier: the solid's ratio, and voxels along cells.
+    #[staticmethod]
+    #[pyo3(signature = (solid, nu, n, threads=None, progress=None))]
+    fn carrier_moduli(
+        py: Python<'_>,
+        solid: &Solid,
+        nu: f64,
+        n: usize,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<[f64; 2]>> {
+        run(py, threads, progress, |p| solid.built().carrier_moduli(nu, n, p))?.map_err(error::stopped)
+    }
+
+    /// The solid fraction of each tetrahedron of a carrier; empty for others.
+    #[getter]
+    fn fraction<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.mesh().fraction.clone().into_pyarray(py)
+    }
+
     /// Nodes (n, 3), mm.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -127,14 +155,14 @@ impl VolumeMesh {
         self.mesh().set(name).map(|set| forces(py, self.mesh().nodal_forces(set, force))).transpose()
     }
 
-    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio for formats with a material; sets that
-    /// are held, sets with the resultants (N) of their loads, and fields.
+    /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio, of all domains or of each, for formats
+    /// with materials; sets that are held, sets with the resultants (N) of their loads, and fields.
     #[allow(clippy::too_many_arguments)] // The pieces of a file.
     fn write(
         &self,
         py: Python<'_>,
         file: (PathBuf, String, String),
-        elastic: [f64; 2],
+        elastic: Vec<[f64; 2]>,
         held: Vec<String>,
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
@@ -143,7 +171,9 @@ impl VolumeMesh {
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
-        let text = FeText { title, elastic, held, loads, fields: fields.into_iter().map(field).collect() };
+        let own_materials = !self.mesh().fraction.is_empty() && !elastic.is_empty();
+        let fields = fields.into_iter().map(field).collect();
+        let text = FeText { title, elastic, own_materials, held, loads, fields };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

@@ -85,7 +85,7 @@ impl VoxelElements {
         &self,
         py: Python<'_>,
         file: (PathBuf, String, String),
-        elastic: [f64; 2],
+        elastic: Vec<[f64; 2]>,
         held: Vec<String>,
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,

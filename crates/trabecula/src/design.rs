@@ -7,6 +7,7 @@ mod beam_files;
 mod build;
 mod build_beams;
 mod build_blend;
+mod build_carrier;
 mod build_cell;
 mod build_core;
 mod build_level;
@@ -31,6 +32,7 @@ mod study_kind;
 mod surface_net;
 #[cfg(test)]
 mod tests;
+mod tiled_cell;
 mod unit_cell;
 mod volume_error;
 mod warn;
@@ -156,6 +158,16 @@ pub struct Tiled {
     field: Arc<dyn Implicit>,
     /// Which zones join, where zones have cells of their own and it can be predicted.
     pub joins: Option<Joins>,
+}
+
+impl Tiled {
+    /// The field of a design that is this lattice alone, to be meshed with other surfaces.
+    fn alone_field(&self) -> Arc<dyn Implicit> {
+        match self.ends {
+            Ends::Rounded => self.field.clone(),
+            _ => Arc::new(self.tiling.eased()),
+        }
+    }
 }
 
 /// A built design.
@@ -419,6 +431,23 @@ impl Built {
     ) -> Result<volume_mesh::Made, Stopped> {
         let named = volume_mesh::Named { bodies: &self.bodies, sets: &self.sets };
         volume_mesh::volume_mesh(&self.solid, &named, options, progress)
+    }
+
+    /// The carrier of its lattice over tetrahedra, with the design's own sets; `order` is 1 or 2.
+    ///
+    /// # Errors
+    /// A design without one such lattice; an empty set.
+    pub fn carrier(&self, order: u8) -> Result<volume_mesh::Made, Fault> {
+        build_carrier::carrier(self, order).map(|made| made.0)
+    }
+
+    /// Young's modulus, over that of the solid, and Poisson's ratio of each domain of the carrier, where the solid has Poisson's ratio `nu`
+    /// and cells are solved for on `n` voxels along an edge.
+    ///
+    /// # Errors
+    /// As `carrier`; a cell that carries no load at the fraction of a domain; a solid that is none; an interruption.
+    pub fn carrier_moduli(&self, nu: f64, n: usize, progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
+        build_carrier::moduli(self, (nu, n), progress)
     }
 
     /// The shells of its mid-surface, with the design's own sets.

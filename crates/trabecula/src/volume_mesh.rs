@@ -17,6 +17,7 @@ use crate::region::Region;
 use crate::solid::Solid;
 
 mod body_centred;
+mod carrier;
 mod cyclic_nodes;
 mod deviation;
 mod domains;
@@ -24,6 +25,7 @@ mod mid_nodes;
 mod named_sets;
 
 use body_centred::Cubes;
+pub use carrier::{Carried, carrier};
 pub(crate) use cyclic_nodes::PLANES;
 use domains::Domains;
 pub use domains::Of;
@@ -227,7 +229,7 @@ fn assembled(
         [0.0; 3]
     };
     let names = domains.names.iter().map(|n| n.to_string()).collect();
-    let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, sets: Vec::new(), pairs, period };
+    let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, pairs, period, ..FeMesh::default() };
     named_sets::add_sets(&mut mesh, domains, &faces, (planes, bounds), named.bodies);
     let empty = named_sets::add_regions(&mut mesh, &faces, named.sets);
     // A region of the solid's surface may hold none of a fluid's.

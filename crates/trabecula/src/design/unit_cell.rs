@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::data::*;
+use super::tiled_cell::TiledCell;
 use super::{Built, Design, Loader};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::effective::UnitCell;
@@ -26,13 +27,10 @@ pub(super) fn of(built: &Built, design: &Design, loader: &dyn Loader) -> Result<
                        design with one of its lattices, at several fractions if they vary";
         return Err(DesignError::new("blend", message));
     }
-    if let [tiled, ..] = &built.tilings[..] {
-        let message = "a lattice over tetrahedra has no periodic cell; mesh a part of it for finite elements instead";
-        return Err(DesignError::new(format!("lattice.{}.map.tets", tiled.name), message));
-    }
-    match (&built.lattices[..], &built.beams[..]) {
-        ([(name, lattice)], []) => of_lattice(name, lattice),
-        ([], [(name, _)]) => of_beams(name, design, loader),
+    match (&built.lattices[..], &built.tilings[..], &built.beams[..]) {
+        ([(name, lattice)], [], []) => of_lattice(name, lattice),
+        ([], [tiled], []) => Ok(of_tiling(format!("lattice.{}", tiled.name), TiledCell::of(tiled)?)),
+        ([], [], [(name, _)]) => of_beams(name, design, loader),
         _ => Err(DesignError::new("lattice", "give one lattice, or one graph of beams")),
     }
 }
@@ -71,6 +69,13 @@ pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell,
     cell.connected = Some(lattice.connected_fraction());
     cell.wall = wall;
     Ok(cell)
+}
+
+/// Of tetrahedra, with the path of their lattice.
+pub(super) fn of_tiling(path: String, tiled: TiledCell) -> UnitCell {
+    let mut cell = pulled(path, tiled.field, [0.0; 3], tiled.edges);
+    (cell.fraction, cell.wall) = (Some(tiled.fraction), tiled.wall);
+    cell
 }
 
 fn of_beams(name: &str, design: &Design, loader: &dyn Loader) -> Result<UnitCell, DesignError> {
@@ -168,6 +173,54 @@ mod tests {
         let c = cell.stiffness(&material, Resolution { n: 16, plain: false }, &Silent).expect("solved").C_n;
         for (a, b) in [([0, 0], [1, 1]), ([0, 0], [2, 2]), ([3, 3], [4, 4]), ([0, 1], [1, 2]), ([0, 1], [2, 0])] {
             assert!((c[a[0]][a[1]] - c[b[0]][b[1]]).abs() <= 1e-15, "{a:?} {b:?}");
+        }
+    }
+
+    fn tiled(name: &str, part: &str, fraction: f64, overlap: f64) -> UnitCell {
+        let text = format!(
+            "schema = 1\nregion.box.size = [4, 4, 4]\n[lattice.a]\ncell.tet.name = \"{name}\"\npart = \"{part}\"\n\
+             level.fraction = {fraction}\nmap.tets = {{ size = 2, overlap = {overlap} }}\n"
+        );
+        let design = Design::from_toml(&text).expect("a design");
+        design.build(&NoFiles).expect("built").unit_cell(&design, &NoFiles).expect("a cell")
+    }
+
+    /// The tiling repeats after each edge, continuously, and has the fraction asked for: of its tetrahedra exactly, of blended ones by the
+    /// table of a sample (0.002).
+    #[test]
+    fn a_tiling_of_tetrahedra_repeats_and_has_its_fraction() {
+        for (name, part, fraction, overlap) in
+            [("diamond", "lower", 0.25, 0.0), ("primitive", "sheet", 0.4, 0.0), ("diamond", "lower", 0.3, 0.1)]
+        {
+            let cell = tiled(name, part, fraction, overlap);
+            let from: Vec<Vec3> =
+                (0..500).map(|i| [0.618, 0.414, 0.732].map(|g: f64| (g * f64::from(i)).fract() * 1.2 - 0.1)).collect();
+            let value = |points: &[Vec3]| {
+                let mut v = vec![0.0; points.len()];
+                crate::field::Field::values(&cell.solid, points, &mut v);
+                v
+            };
+            let near = |u: f64| 0.1 * (2.0 * u - 1.0);
+            for axis in 0..3 {
+                let low: Vec<Vec3> =
+                    from.iter().map(|u| core::array::from_fn(|a| if a == axis { near(u[a]) } else { u[a] })).collect();
+                let high: Vec<Vec3> =
+                    low.iter().map(|u| core::array::from_fn(|a| u[a] + f64::from(u8::from(a == axis)))).collect();
+                let (low, high) = (value(&low), value(&high));
+                let most = low.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+                let off = low.iter().zip(&high).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-9 * most, "{name}: {off:.2e} of {most}");
+            }
+            let material = homogenise::Material::isotropic(1.0, 0.3).expect("valid");
+            let found = cell.stiffness(&material, Resolution { n: 24, plain: false }, &Silent).expect("solved");
+            let (close, grid) = (if overlap > 0.0 { 4e-3 } else { 1e-3 }, &found.grids[0]);
+            assert!((grid.fraction - fraction).abs() < close, "{name}: {} for {fraction}", grid.fraction);
+            // Cubic, so three numbers are all.
+            let c = found.C_n;
+            for (a, b) in [([0, 0], [1, 1]), ([0, 1], [1, 2]), ([3, 3], [4, 4])] {
+                assert!((c[a[0]][a[1]] - c[b[0]][b[1]]).abs() < 1e-6 * c[0][0], "{name}: {c:?}");
+            }
+            assert!(c[0][3].abs() < 1e-3 * c[0][0] && c[3][4].abs() < 1e-3 * c[0][0], "{name}: {c:?}");
         }
     }
 }

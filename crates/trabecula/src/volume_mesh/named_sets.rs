@@ -11,7 +11,7 @@ use geometry::math::{Aabb, Vec3, add, norm, scale};
 use rayon::prelude::*;
 
 /// Nodes nearer to a bounding plane than this part of the region's size are on it.
-const FLAT: f64 = 1e-6;
+pub(super) const FLAT: f64 = 1e-6;
 
 /// Adds the sets that are not empty. `faces` are those on surfaces: tetrahedron and corner, their surfaces, whether only one tetrahedron
 /// has them; `planes` the surfaces of the bounding planes; `bounds` those of the region; `bodies` the names of what is solid whatever the
@@ -110,9 +110,9 @@ pub(super) fn add_regions(
 
 /// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
 pub fn is_own_name(name: &str) -> bool {
-    const OWN: [&str; 15] = [
-        "CUT", "LATTICE", "SKIN", "NET", "SOLID", "PORE", "WALL", "LOWER", "UPPER", "NALL", "REF", "REFX", "REFY",
-        "REFZ", "SURFACE",
+    const OWN: [&str; 17] = [
+        "CUT", "LATTICE", "SKIN", "NET", "BORDER", "SHELL", "SOLID", "PORE", "WALL", "LOWER", "UPPER", "NALL", "REF",
+        "REFX", "REFY", "REFZ", "SURFACE",
     ];
     let name = name.to_ascii_uppercase();
     let plane = |n: &str| PLANES.iter().flatten().any(|p| *p == n);
@@ -126,7 +126,7 @@ pub fn is_own_name(name: &str) -> bool {
 }
 
 /// Adds a set of faces with their nodes and tetrahedra, unless it is empty.
-fn push(mesh: &mut FeMesh, name: String, mut faces: Vec<(u32, u8)>) {
+pub(super) fn push(mesh: &mut FeMesh, name: String, mut faces: Vec<(u32, u8)>) {
     if faces.is_empty() {
         return;
     }

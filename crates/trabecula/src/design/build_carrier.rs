@@ -1,0 +1,111 @@
+//! The carrier of a lattice over tetrahedra as finite elements, and what these are as a material: isotropic, by the solid fraction of the cell.
+//!
+//! The stiffness of a cell in equal tetrahedra is cubic. Those of a mesh lie in many directions, so its mean over all directions is taken:
+//! Hill's, between the bounds of Voigt and Reuss (Hill, Proc. Phys. Soc. A 65 (1952) 349).
+
+use super::tiled_cell::TiledCell;
+use super::{Built, Tiled, unit_cell};
+use crate::cell::tet::{TetCell, named_tet_cell};
+use crate::effective::Resolution;
+use crate::volume_mesh::{self, Carried, Made};
+use geometry::fault::Fault;
+use geometry::monotone_cubic::monotone;
+use geometry::progress::{Progress, Stage, Stopped};
+use homogenise::{Material, Voigt};
+use std::sync::Arc;
+
+/// Fractions at which a cell is solved for, at most; between them monotone cubics of the logarithms.
+const NODES: usize = 6;
+/// Fractions from here on are solid.
+const SOLID: f64 = 0.999;
+
+/// The carrier, and the zone of each of its domains.
+pub(super) fn carrier(built: &Built, order: u8) -> Result<(Made, Vec<usize>), Fault> {
+    let tiled = only(built)?;
+    let zones = tiled.zones.iter().map(|z| (z.name.clone(), z.numbers.clone())).collect();
+    let of = Carried { zones, sets: &built.sets, bounds: built.solid.region.bounds(), order };
+    let (mesh, zone_of) = volume_mesh::carrier(&tiled.tiling, &of)?;
+    let edge = tiled.tiling.map.mean_edge();
+    let off = tiled.mesh.fit.as_ref().map_or(0.0, |fit| fit.to_part.max);
+    let bent = tiled.tiling.map.off_region().filter(|_| order == 2).map(|off| off * edge);
+    let pieces = tiled.mesh.quality.pieces;
+    let made = Made { mesh, deviation: bent.unwrap_or(off), straight: 0, pieces, dropped: 0.0, step: [edge; 3] };
+    Ok((made, zone_of))
+}
+
+/// The only lattice.
+fn only(built: &Built) -> Result<&Tiled, Fault> {
+    match &built.tilings[..] {
+        [tiled] if built.blend.is_none() => Ok(tiled),
+        _ => {
+            let message = "of = \"carrier\" goes with one lattice over tetrahedra (map.tets), whose tetrahedra it is";
+            Err(Fault::new("", message))
+        }
+    }
+}
+
+/// Young's modulus, over that of the solid, and Poisson's ratio of each domain, at the mean fraction of its tetrahedra.
+pub(super) fn moduli(built: &Built, (nu, n): (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
+    let tiled = only(built).map_err(Stopped::Refused)?;
+    let (made, zone_of) = carrier(built, 1).map_err(Stopped::Refused)?;
+    let solid = Material::isotropic(1.0, nu).map_err(Stopped::Refused)?;
+    let (mut sums, mut counts) = (vec![0.0; zone_of.len()], vec![0.0; zone_of.len()]);
+    for (d, fraction) in made.mesh.domain.iter().zip(&made.mesh.fraction) {
+        sums[*d as usize] += fraction;
+        counts[*d as usize] += 1.0;
+    }
+    let means: Vec<f64> = sums.iter().zip(&counts).map(|(s, c)| s / c).collect();
+    let mut out = vec![[1.0, nu]; means.len()];
+    let zones = zone_of.last().map_or(0, |z| z + 1);
+    for zone in 0..zones {
+        let own: Vec<usize> = (0..means.len()).filter(|d| zone_of[*d] == zone && means[*d] < SOLID).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let cell = cell_of(tiled, zone)?;
+        let nodes = nodes(&own.iter().map(|d| means[*d]).collect::<Vec<f64>>());
+        let (mut young, mut poisson) = (Vec::new(), Vec::new());
+        for (i, fraction) in nodes.iter().enumerate() {
+            let done = |k: usize| (zone as f64 + k as f64 / nodes.len() as f64) / zones as f64;
+            let stage = Stage { whole: progress, from: done(i), to: done(i + 1) };
+            let tetrahedra = TiledCell::new(&cell, tiled.tiling.part, *fraction, 1.0, tiled.tiling.map.overlap());
+            let path = format!("lattice.{}", tiled.name);
+            let unit = unit_cell::of_tiling(path, tetrahedra.map_err(Stopped::Refused)?);
+            let found = unit.stiffness(&solid, Resolution { n, plain: false }, &stage)?;
+            let [e, own] = isotropic(&found.C);
+            young.push([fraction.ln(), e.ln()]);
+            poisson.push([fraction.ln(), own]);
+        }
+        for d in own {
+            let at = means[d].ln();
+            out[d] = [monotone(&young, at).exp(), monotone(&poisson, at)];
+        }
+    }
+    Ok(out)
+}
+
+/// The cell of a zone.
+fn cell_of(tiled: &Tiled, zone: usize) -> Result<Arc<TetCell>, Stopped> {
+    let Some(named) = tiled.zones.get(zone) else { return Ok(tiled.tiling.cells[0].cell.clone()) };
+    let known = named_tet_cell(&named.cell).ok_or_else(|| Fault::new("cell.tet.zones", "no such cell"));
+    known.and_then(|it| it.cell()).map(Arc::new).map_err(Stopped::Refused)
+}
+
+/// The fractions at which a cell is solved for: these, ascending, or some over their range.
+fn nodes(fractions: &[f64]) -> Vec<f64> {
+    let (first, last) = (fractions[0].ln(), fractions[fractions.len() - 1].ln());
+    if fractions.len() <= NODES {
+        return fractions.to_vec();
+    }
+    (0..NODES).map(|i| (first + (last - first) * i as f64 / (NODES - 1) as f64).exp()).collect()
+}
+
+/// Young's modulus and Poisson's ratio of Hill's mean over all directions of a cubic stiffness.
+fn isotropic(c: &Voigt) -> [f64; 2] {
+    let mean = |pairs: [[usize; 2]; 3]| pairs.iter().map(|[i, j]| c[*i][*j]).sum::<f64>() / 3.0;
+    let (c11, c12) = (mean([[0, 0], [1, 1], [2, 2]]), mean([[0, 1], [1, 2], [0, 2]]));
+    let (c44, slant) = (mean([[3, 3], [4, 4], [5, 5]]), c11 - c12);
+    let bulk = (c11 + 2.0 * c12) / 3.0;
+    let shear = 0.5 * ((slant + 3.0 * c44) / 5.0 + 5.0 * slant * c44 / (4.0 * c44 + 3.0 * slant));
+    [9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))]
+}
