@@ -84,6 +84,14 @@ CASES = {
             "level.fraction = 0.3", 'level.iso.formula = "0.3 + 0.1*sin(x/5) + 0.05*clamp(z, -1, 2)^2 - min(0, y)/90"'
         ),
     ),
+    "steps": (
+        BOX,
+        PLAIN.replace(
+            "level.fraction = 0.3",
+            'level.iso.formula = " 0.3 + 0.05*step(1, x) + 0.1*smoothstep(-2, 3, y) -'
+            ' 0.05*mod(-z, 3)^3/27 + clamp(x, 2, -1)/99"',
+        ),
+    ),
     "combined": (
         "[region.offset]\nby = -0.5\n[[region.offset.of.intersection]]\nsphere = { center = [1, 0, 0], radius = 9 }\n"
         "[[region.offset.of.intersection]]\nhalfspace = { point = [0, 0, 3], normal = [0, 1, 1] }\n",
@@ -132,7 +140,6 @@ def test_a_mesh_region_is_a_node_of_its_mesh(tmp_path):
             "fraction that varies",
         ),
         ("[region.capsule]\nstart = [0, 0, 0]\nend = [9, 0, 0]\nradius = 5\n", PLAIN, "region.capsule"),
-        (BOX, PLAIN.replace("fraction = 0.3", 'iso.formula = "0.3 + step(0, x)/10"'), "the function step"),
         (
             BOX,
             PLAIN.replace("fraction = 0.3", "iso.radial = { center = [0, 0, 0], stops = [[0, 0.3], [5, 0.5]] }"),

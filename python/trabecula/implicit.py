@@ -6,7 +6,6 @@ The function is the solid's own field, max(region, lattice), written out in the 
 
 from __future__ import annotations
 
-import ast
 import itertools
 import math
 import os
@@ -43,6 +42,11 @@ FILES = {
 FUNCTIONS = {
     **{name: name for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs")},
     **{"asin": "arcsin", "acos": "arccos", "atan": "arctan", "floor": "floor", "ceil": "ceil", "sign": "sign"},
+}
+#: Operations on two values that have a node of their own.
+PAIRS = {
+    **{"+": "addition", "-": "subtraction", "*": "multiplication", "/": "division"},
+    **{"min": "min", "max": "max", "atan2": "arctan2"},
 }
 
 
@@ -204,49 +208,59 @@ def graded_level(write: Expressions, name: str, level: dict) -> str:
 
 
 def formula(write: Expressions, text: str) -> str:
-    """A formula in x, y and z."""
+    """A formula in x, y and z, by the program that the core runs."""
+    stack: list[str] = []
+    # The number that a reference stands for, if it is one.
+    numbers: dict[str, float] = {}
+    for word, number in _core.formula_terms(text):
+        if word == "number":
+            stack.append(write.constant(number))
+            numbers[stack[-1]] = number
+        elif word in ("x", "y", "z"):
+            stack.append(write.component(write.POSITION, "xyz".index(word)))
+        elif word in ("clamp", "smoothstep"):
+            a, b, c = [stack.pop() for _ in range(3)][::-1]
+            stack.append(_three(write, word, a, b, c))
+        elif word == "negate":
+            stack.append(write.negative(stack.pop()))
+        elif word in FUNCTIONS:
+            stack.append(write.one(FUNCTIONS[word], stack.pop()))
+        else:
+            b, a = stack.pop(), stack.pop()
+            stack.append(_two(write, word, a, b, numbers.get(b)))
+    return stack[0]
 
-    def value(node: ast.AST) -> str:
-        match node:
-            case ast.Constant(value=v):
-                return write.constant(v)
-            case ast.Name(id=name) if name in ("x", "y", "z"):
-                return write.component(write.POSITION, "xyz".index(name))
-            case ast.Name(id="pi"):
-                return write.constant(math.pi)
-            case ast.Name(id="e"):
-                return write.constant(math.e)
-            case ast.UnaryOp(op=ast.USub(), operand=a):
-                return write.negative(value(a))
-            case ast.UnaryOp(op=ast.UAdd(), operand=a):
-                return value(a)
-            case ast.BinOp(left=a, op=ast.Pow(), right=ast.Constant(value=n)) if n in (2, 3):
-                a = value(a)
-                square = write.two("multiplication", a, a)
-                return square if n == 2 else write.two("multiplication", square, a)
-            case ast.BinOp(left=a, op=op, right=b):
-                kinds = {ast.Add: "addition", ast.Sub: "subtraction", ast.Mult: "multiplication", ast.Div: "division"}
-                return write.two(kinds.get(type(op), "pow"), value(a), value(b))
-            case ast.Call(func=ast.Name(id=name), args=[a]) if name in FUNCTIONS:
-                return write.one(FUNCTIONS[name], value(a))
-            case ast.Call(func=ast.Name(id=("min" | "max") as name), args=[a, *more]):
-                total = value(a)
-                for b in more:
-                    total = write.two(name, total, value(b))
-                return total
-            case ast.Call(func=ast.Name(id="clamp"), args=[a, low, high]):
-                return write.clamp(value(a), value(low), value(high))
-            case ast.Call(func=ast.Name(id="atan2"), args=[a, b]):
-                return write.two("arctan2", value(a), value(b))
-            case ast.Call(func=ast.Name(id="hypot"), args=[a, b]):
-                a, b = value(a), value(b)
-                squares = [write.two("multiplication", v, v) for v in (a, b)]
-                return write.one("sqrt", write.sum(squares))
-            case ast.Call(func=ast.Name(id=name)):
-                raise Unsupported(f"the function {name} of a formula")
-        raise Unsupported(f"the formula {text}")
 
-    return value(ast.parse(text.replace("^", "**"), mode="eval").body)
+def _two(write: Expressions, word: str, a: str, b: str, number: float | None) -> str:
+    """An operation on two values; ``number`` is the second if it is one."""
+    if word in PAIRS:
+        return write.two(PAIRS[word], a, b)
+    if word == "^":
+        if number not in (2, 3):
+            return write.two("pow", a, b)
+        square = write.two("multiplication", a, a)
+        return square if number == 2 else write.two("multiplication", square, a)
+    if word == "hypot":
+        return write.one("sqrt", write.sum([write.two("multiplication", v, v) for v in (a, b)]))
+    if word == "mod":
+        whole = write.one("floor", write.two("division", a, b))
+        return write.two("subtraction", a, write.two("multiplication", b, whole))
+    assert word == "step", word
+    # 1 from the edge on: sign is 1 below it, 0 at it.
+    below = write.two("max", write.constant(0.0), write.one("sign", write.two("subtraction", a, b)))
+    return write.two("subtraction", write.constant(1.0), below)
+
+
+def _three(write: Expressions, word: str, a: str, b: str, c: str) -> str:
+    """``clamp(a, low, high)`` or ``smoothstep(from, to, c)``."""
+    if word == "clamp":
+        return write.two("min", write.two("max", a, b), c)
+    if a == b:
+        return _two(write, "step", a, c, None)
+    share = write.two("division", write.two("subtraction", c, a), write.two("subtraction", b, a))
+    t = write.clamp(share, 0.0, 1.0)
+    steep = write.two("subtraction", write.constant(3.0), write.two("multiplication", write.constant(2.0), t))
+    return write.two("multiplication", write.two("multiplication", t, t), steep)
 
 
 def region_value(write: Expressions, region: dict) -> tuple[str, bool]:

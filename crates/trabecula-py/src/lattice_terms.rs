@@ -3,6 +3,7 @@
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::cell::Part;
+use trabecula::grade::Formula;
 
 use crate::solid::Solid;
 
@@ -22,6 +23,13 @@ pub struct LatticeTerms {
     level: Option<f64>,
     /// Whether f is replaced by the distance to f = 0, because the level is a thickness.
     distance: bool,
+}
+
+/// A formula in x, y and z after the order of its work, as `Formula::postfix`.
+#[pyfunction]
+pub fn formula_terms(text: &str) -> PyResult<Vec<(&'static str, f64)>> {
+    let made = Formula::parse(text).map_err(|f| PyValueError::new_err(f.to_string()))?;
+    Ok(made.postfix())
 }
 
 /// The terms of the lattice of a name.

@@ -71,7 +71,7 @@ mod _core {
     #[pymodule_export]
     use crate::effective::Cell;
     #[pymodule_export]
-    use crate::lattice_terms::{LatticeTerms, lattice_terms};
+    use crate::lattice_terms::{LatticeTerms, formula_terms, lattice_terms};
     #[pymodule_export]
     use crate::layers::Layers;
     #[pymodule_export]

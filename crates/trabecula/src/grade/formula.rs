@@ -104,6 +104,17 @@ impl Formula {
         Ok(Formula { program: parse(text)? })
     }
 
+    /// The program: words, after those of their arguments, and a number. `number` stands for it, `x`, `y`, `z` for the position, other words
+    /// for functions and operators; `negate` is a sign.
+    pub fn postfix(&self) -> Vec<(&'static str, f64)> {
+        let word = |instruction: &Instruction| match *instruction {
+            Instruction::Number(v) => ("number", v),
+            Instruction::Variable(a) => (["x", "y", "z"][a], 0.0),
+            Instruction::Apply(op) => (op.name(), 0.0),
+        };
+        self.program.iter().map(word).collect()
+    }
+
     /// Values and gradients (per mm), where it varies along these axes alone.
     fn slopes<const N: usize>(&self, axes: [usize; N], points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let mut stack = Vec::new();

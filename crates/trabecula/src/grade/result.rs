@@ -103,8 +103,12 @@ pub(super) fn percent(share: f64) -> String {
 
 /// What is wrong with numbers that leave a share of the region without one.
 pub(super) fn not_covered(file: &str, what: &str, share: f64, reach: &Aabb) -> String {
-    let (share, [from, to]) = (percent(share), [reach.min, reach.max]);
-    format!("{file}: the {what} does not cover {share} of the region; it reaches from {from:?} to {to:?} mm")
+    let [from, to] = [reach.min, reach.max];
+    let covers = match share {
+        1.0.. => "covers none of the region".into(),
+        _ => format!("does not cover {} of the region", percent(share)),
+    };
+    format!("{file}: the {what} {covers}; it reaches from {from:?} to {to:?} mm")
 }
 
 fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {

@@ -75,6 +75,19 @@ pub(super) const FUNCTIONS: [(&str, Operation); 25] = [
 ];
 
 impl Operation {
+    /// Its name in formulas; of a sign `negate`.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Negate => "negate",
+            Add => "+",
+            Subtract => "-",
+            Multiply => "*",
+            Divide => "/",
+            Power => "^",
+            _ => FUNCTIONS.iter().find(|(_, op)| *op == self).map_or("", |(name, _)| name),
+        }
+    }
+
     /// How many numbers it takes.
     pub(super) fn arity(self) -> usize {
         match self {
