@@ -61,6 +61,23 @@ def test_a_graded_block(block):
         assert (sign * f > 0).all()
 
 
+def test_one_object_of_a_3mf_is_read_by_its_name(block, tmp_path):
+    out = tmp_path / "all.3mf"
+    solid = lt.load(block).build()
+    parts = solid.parts(edge=0.4)
+    lt.write_parts(out, parts)
+    for name, part in parts.items():
+        again = lt.Mesh.read(out, solid=name)
+        assert again.closed and again.counts == part.counts and again.volume == pytest.approx(part.volume, rel=1e-5)
+    with pytest.raises(ValueError, match="no object is named \"walls\"; there are wall, lower, upper"):
+        lt.Mesh.read(out, solid="walls")
+    assert "3 objects ('wall', 'lower', 'upper'), measured as one mesh" in run("measure", out, cwd=tmp_path).stderr
+    assert "closed" in run("measure", out, "--solid", "wall", cwd=tmp_path).stdout
+    solid.layers(0.5).save(tmp_path / "slices.3mf")
+    with pytest.raises(ValueError, match="the file holds slices"):
+        lt.Mesh.read(tmp_path / "slices.3mf")
+
+
 def test_one_3mf_holds_all(block, tmp_path):
     """An object each, named, in the build, each of them a valid solid; lib3mf reads them without a warning."""
     made = json.loads(run(*words(block, "a.3mf", "wall,lower,upper"), cwd=tmp_path).stdout)

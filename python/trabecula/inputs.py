@@ -98,7 +98,7 @@ def surface(args) -> Mesh:
         return meshed(build(args.file), args)
     if args.edge is not None or args.per_cell is not None:
         raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
-    return Mesh.read(args.file)
+    return Mesh.read(args.file, solid=getattr(args, "solid", None))
 
 
 def meshed(solid: Solid, args) -> Mesh:

@@ -6,6 +6,7 @@ import os
 import re
 import warnings
 
+from . import _core
 from .errors import DesignWarning, Refused
 from .files import check_place
 from .formats import STDIN, VOLUME_READS, is_design, kind_of
@@ -25,6 +26,8 @@ def measure(args) -> None:
     check_measure(args)
     if kind_of(args.file) in VOLUME_READS:
         return measure_tets(args)
+    if args.solid is not None and is_design(args.file):
+        raise Refused("--solid names an object of a 3MF or a solid of a file from a CAD system; a design has none")
     solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:
         raise Refused("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
@@ -40,6 +43,11 @@ def measure(args) -> None:
                 "beams without --edge need the whole surface in memory: leave out one or the other"
             )
         held = surface(args) if solid is None else meshed(solid, args)
+        if args.solid is None and not held.closed and kind_of(args.file) == "3mf" and len(names := objects_of(args.file)) > 1:
+            warn(
+                f"{args.file} holds {len(names)} objects ({', '.join(map(repr, names))}), measured as one mesh; --solid NAME "
+                "measures one of them"
+            )
         if args.region:
             held = held.within(args.region)
         figures = held.measure().to_dict()
@@ -80,6 +88,11 @@ def measure(args) -> None:
         print(transition)
 
 
+def objects_of(file: str) -> list[str]:
+    """The names of a 3MF's objects."""
+    return _core.Mesh.objects(_core.read_file(file))
+
+
 def apart_of(args) -> dict | None:
     """How the figures are to be taken in ranges, if they are."""
     if not (args.resume or args.cluster or args.new):
@@ -97,7 +110,8 @@ def measure_tets(args) -> None:
     from .quadratic import found_in
     from .tets import TetMesh
 
-    if args.region or args.thickness or args.dangling or args.transitions or args.edge or args.per_cell:
+    others = ("region", "solid", "thickness", "dangling", "transitions", "edge", "per_cell", "step", "resume", "cluster", "new")
+    if any(getattr(args, name) for name in others):
         raise Refused(f"{args.file} holds tetrahedra: of the options --json alone applies")
     with warnings.catch_warnings(record=True) as heard, elements.keeping() as arrays:
         warnings.simplefilter("always", DesignWarning)

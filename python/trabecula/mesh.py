@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from functools import cached_property
 
 from . import _core
 from .camera import BACKGROUNDS, section_plane, towards
+from .errors import DesignWarning
 from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, number, positive, whole
@@ -112,7 +114,8 @@ class Mesh(Picture, Transformed):
 
         Corners of an STL file that differ by no more than single precision rounds are one, if it would not be closed else.
         The faces of a CAD system become triangles within ``chord`` mm of them (a five-thousandth of the diagonal of the bounds
-        unless given) that turn by at most ``angle`` degrees (15 unless given); ``solid`` names the one that is read.
+        unless given) that turn by at most ``angle`` degrees (15 unless given). ``solid`` names the one that is read, of them
+        and of the objects of a 3MF, which are joined to one mesh without it.
         """
         name = os.fsdecode(path)
         kind = extension(name, PART_READS)
@@ -121,11 +124,14 @@ class Mesh(Picture, Transformed):
 
             part = read(name, chord, angle, solid)
             return Mesh.of(part.points, part.triangles)
-        if (chord, angle, solid) != (None, None, None):
-            raise ValueError(f"{name}: chord, angle and solid are for files from CAD systems; a .{kind} holds triangles")
+        if chord is not None or angle is not None or (solid is not None and kind != "3mf"):
+            raise ValueError(
+                f"{name}: chord and angle are for files from CAD systems, and solid for these and .3mf; a .{kind} holds "
+                "triangles"
+            )
         data = _core.read_file(name)
         try:
-            return Mesh(_core.Mesh.read(data, kind))
+            return Mesh(_core.Mesh.read(data, kind, solid))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
@@ -282,6 +288,14 @@ class Mesh(Picture, Transformed):
         workers = None if threads is None else whole("threads", threads, 1, 4096)
         spacing, shape, need = self._core.thickness_needs(self._region, wanted)
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
+        wall = 2 * self.volume / self.area
+        if wanted is not None and wanted > wall / 2:
+            warnings.warn(
+                f"step {wanted:g} mm is more than half the mean wall, {wall:.3g} mm (2 V / A): what is found is the size of "
+                f"voxels; use {wall / 8:.2g} mm or less",
+                DesignWarning,
+                stacklevel=2,
+            )
         return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 
     def thickness_at_vertices(
@@ -507,7 +521,16 @@ class Mesh(Picture, Transformed):
         angles = number("azimuth", azimuth), number("elevation", elevation)
         if not all(map(math.isfinite, angles)):
             raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
-        return pixels, angles, None if section is None else section_plane(section, towards(*angles))
+        if section is None:
+            return pixels, angles, None
+        normal, offset = section_plane(section, towards(*angles))
+        axis = [abs(n) for n in normal].index(1)
+        low, high = (end[axis] for end in self.bounds)
+        if min(normal[axis] * low, normal[axis] * high) >= offset:
+            raise ValueError(
+                f'section "{section}" leaves nothing: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}'
+            )
+        return pixels, angles, (normal, offset)
 
     def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np

@@ -86,16 +86,26 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
-    /// Reads the bytes of a mesh file; `extension` names the format.
+    /// Reads the bytes of a mesh file; `extension` names the format, `object` one of the objects of a 3MF.
     #[staticmethod]
-    fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
+    #[pyo3(signature = (bytes, extension, object=None))]
+    fn read(py: Python<'_>, bytes: &[u8], extension: &str, object: Option<&str>) -> PyResult<Mesh> {
         let by_place = formats::Format::of(extension).is_some_and(|f| f.soup);
-        let read = run(py, None, None, |_| match formats::read_mesh(bytes, extension) {
-            Ok(loaded) if by_place => Ok(loaded.mesh.joined_where_open()),
-            Ok(loaded) => Ok(loaded.mesh),
-            Err(f) => Err(f),
+        let read = run(py, None, None, |_| match object {
+            Some(name) => formats::read_object(bytes, name),
+            None => {
+                let loaded = formats::read_mesh(bytes, extension)?;
+                Ok(if by_place { loaded.mesh.joined_where_open() } else { loaded.mesh })
+            }
         })?;
         read.map(Mesh::bare).map_err(|f| PyValueError::new_err(f.to_string()))
+    }
+
+    /// The names of the objects that a 3MF places; empty where they have none.
+    #[staticmethod]
+    fn objects(py: Python<'_>, bytes: &[u8]) -> PyResult<Vec<String>> {
+        let found = run(py, None, None, |_| formats::object_names(bytes))?;
+        found.map_err(|f| PyValueError::new_err(f.to_string()))
     }
 
     /// The mesh of vertices (n, 3), mm, and triangles (m, 3) by index; which of them are cuts, and the design, if known.
