@@ -58,14 +58,9 @@ impl Region {
         (b.min, b.max)
     }
 
-    /// Volume, mm³: exact where it is known in closed form, otherwise of its surface at grid spacing `edge` (mm).
+    /// Volume, mm³, as `extract::region_volume` at grid spacing `edge` (mm).
     fn volume(&self, py: Python<'_>, edge: f64) -> PyResult<f64> {
-        if let Some(v) = self.region.volume() {
-            return Ok(v);
-        }
-        let full = trabecula::solid::Solid::new(self.region.clone(), None, edge);
-        let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
-        Ok(surface.map_err(error::stopped)?.mesh.volume())
+        run(py, None, None, |p| extract::region_volume(&self.region, edge, p))?.map_err(error::stopped)
     }
 
     /// The boundary as a mesh: that of a region that is a mesh as it is, of others at grid spacing `edge` (mm).

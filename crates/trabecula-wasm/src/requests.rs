@@ -212,7 +212,8 @@ impl Session {
         let resolution = resolution::of_mesh(built, edge, per_cell)?;
         let made = surface(built, resolution, &Shown)?;
         let surface = if built.is_open() { made.surface.uncapped() } else { made.surface };
-        let volume = region_volume(built, resolution)?;
+        let edge = if let Resolution::Grid(edge) = resolution { edge } else { 0.0 };
+        let volume = extract::region_volume(&built.solid.region, edge, &Silent)?;
         let figures = MeshReport::of(&Figures::of(&surface), true, Some(volume));
         let triangles = surface.mesh.triangles.len();
         let apart = &made.components;
@@ -318,19 +319,6 @@ fn middle(built: &Built, edge: f64, share: f64) -> Result<Option<(SurfaceMesh, A
     let cropped = trabecula::Solid { region: Arc::new(both), field, filled, ..*solid };
     let surface = extract::surface(&cropped, edge, &Silent)?;
     Ok((!surface.mesh.triangles.is_empty()).then_some((surface, seen)))
-}
-
-/// The volume of the region, mm³: exact where it is known, else of its surface at about the spacing of the mesh.
-fn region_volume(built: &Built, resolution: Resolution) -> Result<f64, Refused> {
-    let region = &built.solid.region;
-    if let Some(volume) = region.volume() {
-        return Ok(volume);
-    }
-    let bounds = region.bounds();
-    let longest = [0, 1, 2].map(|a| bounds.max[a] - bounds.min[a]).into_iter().fold(0.0, f64::max);
-    let edge = if let Resolution::Grid(edge) = resolution { edge } else { 0.0 }.max(longest / 200.0);
-    let full = trabecula::Solid::new(region.clone(), None, edge);
-    Ok(extract::surface(&full, edge, &Silent)?.mesh.volume())
 }
 
 fn catalogue() -> Json {

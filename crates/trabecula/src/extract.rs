@@ -11,6 +11,7 @@ use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use rayon::prelude::*;
 
+use crate::region::Region;
 use crate::solid::Solid;
 use crate::surface_maker::{
     self, Estimate, Islands, Measured, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, not_empty,
@@ -57,6 +58,24 @@ pub struct GridSurface<'a>(pub &'a Solid);
 pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
     let options = Options { resolution: edge, islands: Islands::Keep };
     Ok(GridSurface(solid).mesh(&options, progress)?.surface)
+}
+
+/// Steps along the longest side of a region for its volume.
+const REGION_STEPS: f64 = 200.0;
+
+/// Volume of a region, mm³: exact where it is known in closed form, else of its surface at grid spacing `edge` (mm), or a 200th of its longest
+/// side if that is more.
+///
+/// # Errors
+/// As `surface`.
+pub fn region_volume(region: &Region, edge: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
+    if let Some(volume) = region.volume() {
+        return Ok(volume);
+    }
+    let longest = region.bounds().size().into_iter().fold(0.0, f64::max);
+    let edge = edge.max(longest / REGION_STEPS);
+    let full = Solid::new(region.clone(), None, edge);
+    Ok(surface(&full, edge, progress)?.mesh.volume())
 }
 
 /// Of an estimate: most tiles that are searched, most that a surface may cross, triangles that are enough, tiles at a time.
