@@ -136,6 +136,9 @@ def test_random_designs_that_miss_the_conditions_are_replaced(tmp_path: Path):
     text = '"lattice.a.level.fraction" = { from = 0.1, to = 0.5 }\nsampling = "sobol"\ncount = 30\n'
     points = list(Study(lt.load(written(tmp_path, text + 'where = ["lattice.a.level.fraction > 0.4"]'))).points())
     assert len(points) == 30 and all(0.4 < p["lattice.a.level.fraction"] <= 0.5 for p in points)
+    rare = Study(lt.load(written(tmp_path, text + 'where = ["lattice.a.level.fraction > 0.4999"]')))
+    with pytest.raises(ValueError, match=r"sweep.where: \d+ of 30000 random designs keep the conditions, 30 are asked for"):
+        list(rare.points())
 
 
 @pytest.mark.parametrize(
@@ -281,6 +284,8 @@ def test_files_are_known_by_their_own_paths_and_folders_by_all_they_hold(tmp_pat
     data = {"grade": [{"path": "a/x.csv"}, {"path": "b/x.csv"}], "cell": {"path": "scan/*.png"}, "zone": {"path": "scan/"}}
     before = digests(data, str(tmp_path))
     assert list(before) == ["a/x.csv", "b/x.csv", "scan/*.png", "scan/"] and before["a/x.csv"] != before["b/x.csv"]
+    swept = {"sweep": {"region.mesh.path": ["a/x.csv", "b/x.csv"], "region.mesh.repair": ["a"]}}
+    assert list(digests(swept, str(tmp_path))) == ["a/x.csv", "b/x.csv"]
     (tmp_path / "scan/2.png").write_text("another")
     after = digests(data, str(tmp_path))
     assert [name for name in before if before[name] != after[name]] == ["scan/*.png", "scan/"]
@@ -375,6 +380,7 @@ def test_an_objective_is_a_plain_function():
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3 }\nsampling = "latin"', "the number of designs is missing"),
         ('"lattice.a.level.fraction" = { from = 0, to = 0.3, count = 3, scale = "log" }', "both ends greater than 0"),
         ('"lattice.a.level.fraction" = [0.2]\nsampling = "lhs"', 'did you mean "latin"?'),
+        ('"lattice.a.level.fraction" = [0.2, 0.3]\ncount = 1', "a grid is every combination of the values"),
         ('"region.box.size[7]" = [1]', "there is no item [7] in the list"),
         ("", "nothing varies"),
     ],

@@ -257,11 +257,10 @@ def spartan(
 
 
 def files_in(data: Any) -> list[str]:
-    """The files that plain data names: what stands under ``path``, or as a table of beams."""
-    if isinstance(data, dict):
-        own = [data[key] for key in PATHS if isinstance(data.get(key), str)]
-        return own + [name for item in data.values() for name in files_in(item)]
-    return [name for item in data for name in files_in(item)] if isinstance(data, list) else []
+    """The files that plain data names: what stands under ``path``, or as a table of beams; in a sweep every value of it."""
+    found: list[str] = []
+    _moved(data, lambda name: found.append(name) or name)
+    return found
 
 
 def _moved(data: Any, turn: Callable[[str], str]) -> Any:
@@ -270,7 +269,17 @@ def _moved(data: Any, turn: Callable[[str], str]) -> Any:
         return [_moved(item, turn) for item in data]
     if not isinstance(data, dict):
         return data
-    return {key: turn(item) if key in PATHS and isinstance(item, str) else _moved(item, turn) for key, item in data.items()}
+    out = {}
+    for key, item in data.items():
+        # In a sweep a key is the path of one, and its values are a list.
+        names = key.rpartition(".")[2] in PATHS
+        if names and isinstance(item, str):
+            out[key] = turn(item)
+        elif names and isinstance(item, list):
+            out[key] = [turn(one) if isinstance(one, str) else _moved(one, turn) for one in item]
+        else:
+            out[key] = _moved(item, turn)
+    return out
 
 
 def _relative(path: str, folder: str) -> str:

@@ -6,10 +6,12 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from .conditions import condition
 from .design import Design
+from .given import copied
 from .sampling import latin, sobol
 
 __all__ = ["Study"]
@@ -22,7 +24,7 @@ PATIENCE = 1000
 class Study:
     """A design and what varies in it, as its table ``sweep`` says.
 
-    Raises ValueError for a design without that table.
+    Raises ValueError for a design without that table, and DesignError for one that is none.
     """
 
     design: Design
@@ -32,28 +34,35 @@ class Study:
             raise ValueError(
                 'nothing varies: the design has no [sweep]; give it one, such as "lattice.core.level.fraction" = [0.2, 0.3]'
             )
+        self.design._checked()
+
+    @cached_property
+    def _sweep(self) -> dict[str, Any]:
+        """The table as plain data."""
+        return copied(self.design.sweep)
 
     @property
     def settings(self) -> dict[str, Any]:
         """How values are chosen: sampling, count, seed, where."""
-        given = {key: self.design.sweep[key] for key in ("sampling", "count", "seed", "where") if key in self.design.sweep}
+        given = {key: self._sweep[key] for key in ("sampling", "count", "seed", "where") if key in self._sweep}
         return {"sampling": "grid", "count": None, "seed": 0, "where": []} | given
 
     @property
     def parameters(self) -> dict[str, list | dict]:
         """The values of each path, by name: a list, or a range {from, to, count, scale}."""
-        return {path: of for path, of in sorted(self.design.sweep.items()) if path not in self.settings}
+        return {path: of for path, of in sorted(self._sweep.items()) if path not in self.settings}
 
     def size(self) -> int:
         """The number of designs, or of those of a grid before conditions."""
         if self.settings["sampling"] != "grid":
             return self.settings["count"]
-        return math.prod(len(_listed(of)) for of in self.parameters.values())
+        return math.prod(len(of) if isinstance(of, list) else of["count"] for of in self.parameters.values())
 
     def points(self) -> Iterator[dict[str, Any]]:
         """The values of each path, design by design: of a grid the last path varies fastest.
 
-        Raises ValueError for conditions that no design keeps, and for what is no condition.
+        Raises ValueError for conditions that no design keeps, or of random ones fewer than asked for, and for what is no
+        condition.
         """
         conditions = [(text, condition(text)) for text in self.settings["where"]]
         plain = _by_path(self.design.to_dict())
@@ -70,6 +79,11 @@ class Study:
                 return
         if not found:
             raise ValueError(f'sweep.where: no design keeps the conditions; the last one missed "{missed}"')
+        if found < wanted and self.settings["sampling"] != "grid":
+            raise ValueError(
+                f"sweep.where: {found} of {PATIENCE * wanted} random designs keep the conditions, {wanted} are asked for; "
+                "narrow the ranges, or ask for fewer"
+            )
 
     def _all(self, patience: int) -> Iterator[dict[str, Any]]:
         """The points before conditions; of random ones up to ``patience`` times as many as are asked for."""

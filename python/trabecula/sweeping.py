@@ -27,7 +27,9 @@ def table_of(design: Design, args) -> dict[str, Any]:
     if size > FEW and not args.yes:
         raise Refused(f"the sweep has {size} designs; more than {FEW} are made with --yes only")
     names = [name.strip() for name in args.properties.split(",")] if args.properties else []
-    properties = {name: {} if args.n is None else {"n": int(args.n)} for name in names}
+    if args.n is not None and not names:
+        raise Refused("--n is of --properties; name some, or leave it out")
+    properties = {name: {} if args.n is None else {"n": args.n} for name in names}
     job, points = prepared(design, args.edge, args.per_cell, properties, args.meshes, args.pictures)
     journal = Journal(args.output, job)
     resumed = journal.resume(args.new)

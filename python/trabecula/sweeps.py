@@ -53,7 +53,8 @@ def sweep(
     number. ``jobs`` processes share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in
     order, and apart from ``seconds`` the same for any number of processes.
 
-    Raises DesignError for a study that is none, ValueError where no design keeps the conditions or none can be made.
+    Raises DesignError for a study that is none, ValueError where no design keeps the conditions. One that cannot be made is a
+    row with its error.
     """
     job, points = prepared(study, edge, per_cell, properties, meshes, pictures)
     rows = []
@@ -76,7 +77,7 @@ def objective(
     """A function of {path: value} that gives {column: value}, for optimisers: of the design with these values the ``outputs``,
     names of columns of ``sweep``. It raises ValueError where there is no such design.
     """
-    paths, wanted = list(parameters), list(outputs)
+    paths, wanted = _names("parameters", parameters), _names("outputs", outputs)
     design = design_of(template)
     job = Job(design, edge, per_cell, properties=settings_of(properties))
     for path in paths:
@@ -108,11 +109,18 @@ def design_of(given: Design | dict | str | os.PathLike[str]) -> Design:
 
 def settings_of(properties: Mapping[str, Mapping[str, Any]] | Iterable[str]) -> dict[str, dict[str, Any]]:
     """Properties by name, each with its settings. A ValueError for an unknown one."""
-    given = dict(properties) if isinstance(properties, Mapping) else {name: {} for name in properties}
+    given = dict(properties) if isinstance(properties, Mapping) else {name: {} for name in _names("properties", properties)}
     for name in given:
         if name not in PROPERTIES:
             raise ValueError(f'unknown property "{name}"; there are {", ".join(PROPERTIES) or "none"}')
     return {name: dict(settings) for name, settings in given.items()}
+
+
+def _names(what: str, given: Iterable[str]) -> list[str]:
+    """Names in a list. A TypeError for one text, of which letters would be names."""
+    if isinstance(given, (str, bytes)):
+        raise TypeError(f"{what} must be a list of names, such as [{given!r}], found {given!r}")
+    return list(given)
 
 
 def prepared(
@@ -138,7 +146,7 @@ def prepared(
 
 
 def run(job: Job, tasks: list[tuple[int, dict[str, Any]]], jobs: int, cluster: str | None = None) -> Iterator[dict[str, Any]]:
-    """The rows of numbered points, as they are done. Raises ValueError if the first ones all fail and none is left."""
+    """The rows of numbered points, as they are done."""
     jobs = min(whole("jobs", jobs, 1, 4096), max(len(tasks), 1))
     if cluster:
         return rows_by_cluster(job, tasks, cluster)

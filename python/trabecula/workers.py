@@ -41,8 +41,9 @@ def serve() -> None:
 class _Worker:
     """A process, started when it is first needed and again when it has died."""
 
-    def __init__(self, job: Job):
+    def __init__(self, job: Job, ended: threading.Event):
         self.job = json.dumps(job.to_dict())
+        self.ended = ended
         self.process: subprocess.Popen | None = None
 
     def row(self, number: int, values: dict[str, Any]) -> dict[str, Any] | None:
@@ -50,6 +51,10 @@ class _Worker:
         try:
             if self.process is None:
                 self.process = self._started()
+            # Whoever ends all workers may have come by before this one had a process.
+            if self.ended.is_set():
+                self.end()
+                return None
             assert self.process.stdin and self.process.stdout
             self.process.stdin.write(json.dumps([number, values]) + "\n")
             self.process.stdin.flush()
@@ -85,8 +90,8 @@ def rows_by_processes(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], job
     """
     waiting, lock = iter(tasks), threading.Lock()
     done: queue.Queue = queue.Queue()
-    workers = [_Worker(job) for _ in range(jobs)]
     ended = threading.Event()
+    workers = [_Worker(job, ended) for _ in range(jobs)]
 
     def feed(worker: _Worker) -> None:
         try:

@@ -158,6 +158,11 @@ impl Kind for SweepKind {
         if self.settings.sampling != Sampling::Grid && self.settings.count.is_none() {
             return Err(Fault::new("count", "the number of designs is missing: only a grid has one by itself"));
         }
+        if self.settings.sampling == Sampling::Grid && self.settings.count.is_some() {
+            let message = "a grid is every combination of the values: leave the number of designs out, or choose sampling = \"latin\" or \
+                           \"sobol\"";
+            return Err(Fault::new("count", message));
+        }
         for (path, of) in &self.parameters {
             of.check(&Key::NONE).and_then(|()| self.possible(of)).map_err(|f| f.under(path))?;
         }
