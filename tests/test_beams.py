@@ -178,6 +178,24 @@ def test_what_leaves_the_region(trim):
         assert report["dangling"] == 0
 
 
+def test_what_begins_on_the_surface_is_outside_when_ends_are_snapped():
+    """Whole cells in a box: struts go out from nodes on its faces."""
+    box = lt.region.box(min=[0, 0, 0], max=[12, 12, 12])
+    solid = built(box, cell="octet", map=lt.map.affine(wavelength=6), radius=0.4, trim="snap")
+    graph = solid.beams["core"]
+    assert np.all((graph["centers"] > -1e-9) & (graph["centers"] < 12 + 1e-9)) and told(solid)["trimmed"]["snapped"] == 0
+
+
+def test_a_grid_too_coarse_for_beams_is_warned_of():
+    """Beams of a little more than two steps across lose a sixth of their volume."""
+    solid = built(lt.region.box(size=[16, 16, 16]), cell="octet", map=lt.map.affine(wavelength=8), radius=0.55)
+    with pytest.warns(lt.DesignWarning, match="the grid is too coarse: the result has a solid fraction of 0"):
+        solid.mesh(edge=0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", lt.DesignWarning)
+        solid.mesh(edge=0.15)
+
+
 def test_loose_ends_are_told_and_dropped():
     """A ring with a tail of two beams."""
     nodes = [*SQUARE, [5, 5, 5], [5, 5, 8]]

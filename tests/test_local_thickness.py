@@ -60,6 +60,8 @@ def test_a_bare_mesh(tmp_path):
     """Walls alone, exact for planes; bodies apart from each other count together."""
     mesh = lt.Mesh.read(box(tmp_path / "slab.obj"))
     made = mesh.thickness(0.25)
+    with pytest.warns(lt.DesignWarning, match="more than half the mean wall"):
+        mesh.thickness(2.5)
     assert made.pore is None and abs(made.wall["max"] - 1) < 1e-5 and abs(made.wall["min"] - 1) < 1e-5
     assert mesh.measure()["hydraulic_diameter"] is None
     assert mesh.measure()["specific_surface"] == {

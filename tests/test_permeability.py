@@ -228,3 +228,9 @@ def test_a_grade_may_ask_for_a_stiffness():
 def test_what_no_fraction_has_is_refused(amount: dict, more: dict, said: str):
     with pytest.raises(lt.DesignError, match=said):
         solid("gyroid", "sheet", amount, **more)
+
+
+@pytest.mark.parametrize("n", [8, 15])
+def test_two_grids_make_a_limit_at_the_least_number_of_nodes(n: int):
+    found = solid().permeability(n=n)
+    assert len(found.grids) == 2 and 0 < found.error < 1 and found.k[0][0] > 0

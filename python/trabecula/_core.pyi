@@ -57,6 +57,7 @@ class LatticeTerms:
     @property
     def distance(self) -> bool: ...
 
+def formula_terms(text: str) -> list[tuple[str, float]]: ...
 def lattice_terms(solid: Solid, name: str) -> LatticeTerms: ...
 def graph_formats() -> list[tuple[str, str, bool]]: ...
 def write_graph(solid: Solid, path: str, suffix: str) -> BeamsFileReport: ...
@@ -154,6 +155,14 @@ class VolumeMesh:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> VolumeMesh: ...
+    @staticmethod
+    def carrier(solid: Solid, order: int = 1, threads: int | None = None) -> VolumeMesh: ...
+    @staticmethod
+    def carrier_moduli(
+        solid: Solid, nu: float, n: int, threads: int | None = None, progress: Progress | None = None
+    ) -> list[list[float]]: ...
+    @property
+    def fraction(self) -> NDArray[np.float64]: ...
     @property
     def nodes(self) -> NDArray[np.float64]: ...
     @property
@@ -173,7 +182,7 @@ class VolumeMesh:
     def write(
         self,
         file: tuple[str, str, str],
-        elastic: list[float],
+        elastic: list[list[float]],
         held: list[str],
         loads: list[tuple[str, list[float]]],
         fields: list[tuple[str, int, bool, list[float]]],
@@ -199,7 +208,7 @@ class VoxelElements:
     def write(
         self,
         file: tuple[str, str, str],
-        elastic: list[float],
+        elastic: list[list[float]],
         held: list[str],
         loads: list[tuple[str, list[float]]],
         fields: list[tuple[str, int, bool, list[float]]],
@@ -226,7 +235,7 @@ class Shells:
     def write(
         self,
         file: tuple[str, str, str],
-        elastic: list[float],
+        elastic: list[list[float]],
         held: list[str],
         loads: list[tuple[str, list[float]]],
         fields: list[tuple[str, int, bool, list[float]]],
@@ -438,7 +447,9 @@ class Voxels:
 
 class Mesh:
     @staticmethod
-    def read(bytes: bytes, extension: str) -> Mesh: ...
+    def read(bytes: bytes, extension: str, object: str | None = None) -> Mesh: ...
+    @staticmethod
+    def objects(bytes: bytes) -> list[str]: ...
     @staticmethod
     def of(
         vertices: NDArray[np.float64], triangles: NDArray[np.int64], cut: Sequence[bool] | None = None, design: str = ""

@@ -70,12 +70,14 @@ def number(what: str, ok: Callable[[float], bool] = lambda v: True, allowed: str
     """A check of numbers on the command line: ``what`` names one, ``allowed`` says which are ``ok``."""
 
     def check(text: str):
+        shown = text if len(text) <= 40 else f"{text[:37]}..."
         try:
             value = kind(text)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"expected {what}, found {text!r}") from None
-        if not (math.isfinite(value) and ok(value)):
-            raise argparse.ArgumentTypeError(f"expected {what}{allowed}, found {text}")
+            raise argparse.ArgumentTypeError(f"expected {what}, found {shown!r}") from None
+        # A whole number of any length is below infinity.
+        if not (-math.inf < value < math.inf and ok(value)):
+            raise argparse.ArgumentTypeError(f"expected {what}{allowed}, found {shown}")
         return value
 
     return check
@@ -378,13 +380,14 @@ COMMANDS = {
         "(bounding planes), CUT (the region's boundary), LATTICE (the lattice's own surface), SKIN, KEEP_NAME, and NAME of\n"
         "each [set.NAME.REGION] in the design.\n"
         "The .inp of a --periodic cell has equations and six steps, that of --hold and --load a step: they run as they are.\n"
-        "--voxels makes hexahedra with their solid fractions (.inp, .msh, .vtu). Beams alone are B31 or CBAR elements by\n"
-        "trabecula mesh DESIGN -o OUT.inp --beams.\n\n"
+        "--voxels makes hexahedra with their solid fractions (.inp, .msh, .msh2, .vtu, .xdmf). Beams alone are B31 or CBAR\n"
+        "elements by trabecula mesh DESIGN -o OUT.inp --beams.\n\n"
         "examples:\n  trabecula volume part.toml -o part.inp --wall 3 --order 2\n"
         "  trabecula volume part.toml -o part.inp --edge 0.5 --order 2 --E 114000 --nu 0.34 --hold X0 --load X1=0,-1000,0\n"
         "  trabecula volume part.toml -o voxels.inp --voxels 0.2\n"
         "  trabecula volume part.toml -o shell.inp --of shell --per-cell 24 --order 2\n"
         "  trabecula volume exchanger.toml -o fluids.msh --of all\n"
+        "  trabecula volume foam.toml -o carrier.vtu --of carrier --fields stiffness\n"
         "  trabecula volume cell.toml -o rve.inp --periodic --per-cell 32 --E 114000 --nu 0.34",
         *(DESIGN, output(VOLUME_WRITES, f"the mesh to write ({dotted(VOLUME_WRITES)})")),
         [
@@ -396,10 +399,11 @@ COMMANDS = {
         option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic elements"),
         option(
             "--of",
-            choices=("solid", "pore", "lower", "upper", "all", "shell"),
+            choices=("solid", "pore", "lower", "upper", "all", "shell", "carrier"),
             default="solid",
             help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes; "
-            "or shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu)",
+            "shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu); or carrier: the "
+            "tetrahedra of a lattice over tetrahedra, each a material by its solid fraction",
         ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
@@ -409,7 +413,7 @@ COMMANDS = {
             type=names,
             metavar="NAMES",
             help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), "
-            "orientation (unit vectors along the cell's axes), wavelength",
+            "orientation (unit vectors along the cell's axes), wavelength; and of a carrier's elements stiffness",
         ),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(
@@ -476,7 +480,7 @@ COMMANDS = {
         ),
         option("--cluster", metavar="ADDRESS", help="a Dask cluster at this address, or local:N; needs the extra scale"),
         option("--properties", metavar="NAMES", help="what else is computed of each design, by commas"),
-        option("--n", type=SAMPLES, metavar="N", help="voxels along a cell for these properties"),
+        option("--n", type=VOXELS, metavar="N", help="voxels along a cell for these properties"),
         option("--meshes", metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
         option("--pictures", metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
         option("--plot", nargs="+", metavar=("X", "Y"), help="draw column Y against X, a third as colour, to OUT with .svg"),
@@ -535,6 +539,7 @@ COMMANDS = {
             "region of the solid fraction: a design, a file with a [region] alone, or a closed mesh in mm",
             "R",
         ),
+        option("--solid", metavar="NAME", help="one object of a 3MF, or one solid of a file from a CAD system"),
         *(spacing(), THREADS, PROGRESS),
         *APART,
         option("--thickness", action="store_true", help="also distributions of wall thickness and pore size"),
@@ -602,8 +607,9 @@ COMMANDS = {
         "Find what a cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
         "At each fraction the limit of grids of n, n/2 and n/4 voxels along the cell; between them monotone cubics, and\n"
         "powers of the fraction fitted (Gibson and Ashby). Stiffness and conductivity are relative to the solid's, lengths\n"
-        "to the wavelength. OUT: .csv, a row for each fraction; .json, with fits and notes; .svg, plots.\n\n"
-        "examples:\n  trabecula law gyroid -o gyroid.csv gyroid.svg\n"
+        "to the wavelength; with --tet, to the edge of a regular tetrahedron of the same volume. OUT: .csv, a row for each\n"
+        "fraction; .json, with fits and notes; .svg, plots.\n\n"
+        "examples:\n  trabecula law gyroid -o gyroid.csv gyroid.svg\n  trabecula law diamond_sheet --tet --from 0.1 --to 0.4\n"
         "  trabecula law diamond --part lower --from 0.2 --to 0.5 --count 7 --properties stiffness --json",
         option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` and `trabecula cells --beams` list them"),
         option(
@@ -612,7 +618,12 @@ COMMANDS = {
         option(
             "--part",
             choices=("sheet", "lower", "upper", "beams"),
-            help="what is solid (default: sheet, or beams where no other is)",
+            help="what is solid (default: sheet, or beams where no other is; with --tet what the cell is meant for)",
+        ),
+        option(
+            "--tet",
+            action="store_true",
+            help="the cell is a tetrahedral one (`trabecula cells --tet`), in the tetrahedra of a body-centred lattice",
         ),
         option("--from", dest="start", type=FRACTION, default=0.05, metavar="F", help="the least fraction (default: 0.05)"),
         option("--to", dest="stop", type=FRACTION, default=0.6, metavar="F", help="the greatest fraction (default: 0.6)"),

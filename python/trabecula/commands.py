@@ -136,14 +136,19 @@ def volume(args) -> None:
     check_elements(args)
     check_sets(args)
     solid = build(args.design, tell=not args.json)
+    carried = args.of == "carrier"
+    named = [name for name in args.fields or () if not (carried and name == "stiffness")]
     try:
-        fields_at(solid, args.fields or (), solid.bounds)
+        fields_at(solid, named, solid.bounds)
     except ValueError as error:
         raise Refused(f"--fields: {error}") from None
     start = time.perf_counter()
     with Progress("meshing", args.progress) as progress:
         if args.voxels is not None:
-            made = solid.voxel_elements(args.voxels, args.least or 0.01, args.threads, progress)
+            share = {} if args.least is None else {"least": args.least}
+            made = solid.voxel_elements(args.voxels, threads=args.threads, progress=progress, **share)
+        elif carried:
+            made = solid.carrier(args.order, args.threads)
         elif args.of == "shell":
             made = solid.shell_mesh(args.edge, args.per_cell, args.order, args.threads, progress)
         else:
@@ -152,7 +157,10 @@ def volume(args) -> None:
     missing = [name for name in args.sets or () if name not in made.report().sets]
     if missing:
         raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
-    fields = fields_at(solid, args.fields or (), made.nodes)
+    fields = fields_at(solid, named, made.nodes)
+    if len(named) < len(args.fields or ()):
+        with Progress("stiffness", args.progress) as progress:
+            fields |= made.moduli(args.nu, threads=args.threads, progress=progress)
     settle()
     made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()), fields)
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
@@ -178,12 +186,16 @@ def check_elements(args) -> None:
     check_steps(kind, args.hold or (), dict(args.load or ()))
     if args.hold and args.periodic:
         raise Refused("a periodic mesh has steps of its own; leave out --hold and --load")
-    if args.hold and args.of not in ("solid", "shell"):
-        raise Refused(f"--hold and --load are for --of solid or shell, not {args.of}")
+    if args.hold and args.of not in ("solid", "shell", "carrier"):
+        raise Refused(f"--hold and --load are for --of solid, shell or carrier, not {args.of}")
     if args.voxels is None:
         if args.least is not None:
             raise Refused("--least belongs to --voxels; add it")
         check_order(kind, args.order)
+        if args.of == "carrier":
+            sized = {"--edge": args.edge, "--per-cell": args.per_cell, "--wall": args.wall, "--periodic": args.periodic}
+            for name in (name for name, given in sized.items() if given):
+                raise Refused(f"{name} is for other meshes than --of carrier, whose tetrahedra are the design's; leave it out")
         if args.of == "shell":
             for name in (name for name, given in {"--wall": args.wall, "--periodic": args.periodic}.items() if given):
                 raise Refused(f"{name} is for tetrahedra; leave it out, or --of shell")
@@ -203,9 +215,10 @@ def check_sets(args) -> None:
     if not named:
         return
     design = design_of(args.design)
-    own = ("SURFACE",) if args.voxels is not None else ("BORDER",) if args.of == "shell" else ("CUT", "LATTICE")
+    surface = args.voxels is not None or args.of == "carrier"
+    own = ("SURFACE",) if surface else ("BORDER",) if args.of == "shell" else ("CUT", "LATTICE")
     known = [*own, "X0", "X1", "Y0", "Y1", "Z0", "Z1", *(design.set or ())]
-    if args.voxels is None and args.of != "shell":
+    if not surface and args.of != "shell":
         known += ["SKIN"] if design.skin else []
         known += ["NET"] if any("tets" in (it.map or {}) for it in (design.lattice or {}).values()) else []
         known += [f"KEEP_{name}" for name in design.keep or ()]
@@ -318,9 +331,6 @@ def cells(args) -> None:
     for it in made:
         print(f"{it['name']}  ({it['title']})")
         print("\n".join(f"  {line}" for line in words(it)))
-
-
-# --- what they share -------------------------------------------------------------------------------------------------
 
 
 def stiffness(args) -> None:

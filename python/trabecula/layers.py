@@ -97,7 +97,10 @@ class Layers(Sequence):
 
     def at(self, z: float) -> Layer:
         """The section at a height ``z`` (mm): a layer without thickness."""
-        return _layer(self._core.at(number("z", z)))
+        height = number("z", z)
+        if not math.isfinite(height):
+            raise ValueError(f"z is {height}; it must be a finite number, mm")
+        return _layer(self._core.at(height))
 
     def save(
         self,

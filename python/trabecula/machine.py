@@ -79,7 +79,9 @@ def fits(
         return
     kind = "memory" if path is None else "disk space"
     request, advice = "this", ""
-    if edge is not None:
+    if edge is not None and not math.isfinite(need):
+        request = f"{word} {edge:g} mm"
+    elif edge is not None:
         better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
         request = f"{word} {edge:g} mm"
         advice = f"; try {word} {rounded_up(better):g} mm"

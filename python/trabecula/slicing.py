@@ -6,7 +6,7 @@ import time
 
 from .errors import Refused
 from .files import check_place
-from .formats import kind_of
+from .formats import LAYERS, kind_of
 from .inputs import build, keep_file
 from .solid import Solid
 from .terminal import Progress, figure, put_json, say
@@ -14,11 +14,22 @@ from .texts import counted
 
 __all__ = ["slice"]
 
+#: What belongs to layers alone, and the words of those that are others on the command line.
+LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exposure")
+WORDS = {"start": "from", "stop": "to"}
+
 
 def slice(args) -> None:
     """``trabecula slice``: layers, or one section."""
     import numpy  # noqa: F401  wanted by drawings; see `terminal` for why no import waits until then
 
+    others = ("beams", "chord") if args.layer is not None else LAYERED
+    for name in (name for name in others if getattr(args, name) is not None and getattr(args, name) is not False):
+        raise Refused(f"--{WORDS.get(name, name)} belongs to --{'layer' if args.layer is None else 'z'}; leave it out")
+    if args.least is not None and args.adaptive is None:
+        raise Refused("--least is for adaptive layers; add --adaptive MM, the greatest height of steps on the surface")
+    if args.layer is not None and args.output and LAYERS[kind_of(args.output)].pictures and args.pixel is None:
+        raise Refused(f"{args.output} holds pictures; add --pixel MM, the edge of a pixel")
     if args.output:
         if args.z is not None and kind_of(args.output) != "svg":
             raise Refused(f"{args.output}: a section is drawn as .svg; other formats take --layer")

@@ -80,9 +80,9 @@ def duration(seconds: float) -> str:
     return f"{minutes} min {seconds} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
-def figure(v: float) -> str:
-    """A number with six digits; what is left of a difference that should be nothing is nothing."""
-    return f"{v:.6g}" if abs(v) > 1e-12 else "0"
+def figure(v: float, nothing: float = 1e-12) -> str:
+    """A number with six digits; what is left of a difference that should be ``nothing`` is 0, and what is no number ``-``."""
+    return f"{v:.6g}" if abs(v) > nothing else "0" if v == v else "-"
 
 
 def span(v) -> str:

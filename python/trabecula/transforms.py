@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Set
 
 from .given import number, three
 
@@ -64,7 +65,7 @@ class Transformed:
 
 def vector_of(name: str, value: Any) -> list[float]:
     """Three finite numbers."""
-    if isinstance(value, (str, bytes)) or not hasattr(type(value), "__len__") or len(value) != 3:
+    if isinstance(value, (str, bytes, Set, Mapping)) or not hasattr(type(value), "__len__") or len(value) != 3:
         raise ValueError(f"{name} must be three numbers, found {value!r:.80}")
     found = [number(name, v) for v in value]
     if not all(map(math.isfinite, found)):

@@ -35,6 +35,8 @@ use roots::{Plane, meet, solve};
 /// Most layers of a part, and most cells of a layer.
 const MOST_LAYERS: f64 = 1e7;
 const MOST_CELLS: f64 = 4e8;
+/// The greatest tolerance, in cells.
+const COARSEST: f64 = 0.25;
 
 /// The heights at which layers begin, and the last one's end, mm, rising.
 pub type Heights = Vec<f64>;
@@ -81,6 +83,8 @@ impl Slicer {
                 return Err(Fault::new(name, format!("{value} mm; it must be a length greater than 0")));
             }
         }
+        // Contours nearer than they need be are within the tolerance, too; coarser ones than the cells would miss what these show.
+        let plan = &Plan { tolerance: plan.tolerance.min(COARSEST * plan.step), ..*plan };
         let size = bounds.size();
         let farthest = (bounds.min.iter().chain(&bounds.max)).fold(0.0f64, |m, x| m.max(x.abs()));
         let gap = (4.0 * f64::from(f32::EPSILON) * farthest).max(1e-4 * plan.tolerance.min(plan.step));

@@ -45,6 +45,8 @@ pub const MOST_FACES: f64 = 4e5;
 const MOST_NODES: f64 = 4e6;
 /// Grid cells a wavelength to begin with, and at most.
 const CELLS: [f64; 2] = [4.0, 40.0];
+/// Where patches of the fourth order would take this many times the most cells, no finer grid is tried.
+const BEYOND: f64 = 3.0;
 /// Cells a wavelength of the grid whose topology counts, where its nodes are not too many.
 const FINE: f64 = 32.0;
 /// How much finer the next grid is after one that is too coarse.
@@ -116,6 +118,9 @@ impl Patches {
                 round += 1;
                 match attempt(&bounds, &grid, &surfaces, (tolerance, shift, solid.wavelength / FINE), &stage)? {
                     Attempt::Made(made) => return Ok(*made),
+                    Attempt::Off(deviation) if cells * (deviation / tolerance).powf(0.25) > BEYOND * CELLS[1] => {
+                        return Err(too_many(tolerance));
+                    }
                     Attempt::Off(deviation) => {
                         factor = (deviation / (0.7 * tolerance)).powf(0.25).clamp(1.1, 1.7);
                         break;

@@ -77,7 +77,10 @@ impl Trim {
                 Trim::Snap => {
                     let from = if ends[0] { *s } else { [s[1], s[0]] };
                     // The far end is outside, so a crossing exists.
-                    Outcome::Shortened(from, exit_parameter(region, at(&from), slack).unwrap_or(1.0))
+                    let left = exit_parameter(region, at(&from), slack).unwrap_or(1.0);
+                    let [p, q] = at(&from);
+                    // One that begins on the surface has nothing inside.
+                    if left * norm(sub(q, p)) <= slack { Outcome::Outside } else { Outcome::Shortened(from, left) }
                 }
             }
         };

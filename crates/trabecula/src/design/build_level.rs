@@ -329,7 +329,7 @@ impl AmountSpec {
         self.lengths().first().copied()
     }
 
-    /// The quantity under the key `amount`; of a porosity the complement is meant.
+    /// The quantity of the amount under its own key; of a porosity the complement is meant.
     pub(super) fn quantity<'a>(&self, path: String, environment: &'a Environment<'a>) -> Quantity<'a> {
         Quantity {
             complement: self.key() == "porosity",

@@ -124,20 +124,30 @@ impl Property<'_> {
     }
 
     /// The fractions between which the cell has the property: of a stiffness those at which it holds together.
-    fn range(&self) -> [f64; 2] {
+    fn range(&self) -> Result<[f64; 2], DesignError> {
         let [mut low, mut high] = FRACTIONS;
         if self.grows()
             && let Some([from, to]) = self.cell.connected_fraction(self.part).last()
         {
             (low, high) = (low.max(from + 1e-3), high.min(*to));
+            if low >= high {
+                let message = format!(
+                    "{} is sought at solid fractions from {} to {}, and the cell is in one piece from {from:.4} to {to:.4} only; give a \
+                     fraction",
+                    self.amount.key(),
+                    FRACTIONS[0],
+                    FRACTIONS[1]
+                );
+                return Err(DesignError::new(&self.path, message));
+            }
         }
-        [low, high]
+        Ok([low, high])
     }
 
     /// The fraction at which the property has this value.
     fn fraction(&self, asked: f64) -> Result<f64, DesignError> {
         let (mut at, mut slope) = self.coarse_root(asked)?;
-        let [low, high] = self.range();
+        let [low, high] = self.range()?;
         let mut last: Option<[f64; 2]> = None;
         for _ in 0..STEPS[1] {
             let off = (self.value(at, self.fine())? / asked).ln();
@@ -166,7 +176,7 @@ impl Property<'_> {
 
     /// Two fractions and the properties there, between which `asked` lies if it does between any.
     fn bracket(&self, asked: f64, n: usize) -> Result<([f64; 2], [f64; 2]), DesignError> {
-        let [low, high] = self.range();
+        let [low, high] = self.range()?;
         let [mut a, mut b] = [LIKELY[0].clamp(low, high), LIKELY[1].clamp(low, high)];
         let [mut at_a, mut at_b] = [self.value(a, n)?, self.value(b, n)?];
         let grows = self.grows();
@@ -230,7 +240,7 @@ impl Property<'_> {
     /// The fraction by the property, over the range of what is asked for.
     fn between(&self, asked: Varied) -> Result<Stops, DesignError> {
         let ends = [self.coarse_root(asked.min)?.0, self.coarse_root(asked.max)?.0];
-        let ([low, high], [least, most]) = (self.range(), [ends[0].min(ends[1]), ends[0].max(ends[1])]);
+        let ([low, high], [least, most]) = (self.range()?, [ends[0].min(ends[1]), ends[0].max(ends[1])]);
         let (first, last) = ((least * (1.0 - BEYOND)).max(low).ln(), (most * (1.0 + BEYOND)).min(high).ln());
         let mut nodes: Vec<[f64; 2]> = Vec::new();
         for i in 0..NODES {

@@ -98,7 +98,25 @@ fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Resul
         faces.push(face);
         places.push(path);
     }
+    let mut widths = vec![0.0; points.len()];
+    thickness.values(points, &mut widths);
+    let width = Varied::of(&widths);
+    let deepest = || {
+        let mut depth = vec![0.0; points.len()];
+        region.values(points, &mut depth);
+        depth.iter().fold(0.0f64, |m, d| m.max(-d))
+    };
+    let too_thick = || {
+        let message = format!(
+            "a skin of {width} mm is thicker than the region: the part would be solid. Its deepest point is {:.4} mm below its surface; \
+             give less than that",
+            deepest()
+        );
+        DesignError::new(path, message)
+    };
     let body = skin(region, &thickness, &faces).map_err(|f| match f.at.strip_prefix("open[") {
+        // So deep the region has no faces.
+        Some(_) if width.min >= deepest() => too_thick(),
         // Faces are numbered among themselves.
         Some(n) => {
             DesignError::new(n.trim_end_matches(']').parse().map_or("skin.open", |n: usize| &places[n]), f.message)
@@ -106,19 +124,8 @@ fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Resul
         None => DesignError::fault("skin", f),
     })?;
     let body = openings.iter().fold(body, outside);
-    let mut widths = vec![0.0; points.len()];
-    thickness.values(points, &mut widths);
-    let width = Varied::of(&widths);
     if !is_open(std::slice::from_ref(&body), region, points) {
-        let mut depth = vec![0.0; points.len()];
-        region.values(points, &mut depth);
-        let deepest = depth.iter().fold(0.0f64, |m, d| m.max(-d));
-        let message = format!(
-            "a skin of {} mm is thicker than the region: the part would be solid. Its deepest point is {deepest:.4} mm \
-             below its surface; give less than that",
-            width
-        );
-        return Err(DesignError::new(path, message));
+        return Err(too_thick());
     }
     Ok((body, width.min))
 }

@@ -19,6 +19,8 @@ use geometry::math::{Vec3, add, norm, scale, sub};
 const PIECES: usize = 4;
 /// A rod this near its chord, in lengths, is straight.
 const STRAIGHT: f64 = 1e-4;
+/// Rods shorter than this share of their radius are none.
+const SHORTEST: f64 = 1e-6;
 
 /// The middle lines of a net.
 pub(super) struct Net {
@@ -113,7 +115,13 @@ impl Net {
     /// The rods, of a radius (mm), as a solid.
     pub fn solid(&self, radius: f64) -> Result<CsgSolid, Fault> {
         let hubs = self.nodes.iter().map(|center| Hub { center: *center, radius }).collect();
-        let beams = self.rods.iter().map(|ends| Beam { ends: *ends, profile: Profile::Cylinder }).collect();
+        // Nodes may coincide, where the mesh is finer than what it follows.
+        let long = |ends: &&[u32; 2]| {
+            let [p, q] = ends.map(|n| self.nodes[n as usize]);
+            norm(sub(p, q)) > SHORTEST * radius
+        };
+        let rods = self.rods.iter().filter(long);
+        let beams = rods.map(|ends| Beam { ends: *ends, profile: Profile::Cylinder }).collect();
         let quadors = Arc::new(Quadors::new(&Graph { hubs, beams }, Fillet::None)?);
         Ok(CsgSolid { surfaces: vec![Surface::smooth(quadors)], tree: CsgTree::Leaf(0) })
     }

@@ -118,12 +118,13 @@ impl UnitCell {
         Ok(limit(&areas).tensor[0])
     }
 
-    /// The cubic grids of about n, n/2 and n/4 nodes along the cell.
+    /// The cubic grids of about n, n/2 and, where that is enough, n/4 nodes along the cell.
     fn grids(&self, n: usize) -> Vec<CubicGrid> {
         let edges = transpose(&self.edges);
         let mut grids = vec![CubicGrid::near(&edges, n)];
         for by in [2, 4] {
-            if n / by >= LEAST {
+            // A limit takes two.
+            if by == 2 || n / by >= LEAST {
                 grids.push(grids[0].coarser(by).unwrap_or_else(|| CubicGrid::near(&edges, n / by)));
             }
         }

@@ -216,7 +216,7 @@ pub struct TilingReport {
     pub edge: f64,
     /// Volume of the mesh, mm³.
     pub volume: f64,
-    /// Volume of solid over volume of the mesh.
+    /// Solid fraction of the lattice in its flat tetrahedra, without net or rounding: the lattice's `fraction` is that of the finished part.
     pub solid_fraction: f64,
     /// The zones by the number or the name in the design, where zones have cells of their own.
     pub zones: Option<BTreeMap<String, ZoneReport>>,
@@ -252,7 +252,7 @@ pub struct ZoneReport {
     pub count: usize,
     /// Volume, mm³.
     pub volume: f64,
-    /// Volume of solid over volume.
+    /// Solid fraction of the lattice in the zone's flat tetrahedra, without net or rounding.
     pub solid_fraction: f64,
 }
 
