@@ -1175,7 +1175,8 @@ class TilingReport(Report):
     ports: int | None
     """Number of ports on each face of a tetrahedron; None for zones."""
     solid_fraction: float
-    """Volume of solid over volume of the mesh."""
+    """Solid fraction of the lattice in its flat tetrahedra, without net or rounding: the lattice's `fraction` is that of the
+    finished part."""
     surface: str
     """How the lattice ends at the part's surface: capped, open, net or rounded."""
     thickness: WallSpread | None
@@ -1352,6 +1353,6 @@ class ZoneReport(Report):
     numbers: list[int]
     """Numbers of its tetrahedra in the mesh: several, where elements of a group are of other groups too."""
     solid_fraction: float
-    """Volume of solid over volume."""
+    """Solid fraction of the lattice in the zone's flat tetrahedra, without net or rounding."""
     volume: float
     """Volume, mm³."""

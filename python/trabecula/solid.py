@@ -282,8 +282,8 @@ class Solid(Seen, Simulated):
         found = volume / region
         # A share of the fraction, and three standard deviations of the sample that the expected one is from. Over tetrahedra
         # the sample may lie where none is.
-        near = share / 3 if any(it.tets for it in self.report().lattices.values()) else 0.05 * share + 0.005
-        if abs(found - share) > min(0.05, near):
+        tets = any(it.tets for it in self.report().lattices.values())
+        if abs(found - share) > min(0.05, share / 3, math.inf if tets else 0.05 * share + 0.005):
             better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
             warnings.warn(
                 f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design {share:.3g}; use "
