@@ -10,7 +10,7 @@ from . import beams as unit_cells
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import Refused
-from .files import check_place, read_text, whole_file
+from .files import check_place, read_text, write_text
 from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .local_fields import fields_at
@@ -54,8 +54,7 @@ def new(args) -> None:
     texts = [(args.file, starter(os.path.basename(args.file), args.cell, args.beams, part, args.skin, meshes, named))]
     texts += [(beside, _core.schema())] if beside else []
     for name, text in texts:
-        with whole_file(name) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-            out.write(text)
+        write_text(name, text)
     say(f"{args.file} written; next: trabecula check {args.file}")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from .errors import DesignError, DesignWarning
-from .files import extension, read_text, whole_file
+from .files import extension, read_text, write_text
 from .given import copied, named, settings, three
 
 if TYPE_CHECKING:
@@ -189,8 +189,7 @@ class Design:
         checked = _core.Design.from_data(data)
         checked.build(new)
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
-        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-            out.write(text)
+        write_text(path, text)
 
 
 def _by_name(given: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .camera import VIEWS, section_plane, towards
 from .errors import Refused
-from .files import check_place, kind_of, whole_file
+from .files import check_place, kind_of, write_bytes
 from .formats import is_design
 from .inputs import build, meshed, surface
 from .mesh import Mesh
@@ -112,5 +112,4 @@ def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, floa
             azimuth = angles[0] + 360 * i / args.turn
             frames.append(made.png(pixels, azimuth, angles[1], section=args.section, **shown))
             progress(i + 1, args.turn)
-    with whole_file(args.output) as temporary, open(temporary, "wb") as out:
-        out.write(animated(frames, args.seconds))
+    write_bytes(args.output, animated(frames, args.seconds))

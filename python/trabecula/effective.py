@@ -6,7 +6,7 @@ import csv
 from collections.abc import Callable, Sequence
 
 from .cards import CARDS
-from .files import check_place, whole_file
+from .files import check_place, write_text
 from .formats import kind_of
 from .inputs import build, keep_file
 from .moduli import SURFACE_WRITES, write_surface
@@ -35,7 +35,7 @@ def stiffness(args) -> StiffnessReport:
             title = (
                 f"effective stiffness of {args.design}, solid E = {args.E:g}, nu = {args.nu:g}, fraction {found.fraction:.6g}"
             )
-            written(name, CARDS[kind](found, title) if kind in CARDS else table(found.C, AXES, found.C_n))
+            write_text(name, CARDS[kind](found, title) if kind in CARDS else table(found.C, AXES, found.C_n))
     say_found(found, args)
     return found
 
@@ -46,7 +46,7 @@ def conductivity(args) -> ConductivityReport:
     with Progress("conductivity", args.progress) as progress:
         found = solid.conductivity(args.n, args.pore, args.voxels, args.threads, progress)
     for name in args.output or ():
-        written(name, table(found.k, "123", found.k_n))
+        write_text(name, table(found.k, "123", found.k_n))
     say_found(found, args)
     return found
 
@@ -57,7 +57,7 @@ def permeability(args) -> PermeabilityReport:
     with Progress("permeability", args.progress) as progress:
         found = solid.permeability(args.n, args.side, args.threads, progress)
     for name in args.output or ():
-        written(name, table(found.k, "123", found.k_n))
+        write_text(name, table(found.k, "123", found.k_n))
     say_found(found, args)
     return found
 
@@ -94,12 +94,6 @@ def say_found(found: Found, args) -> None:
         warn(warning["message"], warning["path"], not args.json)
     for name in args.output or ():
         say(f"{name}: written")
-
-
-def written(name: str, text: str) -> None:
-    """Writes a text."""
-    with whole_file(name) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write(text)
 
 
 def table(limit: Sequence[Sequence[float]], names: Sequence[str], finest: Sequence[Sequence[float]]) -> str:

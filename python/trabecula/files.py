@@ -12,7 +12,10 @@ from . import _core, terminal
 from .errors import DesignError
 from .formats import dotted, kind_of
 
-__all__ = ["check_place", "extension", "read_text", "replace_file", "special", "whole_file", "write_svg"]
+__all__ = [
+    *("check_place", "extension", "read_text", "replace_file", "special", "whole_file"),
+    *("write_bytes", "write_svg", "write_text"),
+]
 
 #: Names of what is open already.
 OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
@@ -123,12 +126,21 @@ def replace_file(new: str, real: str) -> None:
     os.replace(new, real)
 
 
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Writes a text in UTF-8, its lines ended by line feeds."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Writes a file that appears whole or not at all."""
+    with whole_file(path) as temporary, open(temporary, "wb") as out:
+        out.write(data)
+
+
 def write_svg(path: str | os.PathLike[str], drawing: Callable[[], str]) -> None:
     """Writes a drawing to a .svg file."""
     extension(path, ("svg",))
-    text = drawing()
-    with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write(text)
+    write_text(path, drawing())
 
 
 def _permissions(temporary: str, real: str) -> None:

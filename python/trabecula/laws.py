@@ -17,7 +17,7 @@ from .cell import tet as tet_cell
 from .cell import tet_facts, tet_names
 from .design import Beams, Design, Lattice
 from .errors import DesignError, DesignWarning
-from .files import extension, whole_file
+from .files import extension, write_text
 from .formats import LAW_WRITES
 from .given import number, poisson, positive, thread_count, whole
 from .map import affine, tets
@@ -135,8 +135,7 @@ class Law:
             text = json.dumps(self.to_dict(), indent=1) + "\n"
         else:
             text = self.svg()
-        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-            out.write(text)
+        write_text(path, text)
 
     def svg(self) -> str:
         """Its plots as SVG."""

@@ -10,9 +10,9 @@ from functools import cached_property
 from . import _core
 from .camera import BACKGROUNDS, section_plane, towards
 from .errors import DesignWarning
-from .files import extension, read_text, whole_file
+from .files import extension, read_text, whole_file, write_bytes
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
-from .given import fixed, number, positive, whole
+from .given import fixed, number, positive, thread_count, whole
 from .machine import file_size, fits
 from .thickness import Thickness
 from .transforms import Transformed, determinant
@@ -285,7 +285,7 @@ class Mesh(Picture, Transformed):
         closed.
         """
         wanted = None if step is None else positive("step", step)
-        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        workers = thread_count(threads)
         spacing, shape, need = self._core.thickness_needs(self._region, wanted)
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         wall = 2 * self.volume / self.area
@@ -309,7 +309,7 @@ class Mesh(Picture, Transformed):
         ValueError else.
         """
         wanted = None if step is None else positive("step", step)
-        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        workers = thread_count(threads)
         spacing, shape, need = self._core.thickness_needs(None, wanted)
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         return self._core.thickness_at_vertices(spacing, workers, progress)
@@ -612,8 +612,7 @@ class Mesh(Picture, Transformed):
             made = self.svg(size, azimuth, elevation, section, dpi).encode()
         else:
             made = self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi)
-        with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(made)
+        write_bytes(path, made)
 
     def _picture(self) -> Mesh:
         return self

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .files import extension, whole_file
+from .files import extension, write_bytes
 from .mesh import Mesh
 
 __all__ = ["SURFACE_WRITES", "modulus", "sphere", "surface", "write_surface"]
@@ -76,8 +76,7 @@ def write_surface(path: str | os.PathLike[str], stiffness: Sequence[Sequence[flo
     label = f"Young's modulus E{unit and f', {unit}'}"
     draw = {"png": lambda: mesh.png((1200, 900), color=along, label=label), "ply": lambda: ply(mesh, along)}
     data = draw.get(kind, lambda: vtu(mesh, along))()
-    with whole_file(path) as temporary, open(temporary, "wb") as out:
-        out.write(data)
+    write_bytes(path, data)
 
 
 def ply(mesh: Mesh, along: NDArray[np.float64]) -> bytes:

@@ -12,7 +12,7 @@ from .design import Design
 from .errors import DesignError, DesignWarning
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
-from .given import fixed, whole
+from .given import fixed, thread_count
 from .mesh import Mesh, Picture
 from .transforms import Transformed
 
@@ -44,7 +44,7 @@ class TetMesh(Picture, Transformed):
         Raises DesignError for anything wrong, and warns (DesignWarning) of possible mistakes: thin walls that are lost,
         slivers, several pieces.
         """
-        threads = None if threads is None else whole("threads", threads, 1, 4096)
+        threads = thread_count(threads)
         if isinstance(design, Design):
             data, folder = design.to_dict(), design.folder or os.getcwd()
             return made_of(_core.TetMesh.from_data(data, folder, lattice, threads))

@@ -11,7 +11,7 @@ from html import escape
 from importlib.resources import files
 
 from .camera import section_plane, towards
-from .files import extension, whole_file
+from .files import extension, write_text
 from .given import number
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -328,5 +328,4 @@ def page(title: str, body: str, more: str = "") -> str:
 def write_page(path: str | os.PathLike[str], text: str) -> None:
     """Writes a page to an .html file."""
     extension(path, ("html",))
-    with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write(text)
+    write_text(path, text)

@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from .files import whole_file
+from .files import whole_file, write_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -62,5 +62,4 @@ def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray]
             head = f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">'
             lines.append(f"{head}{item(f'data{k}', values)}</Attribute>")
     lines.append("</Grid></Domain></Xdmf>")
-    with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write("\n".join(lines) + "\n")
+    write_text(path, "\n".join(lines) + "\n")
