@@ -183,7 +183,7 @@ fn joined(bytes: &[u8], which: Which) -> Result<Mesh, Fault> {
     let held = place_all(bytes, which, &mut |placed| {
         if placed.object.slices {
             let message =
-                "the file holds slices, beside triangles that only stand for them; read the design or a mesh of it";
+                "the file holds slices, and triangles that only stand for them; read the design or a mesh of it";
             return Err(Fault::new("", message));
         }
         let mirrored = determinant(&placed.matrix) < 0.0;
@@ -383,7 +383,7 @@ impl Parsing {
                 let kind = attribute(tag, "type").map_or("model".into(), Cow::into_owned);
                 let properties = attribute(tag, "pid").is_some() && attribute(tag, "pindex").is_some();
                 let name = attribute(tag, "name").map_or(String::new(), Cow::into_owned);
-                // Of the slice extension: the mesh is a coarse one beside the slices.
+                // Of the slice extension: the mesh is a coarse one that stands for the slices.
                 let slices = attribute_where(tag, |n| n.ends_with(":slicestackid")).is_some()
                     && attribute_where(tag, |n| n.ends_with(":meshresolution")).is_some_and(|v| v == "lowres");
                 let object = Object { kind, name, slices, properties, ..Object::default() };
