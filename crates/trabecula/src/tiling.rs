@@ -13,6 +13,7 @@ mod mixture;
 mod node_levels;
 mod ports;
 mod rounded;
+mod space_filling;
 mod surface;
 mod walls;
 
@@ -30,6 +31,7 @@ pub use crease::Creases;
 pub use node_levels::Amount;
 pub use ports::Ports;
 pub use rounded::Rounded;
+pub use space_filling::SpaceFilling;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
 pub use walls::Spread;
 

@@ -65,8 +65,8 @@ mod tests {
     proptest! {
         /// With a sign and an exponent of two digits and its sign two decimals are left of eight characters, ten of sixteen.
         #[test]
-        fn a_number_fits_and_has_as_many_digits_as_fit(digits in -1.0f64..1.0, power in -99i32..99) {
-            let v = digits * 10f64.powi(power);
+        fn a_number_fits_and_has_as_many_digits_as_fit(digits in 1.0f64..9.9, sign in prop::bool::ANY, power in -99i32..99) {
+            let v = if sign { -digits } else { digits } * 10f64.powi(power);
             for (width, off) in [(8, 6e-3), (16, 1e-10)] {
                 let text = real(v, width);
                 let back = value(&text).unwrap_or(f64::NAN);

@@ -10,7 +10,7 @@ use crate::cell::tet::TetCell;
 use crate::implicit::Implicit;
 use crate::kind::DesignError;
 use crate::map::Tets;
-use crate::tiling::{Level, Tiling};
+use crate::tiling::{Level, SpaceFilling, Tiling};
 use geometry::fault::Fault;
 use geometry::math::Mat3;
 use geometry::tetmesh::TetMesh;
@@ -40,7 +40,11 @@ impl TiledCell {
             _ => Some(2.0 * made.ports().1),
         };
         let edges = [0, 1, 2].map(|a| [0, 1, 2].map(|b| if a == b { edge } else { 0.0 }));
-        Ok(TiledCell { field: Arc::new(made), edges, fraction, wall })
+        let field: Arc<dyn Implicit> = match SpaceFilling::of(&made, edge) {
+            Some(folded) => Arc::new(folded),
+            None => Arc::new(made),
+        };
+        Ok(TiledCell { field, edges, fraction, wall })
     }
 
     /// Of a lattice, in tetrahedra of the mean volume of its own.
@@ -88,4 +92,45 @@ fn body_centred(edge: f64) -> TetMesh {
         }
     }
     TetMesh { nodes, tets, zones: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::tet::named_tet_cell;
+    use crate::field::Field;
+    use geometry::math::{Aabb, Vec3, norm, sub};
+    use geometry::random::random;
+
+    /// Folding finds what the search in a mesh finds, values and gradients, and its bounds hold.
+    #[test]
+    fn folded_tetrahedra_are_those_of_the_mesh() {
+        let cell = Arc::new(named_tet_cell("diamond").and_then(|c| c.cell().ok()).expect("a cell"));
+        let edge = 3.0;
+        let map = Arc::new(Tets::new(&body_centred(edge), 0.0).expect("a mesh"));
+        let mut seed = 7;
+        for part in [Part::Lower, Part::Sheet, Part::Upper] {
+            let tiling = Tiling::new(map.clone(), cell.clone(), part, Level::Same(0.4));
+            let folded = SpaceFilling::of(&tiling, edge).expect("equal tetrahedra");
+            let points: Vec<Vec3> = (0..2000).map(|_| [0; 3].map(|_| edge * (0.5 + 0.7 * random(&mut seed)))).collect();
+            let both = [&tiling as &dyn Field, &folded].map(|field| {
+                let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+                field.gradients(&points, &mut v, &mut g);
+                let mut plain = vec![0.0; points.len()];
+                field.values(&points, &mut plain);
+                assert_eq!(v, plain);
+                (v, g)
+            });
+            let [(v, g), (w, h)] = &both;
+            for i in 0..points.len() {
+                assert!((v[i] - w[i]).abs() < 1e-9 && norm(sub(g[i], h[i])) < 1e-8, "{:?}", points[i]);
+                let half = 0.3 * (1.0 + random(&mut seed));
+                let b = Aabb { min: points[i].map(|x| x - half), max: points[i].map(|x| x + half) };
+                let bound = folded.bound(&b);
+                let inside =
+                    points.iter().zip(w).filter(|(p, _)| (0..3).all(|a| (b.min[a]..=b.max[a]).contains(&p[a])));
+                inside.for_each(|(p, w)| assert!(bound.lo <= *w && *w <= bound.hi, "{p:?}"));
+            }
+        }
+    }
 }
