@@ -7,6 +7,7 @@ Cells that stand in the data at this n or a finer one are kept, unless --again; 
 """
 
 import argparse
+import itertools
 import json
 import math
 from pathlib import Path
@@ -22,7 +23,10 @@ DATA = ROOT / "docs" / "generated" / "properties.json"
 PAGE = ROOT / "docs" / "generated" / "catalogue.md"
 PICTURES = ROOT / "docs" / "images"
 FRACTIONS = (0.05, 0.6, 12)
-PARTS = ("sheet", "lower", "upper", "beams")
+#: The kinds of cells: parts of named ones, cells of beams, tetrahedral ones, each with the part that it is meant for.
+PARTS = ("sheet", "lower", "upper", "beams", "tetrahedra")
+#: What is found of tetrahedral cells: flow through them takes hours.
+OF_TETS = ("stiffness", "conductivity", "area")
 #: Plots: column, title, and whether it is logarithmic.
 SHOWN = (
     ("E", "Young's modulus along the axes, over the solid's", True),
@@ -36,23 +40,31 @@ SHOWN = (
 #: The named cells but one of the two gyroids, which are mirror images.
 CELLS = [cell[0] for cell in _core.cells() if cell[0] != "gyroid_mirrored"]
 BEAMS = lt.beams.names()
+NAMES = dict.fromkeys(PARTS, CELLS) | {"beams": BEAMS, "tetrahedra": lt.cell.tet_names()}
+
+
+def kind(law):
+    """Of which of the kinds a law is."""
+    return "tetrahedra" if law.get("tet") else law["part"]
 
 
 def order(law):
-    """Where a law stands: named cells first, then cells of beams."""
-    names = BEAMS if law["part"] == "beams" else CELLS
-    return law["part"] == "beams", names.index(law["cell"]), PARTS.index(law["part"])
+    """Where a law stands: named cells first, then cells of beams, then tetrahedral ones."""
+    part = kind(law)
+    return PARTS.index(part) - 2 if part in PARTS[3:] else 0, NAMES[part].index(law["cell"]), PARTS.index(part)
 
 
 def compute(n, cells, parts, again):
     """Adds laws to the data."""
     kept = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {"laws": []}
-    laws = {(law["cell"], law["part"]): law for law in kept["laws"]}
+    laws = {(law["cell"], kind(law)): law for law in kept["laws"]}
     for cell in cells:
-        for part in (part for part in parts if cell in (BEAMS if part == "beams" else CELLS)):
+        for part in (part for part in parts if cell in NAMES[part]):
             if not again and laws.get((cell, part), {"n": 0})["n"] >= n:
                 continue
-            law = lt.law(cell, part, *FRACTIONS, n=n).to_dict()
+            tet = part == "tetrahedra"
+            more = {"tet": True, "properties": OF_TETS} if tet else {}
+            law = lt.law(cell, None if tet else part, *FRACTIONS, n=n, **more).to_dict()
             law["columns"] = {k: [v and float(f"{v:.6g}") for v in column] for k, column in law["columns"].items()}
             laws[cell, part] = law
             law["fits"] = {k: {name: float(f"{v:.6g}") for name, v in fit.items()} for k, fit in law["fits"].items()}
@@ -65,18 +77,19 @@ def compute(n, cells, parts, again):
 def page():
     """The page and its plots."""
     laws = json.loads(DATA.read_text(encoding="utf-8"))["laws"]
-    for part in (part for part in PARTS if any(law["part"] == part for law in laws)):
+    for part in (part for part in PARTS if any(kind(law) == part for law in laws)):
         plots = []
         for column, title, log in SHOWN:
             curves = []
-            for law in (law for law in laws if law["part"] == part):
+            for law in (law for law in laws if kind(law) == part and column in law["columns"]):
                 x = np.array(law["columns"]["fraction"])
                 y = np.array([math.nan if v is None else v for v in law["columns"][column]])
                 known = np.isfinite(y) & (y > 0)
                 along = np.linspace(x[known][0], x[known][-1], 81) if known.sum() > 1 else []
                 values = monotone(x[known], y[known], along) if len(along) else []
                 curves.append(Curve(law["cell"], x[known], y[known], along, values))
-            plots.append(Panel(title, f"solid fraction, {part}", curves, log))
+            if curves:
+                plots.append(Panel(title, f"solid fraction, {part}", curves, log))
         (PICTURES / f"properties_{part}.svg").write_text(panels(plots), encoding="utf-8")
     PAGE.write_text("\n".join(lines(laws)) + "\n", encoding="utf-8")
     print(PAGE)
@@ -90,16 +103,21 @@ def lines(laws):
     yield (
         "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three "
         "grids, by [`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
-        "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through."
+        "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through. "
+        "Tetrahedral cells stand in the equal tetrahedra of a body-centred cubic lattice, and λ is the edge of a regular one "
+        "of the same volume; their permeability is left out."
     )
-    for part in (part for part in PARTS if any(law["part"] == part for law in laws)):
+    for part in (part for part in PARTS if any(kind(law) == part for law in laws)):
         yield from ("", f"## {part}", "", f"![Properties by fraction](../images/properties_{part}.svg)", "")
         yield "| cell | n | fraction | E | error of C | Zener | k | error of k | K / λ² | error of K | area λ / V |"
         yield "|" + "---|" * 11
-        for law in (law for law in laws if law["part"] == part):
+        for law in (law for law in laws if kind(law) == part):
             columns = law["columns"]
             for i in range(0, len(columns["fraction"]), 2):
-                cells = [columns[name][i] for name in ("E", "C_error", "zener", "k", "k_error", "K", "K_error", "area")]
+                cells = [
+                    columns[name][i] if name in columns else None
+                    for name in ("E", "C_error", "zener", "k", "k_error", "K", "K_error", "area")
+                ]
                 shares = {1, 4, 6}
                 texts = [
                     "–" if v is None or (v == 0 and j == 5) else f"{100 * v:.2g} %" if j in shares else f"{v:.4g}"
@@ -112,7 +130,7 @@ def main():
     """Compute what is asked for, and the page."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--n", type=int, default=64)
-    parser.add_argument("--cells", nargs="+", default=[*CELLS, *(name for name in BEAMS if name not in CELLS)])
+    parser.add_argument("--cells", nargs="+", default=list(dict.fromkeys(itertools.chain(*NAMES.values()))))
     parser.add_argument("--parts", nargs="+", default=PARTS, choices=PARTS)
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--page", action="store_true")

@@ -101,7 +101,7 @@ const MOST: usize = 256;
 /// reach: farther out the lattice goes on straight.
 const BEYOND: f64 = 0.1;
 /// How steep an eased field may be, in the median over the volume: beyond what sizes and shapes do in a good mesh.
-const STEEP: f64 = 2.0;
+const STEEP: f64 = 4.0;
 
 impl Tiling {
     /// A single cell over a mesh.
