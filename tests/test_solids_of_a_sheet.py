@@ -69,7 +69,7 @@ def test_one_object_of_a_3mf_is_read_by_its_name(block, tmp_path):
     for name, part in parts.items():
         again = lt.Mesh.read(out, solid=name)
         assert again.closed and again.counts == part.counts and again.volume == pytest.approx(part.volume, rel=1e-5)
-    with pytest.raises(ValueError, match="no object is named \"walls\"; there are wall, lower, upper"):
+    with pytest.raises(ValueError, match='no object is named "walls"; there are wall, lower, upper'):
         lt.Mesh.read(out, solid="walls")
     assert "3 objects ('wall', 'lower', 'upper'), measured as one mesh" in run("measure", out, cwd=tmp_path).stderr
     assert "closed" in run("measure", out, "--solid", "wall", cwd=tmp_path).stdout
