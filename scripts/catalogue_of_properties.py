@@ -95,6 +95,11 @@ def page():
     print(PAGE)
 
 
+def percent(share):
+    """A share in two digits."""
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
+
+
 def lines(laws):
     """The page's text."""
     yield "<!-- Made by scripts/catalogue_of_properties.py; do not edit. -->"
@@ -120,7 +125,7 @@ def lines(laws):
                 ]
                 shares = {1, 4, 6}
                 texts = [
-                    "–" if v is None or (v == 0 and j == 5) else f"{100 * v:.2g} %" if j in shares else f"{v:.4g}"
+                    "–" if v is None or (v == 0 and j == 5) else percent(v) if j in shares else f"{v:.4g}"
                     for j, v in enumerate(cells)
                 ]
                 yield "| " + " | ".join([f"`{law['cell']}`", str(law["n"]), f"{columns['fraction'][i]:.2f}", *texts]) + " |"
