@@ -137,6 +137,9 @@ def test_what_has_no_carrier_is_refused():
         box.build().carrier()
     with pytest.raises(ValueError, match="order is 3"):
         design({"fraction": 0.3}).build().carrier(order=3)
+    skinned = dataclasses.replace(design({"fraction": 0.3}), skin=lt.skin(0.5)).build()
+    with pytest.warns(lt.DesignWarning, match="SKIN: no part of the carrier"):
+        skinned.carrier()
     # Spheres alone, which carry nothing.
     apart = design({"fraction": 0.05}, "diamond").build().carrier()
     with pytest.raises(ValueError, match=r"falls apart|in pieces"):

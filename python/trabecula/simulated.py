@@ -110,12 +110,16 @@ class Simulated:
         """The tetrahedra that carry a lattice over tetrahedra (``map.tets``) as finite elements, each a material by the solid
         fraction of its cell: a model of the whole part by as few elements as there are cells.
 
-        ``order`` 2 gives quadratic tetrahedra, whose boundary edges are bent onto the region's surface. Raises ValueError for a
-        design that is more or other than one such lattice, and for an empty set.
+        ``order`` 2 gives quadratic tetrahedra, whose boundary edges are bent onto the region's surface. A skin, keep zones and
+        a net are left out, with a warning. Raises ValueError for a design that is more or other than one such lattice, for an
+        empty set, and for more than 256 domains.
         """
         if order not in (1, 2):
             raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
-        return Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
+        made = Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
+        if left := self._core.bodies:
+            warnings.warn(f"{', '.join(left)}: no part of the carrier, which is the lattice alone", DesignWarning, stacklevel=2)
+        return made
 
     def voxel_elements(
         self,

@@ -278,8 +278,11 @@ class Carrier(VolumeMesh):
     with as many elements as the lattice has cells. Made by ``Solid.carrier``.
 
     Its domains are classes of the solid fraction, in twentieths: FRACTION_005 to FRACTION_100, or ZONE_NAME_FRACTION_005 in a
-    mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume`` is
-    that of the tetrahedra.
+    mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume``
+    (mm³) is that of the tetrahedra. A skin, keep zones and a net are no part of it.
+
+    ``write`` is that of ``VolumeMesh``, with fractions in .msh, .vtu and .xdmf. In .inp and .bdf each domain has a material:
+    ``moduli(nu)`` times the ``E`` (MPa) of the solid. ``fields`` may have them in .vtu: ``carrier.moduli()``.
     """
 
     def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
@@ -317,20 +320,6 @@ class Carrier(VolumeMesh):
         if (nu, n) not in self._found:
             self._found[nu, n] = _core.VolumeMesh.carrier_moduli(self._solid, nu, n, thread_count(threads), progress)
         return self._found[nu, n]
-
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        E: float = 1.0,
-        nu: float = 0.3,
-        hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
-        fields: Mapping[str, ArrayLike] | None = None,
-    ) -> None:
-        """Writes the files of ``VolumeMesh.write``, with fractions in .msh, .vtu and .xdmf. In .inp and .bdf each domain has a
-        material: ``moduli(nu)`` times the ``E`` (MPa) of the solid. ``fields`` may have them in .vtu: ``carrier.moduli()``.
-        """
-        super().write(path, E, nu, hold, load, fields)
 
     def _of_elements(self) -> dict[str, NDArray]:
         return super()._of_elements() | {"fraction": self.fraction}

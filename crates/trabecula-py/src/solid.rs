@@ -356,6 +356,12 @@ impl Solid {
         measured(py, &made, region)
     }
 
+    /// Names of what is solid whatever the lattice says.
+    #[getter]
+    fn bodies(&self) -> Vec<String> {
+        self.built.bodies.clone()
+    }
+
     /// Whether files of its mesh have no caps on the region's boundary.
     #[getter]
     fn open_ends(&self) -> bool {

@@ -171,9 +171,8 @@ impl VolumeMesh {
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
-        let own_materials = !self.mesh().fraction.is_empty() && !elastic.is_empty();
         let fields = fields.into_iter().map(field).collect();
-        let text = FeText { title, elastic, own_materials, held, loads, fields };
+        let text = FeText { title, elastic, held, loads, fields };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

@@ -26,10 +26,8 @@ pub use voxel_elements::{HEX_FORMATS, HexFormat};
 pub struct FeText {
     /// The first line: what it is.
     pub title: String,
-    /// Young's modulus (MPa) and Poisson's ratio: of all domains, or of each if they have materials of their own.
+    /// Young's modulus (MPa) and Poisson's ratio: of all domains; of a mesh with solid fractions, of each.
     pub elastic: Vec<[f64; 2]>,
-    /// Whether domains have materials of their own, which are then written whether or not there is a step.
-    pub own_materials: bool,
     /// Names of sets whose nodes are held in all directions.
     pub held: Vec<String>,
     /// Names of sets and the resultant (N) of a uniform traction on their faces.

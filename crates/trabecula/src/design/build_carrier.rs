@@ -55,6 +55,10 @@ pub(super) fn moduli(built: &Built, (nu, n): (f64, usize), progress: &dyn Progre
         counts[*d as usize] += 1.0;
     }
     let means: Vec<f64> = sums.iter().zip(&counts).map(|(s, c)| s / c).collect();
+    if let Some(d) = means.iter().position(|mean| *mean <= 0.0) {
+        let message = format!("nothing is solid in the tetrahedra of {}, which carry no load", made.mesh.domains[d]);
+        return Err(Stopped::Refused(Fault::new(format!("lattice.{}.level", tiled.name), message)));
+    }
     let mut out = vec![[1.0, nu]; means.len()];
     let zones = zone_of.last().map_or(0, |z| z + 1);
     for zone in 0..zones {

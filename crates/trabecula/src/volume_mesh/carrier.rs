@@ -29,7 +29,7 @@ pub struct Carried<'a> {
 /// each zone where there are several; sets are SURFACE, the bounding planes and the regions given.
 ///
 /// # Errors
-/// An empty set.
+/// An empty set; more than 256 domains.
 pub fn carrier(tiling: &Tiling, of: &Carried) -> Result<(FeMesh, Vec<usize>), Fault> {
     let map = &*tiling.map;
     let shares = tiling.shares();
@@ -39,7 +39,10 @@ pub fn carrier(tiling: &Tiling, of: &Carried) -> Result<(FeMesh, Vec<usize>), Fa
     for (zone, (prefix, tets)) in zones(tiling, &of.zones).into_iter().enumerate() {
         let fractions: Vec<f64> = tets.iter().map(|t| shares[*t]).collect();
         for (name, members) in fraction_classes(&fractions) {
-            let domain = mesh.domains.len() as u8;
+            let Ok(domain) = u8::try_from(mesh.domains.len()) else {
+                let message = "zones and classes of the solid fraction make more than 256 domains; take fewer zones, or levels that vary less";
+                return Err(Fault::new("", message));
+            };
             mesh.domains.push(format!("{prefix}{name}"));
             zone_of.push(zone);
             mesh.domain.extend(members.iter().map(|_| domain));

@@ -40,7 +40,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
     match (mesh.pairs.is_empty(), text.held.is_empty() && text.loads.is_empty()) {
         (false, _) => periodic(mesh, text, out),
         (true, false) => loaded(mesh, text, out),
-        (true, true) if text.own_materials => materials(mesh, text, out),
+        (true, true) if !mesh.fraction.is_empty() => materials(mesh, text, out),
         (true, true) => Ok(()),
     }
 }
@@ -93,9 +93,9 @@ pub(super) fn decimal(text: &mut String, x: f64) {
     }
 }
 
-/// The materials of the domains: one of all, or one of each.
+/// The materials of the domains: one of all, or where they are classes of the solid fraction one of each.
 fn materials(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
-    let own = text.own_materials;
+    let own = !mesh.fraction.is_empty();
     for (d, name) in mesh.domains.iter().enumerate() {
         let material = if own { name } else { "SOLID" };
         if own || d == 0 {

@@ -26,7 +26,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         }
         text.push('\n');
     })?;
-    let own = text.own_materials;
+    let own = !mesh.fraction.is_empty();
     for (d, name) in mesh.domains.iter().enumerate() {
         let number = if own { d + 1 } else { 1 };
         if own || d == 0 {
