@@ -521,7 +521,8 @@ class Solid(Seen, Simulated):
         component is a solid. ``protocol`` is "ap214" or "ap242".
 
         Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
-        rational B-splines. A ValueError for a region that cuts them, and beams that run into each other without a node.
+        rational B-splines; where a box, a tetrahedron, half-spaces or an intersection of these cuts them, the cuts are planar
+        faces. A ValueError for other regions that cut them, and beams that run into each other without a node.
 
         Of lattices and blends of them in a box the surface is bicubic patches, with planar faces in the box's planes.
         Patches are no farther than ``tolerance`` (mm; default: a thousandth of ``wavelength``) from the surface, and have its

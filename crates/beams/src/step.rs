@@ -8,15 +8,17 @@
 use std::collections::HashMap;
 use std::io;
 
+use geometry::fault::Fault;
 use geometry::formats::part21::{Id, Part21, Product, Title, list, real, spline_curve};
-use geometry::math::{Vec3, add};
+use geometry::math::{Vec3, add, cross};
 use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
 use crate::quador::brep::{Brep, CurveKey, Surface, Use};
+use crate::quador::slice::Plane;
 
 /// What a STEP file contains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepSummary {
     /// Number of solids: connected components.
     pub solids: usize,
@@ -26,32 +28,64 @@ pub struct StepSummary {
     pub edges: usize,
     /// Number of vertices.
     pub vertices: usize,
+    /// Enclosed volume, mm³.
+    pub volume: f64,
 }
 
-/// Writes the boundary of a quador lattice as a STEP file (mm). The same lattice gives the same bytes.
+/// Writes the boundary of a quador lattice, or of what is behind all of some planes (on the side away from their normals), as a
+/// STEP file (mm). The same lattice gives the same bytes.
 ///
 /// # Errors
-/// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close; failures of the output.
-pub fn write_step(quadors: &Quadors, title: Title, out: &mut dyn io::Write) -> Result<StepSummary, Stopped> {
-    let brep = quadors.brep().map_err(Stopped::Refused)?;
-    write(&brep, title, out).map_err(Stopped::Io)
+/// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close; planes that touch the boundary and
+/// cut nothing there, or that leave nothing; closed cavities; failures of the output.
+pub fn write_step(
+    quadors: &Quadors,
+    planes: &[Plane],
+    title: Title,
+    out: &mut dyn io::Write,
+) -> Result<StepSummary, Stopped> {
+    let refused = |message: &str| Stopped::Refused(Fault::new("region", message));
+    let brep = quadors.brep(planes).map_err(Stopped::Refused)?;
+    let components = brep.components();
+    if components.is_empty() {
+        return Err(refused("no beam is in the region"));
+    }
+    let mut volume = 0.0;
+    for faces in &components {
+        checkpoint();
+        let within =
+            brep.volume(faces).ok_or_else(|| refused("a face is too thin to be resolved: move the region a little"))?;
+        if within <= 0.0 {
+            return Err(refused(
+                "the beams enclose a cavity, which a STEP file of them cannot have: make them thinner",
+            ));
+        }
+        volume += within;
+    }
+    write(&brep, (&components, volume), title, out).map_err(Stopped::Io)
 }
 
-fn write(brep: &Brep, title: Title, out: &mut dyn io::Write) -> io::Result<StepSummary> {
+fn write(
+    brep: &Brep,
+    (components, volume): (&[Vec<u32>], f64),
+    title: Title,
+    out: &mut dyn io::Write,
+) -> io::Result<StepSummary> {
     let mut file = Part21::new(out, title)?;
     let product = Product::write(&mut file)?;
     let planar = file.parameter_plane()?;
     let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
     let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
     let mut solids = Vec::new();
-    for faces in brep.components() {
-        solids.push(writer.solid(&faces)?);
+    for faces in components {
+        solids.push(writer.solid(faces)?);
     }
     let summary = StepSummary {
         solids: solids.len(),
         faces: brep.faces.len(),
         edges: writer.edges.iter().flatten().count(),
         vertices: writer.corners.iter().flatten().count(),
+        volume,
     };
     let Writer { mut file, .. } = writer;
     product.finish(&mut file, &solids)?;
@@ -149,6 +183,10 @@ impl Writer<'_> {
                 let curve = self.file.entity(&spline_curve(&points, Some(&[1.0, meridian.weight, 1.0])))?;
                 self.file.entity(&format!("SURFACE_OF_REVOLUTION('',{curve},{axis})"))
             }
+            Surface::Plane { origin, axes: [u, v] } => {
+                let at = self.placement(add(center, origin), cross(u, v), u)?;
+                self.file.entity(&format!("PLANE('',{at})"))
+            }
             Surface::Rational { chart, range } => {
                 let (net, weights) = chart.net(range);
                 let sign = weights[1][1].signum();
@@ -245,8 +283,8 @@ mod tests {
 
     fn text() -> (String, StepSummary) {
         let mut out = Vec::new();
-        let made =
-            write_step(&lattice(), Title { name: "it's", ..Title::default() }, &mut out).expect("written to memory");
+        let made = write_step(&lattice(), &[], Title { name: "it's", ..Title::default() }, &mut out)
+            .expect("written to memory");
         (String::from_utf8(out).expect("ASCII"), made)
     }
 

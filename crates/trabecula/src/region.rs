@@ -224,6 +224,11 @@ pub trait Shape: Field {
         None
     }
 
+    /// The half-spaces of which the shape is the intersection, if it is one.
+    fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
+        None
+    }
+
     /// Exact volume (mm³) where it is known in closed form.
     fn volume(&self) -> Option<f64>;
 }

@@ -15,7 +15,7 @@ use geometry::math::{Vec3, add, apply, cross, determinant, dot, eigen, scale, su
 
 use super::complex::{Complex, Face};
 use super::conic::Conic;
-use super::hub::Hub;
+use super::hub::{HalfBeam, Hub};
 use super::hub_quadric::Quadric;
 
 /// The boundary form of one face.
@@ -87,14 +87,7 @@ impl BoundaryForm {
         let q = &face.quadric;
         let arcs = || face.loops.iter().flatten().map(|&(a, _)| a as usize);
         if let Some(half_beam) = face.end_circle {
-            let s = &hub.half_beams[half_beam as usize];
-            return Some(BoundaryForm {
-                quadric: *q,
-                base: [0.0; 3],
-                normal: s.axis,
-                along: s.axis,
-                projection: Projection::Axial(s.meridian, s.split),
-            });
+            return Some(BoundaryForm::of_beam(q, &hub.half_beams[half_beam as usize]));
         }
         if face.label == 0 {
             // The opposite point is on the axis of a half-beam.
@@ -117,6 +110,38 @@ impl BoundaryForm {
                 .find(|form| arcs().all(|a| form.is_clear(&complex.arcs[a].conic, ends[a], least)))
         };
         found(PREFERRED_CLEARANCE).or_else(|| BoundaryForm::around_hyperboloid_axis(q)).or_else(|| found(MIN_CLEARANCE))
+    }
+
+    /// The boundary form of a part of a quadric within some points, by the first of some base points that suits them.
+    pub(super) fn within(q: &Quadric, bases: impl Iterator<Item = Vec3>, points: &[Vec3]) -> Option<BoundaryForm> {
+        let clearance = |form: &BoundaryForm| match form.projection {
+            Projection::Central(nu) => {
+                let at = points.iter().map(|x| 1.0 + 0.5 * nu * dot(form.normal, sub(*x, form.base)));
+                at.fold(f64::INFINITY, f64::min)
+            }
+            Projection::Axial(..) => f64::INFINITY,
+        };
+        let mut best: Option<(f64, BoundaryForm)> = None;
+        for form in bases.filter_map(|base| BoundaryForm::central(q, base)) {
+            let at = clearance(&form);
+            if best.as_ref().is_none_or(|b| at > b.0) {
+                best = Some((at, form));
+            }
+            if at > PREFERRED_CLEARANCE {
+                break;
+            }
+        }
+        let (at, form) = best?;
+        match at {
+            v if v > PREFERRED_CLEARANCE => Some(form),
+            v => BoundaryForm::around_hyperboloid_axis(q).or((v > MIN_CLEARANCE).then_some(form)),
+        }
+    }
+
+    /// The boundary form of a beam, given as one of its half-beams.
+    pub(super) fn of_beam(q: &Quadric, s: &HalfBeam) -> BoundaryForm {
+        let projection = Projection::Axial(s.meridian, s.split);
+        BoundaryForm { quadric: *q, base: [0.0; 3], normal: s.axis, along: s.axis, projection }
     }
 
     /// Central projection with base point `base`.

@@ -12,12 +12,15 @@ use geometry::union_find::{find, unite};
 use super::Quadors;
 use super::bezier::Bezier;
 use super::hub_quadric::Quadric;
+use super::slice::Plane;
 use super::stereographic::Stereographic;
 
 mod cuts;
 mod face_surfaces;
 mod outline;
 mod parameter_curves;
+mod plane_trim;
+mod volume;
 
 pub(crate) use parameter_curves::CurveKey;
 
@@ -57,6 +60,8 @@ enum Kind {
     Beam(u32),
     /// A fillet, with the axis of one of its half-beams.
     Fillet(Vec3),
+    /// A planar face where the lattice is trimmed.
+    Cap,
 }
 
 /// The surface of a face, in the frame of its hub.
@@ -73,6 +78,8 @@ pub(crate) enum Surface {
     Revolution { axis: Vec3, side: Vec3, meridian: Bezier<3> },
     /// Any quadric as a rational biquadratic patch over ranges of s and t.
     Rational { chart: Stereographic, range: [[f64; 2]; 2] },
+    /// A plane, by one of its points, and by unit vectors along u and v; u × v points out of the solid.
+    Plane { origin: Vec3, axes: [Vec3; 2] },
 }
 
 /// The frame of a face: relative to the centre of a hub. That of a beam also refers to its other hub.
@@ -113,12 +120,12 @@ pub(crate) struct Brep<'a> {
 }
 
 impl Quadors {
-    /// The boundary as faces, edges and vertices.
+    /// The boundary as faces, edges and vertices, of what is behind all of some planes: on the side away from their normals.
     ///
     /// # Errors
     /// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close, and faces that
-    /// have no rational form.
-    pub(crate) fn brep(&self) -> Result<Brep<'_>, Fault> {
+    /// have no rational form; planes that touch the boundary and cut nothing there.
+    pub(crate) fn brep(&self, planes: &[Plane]) -> Result<Brep<'_>, Fault> {
         self.require_closed_forms()?;
         if let Some(found) = self.collisions().first() {
             let [a, b] = found.beams;
@@ -132,6 +139,7 @@ impl Quadors {
         let mut brep = Brep { quadors: self, corners: Vec::new(), edges: Vec::new(), faces: Vec::new() };
         brep.outline()?;
         brep.set_surfaces()?;
+        brep.trim(planes)?;
         brep.divide_edges();
         Ok(brep)
     }
@@ -233,21 +241,28 @@ impl Brep<'_> {
         out
     }
 
-    /// The connected components, as numbers of faces.
+    /// The connected components of the boundary, as numbers of faces.
     pub(crate) fn components(&self) -> Vec<Vec<u32>> {
-        let mut to: Vec<u32> = (0..self.quadors.len() as u32).collect();
-        for [a, b] in &self.quadors.ends {
-            unite(&mut to, *a, *b);
+        let count = self.faces.len();
+        let mut to: Vec<u32> = (0..count as u32).collect();
+        let mut first: Vec<u32> = vec![NONE; self.edges.len()];
+        for (i, face) in (0..).zip(&self.faces) {
+            for (edge, _) in self.loops(face).into_iter().flatten() {
+                match first[edge as usize] {
+                    NONE => first[edge as usize] = i,
+                    other => _ = unite(&mut to, other, i),
+                }
+            }
         }
-        let mut number = vec![NONE; to.len()];
+        let mut number = vec![NONE; count];
         let mut out: Vec<Vec<u32>> = Vec::new();
-        for (i, face) in self.faces.iter().enumerate() {
-            let root = find(&mut to, face.frame.hub) as usize;
+        for i in 0..count as u32 {
+            let root = find(&mut to, i) as usize;
             if number[root] == NONE {
                 number[root] = out.len() as u32;
                 out.push(Vec::new());
             }
-            out[number[root] as usize].push(i as u32);
+            out[number[root] as usize].push(i);
         }
         out
     }

@@ -54,15 +54,29 @@ impl Quadric {
         -self.c / (one + (one * one - self.c * two).max(0.0).sqrt())
     }
 
-    /// The points whose normals are parallel to a coordinate axis, two each; `None` on cylinders and paraboloids, which
-    /// may have none.
-    pub(super) fn axis_extremes(&self) -> Option<[Vec3; 6]> {
+    /// The centre, and the inverse of M; `None` for cylinders and paraboloids.
+    fn center(&self) -> Option<(Vec3, Mat3)> {
         let size = self.m.iter().flatten().fold(0.0f64, |a, v| a.max(v.abs()));
         if determinant(&self.m).abs() < 1e-9 * size.powi(3) {
             return None;
         }
         let inverse = inverse(&self.m);
-        let middle = scale(apply(&inverse, self.b), -1.0);
+        Some((scale(apply(&inverse, self.b), -1.0), inverse))
+    }
+
+    /// The two points whose normals are parallel to n; `None` for cylinders and paraboloids, and where no point has
+    /// that normal.
+    pub(super) fn extremes(&self, n: Vec3) -> Option<[Vec3; 2]> {
+        let (middle, inverse) = self.center()?;
+        let along = apply(&inverse, n);
+        let s = (-self.at(middle) / dot(n, along)).sqrt();
+        s.is_finite().then(|| [s, -s].map(|s| add(middle, scale(along, s))))
+    }
+
+    /// The points whose normals are parallel to a coordinate axis, two each; `None` on cylinders and paraboloids, which
+    /// may have none.
+    pub(super) fn axis_extremes(&self) -> Option<[Vec3; 6]> {
+        let (middle, inverse) = self.center()?;
         // Mx + b = s e with Q = 0; NaN where no point has that normal.
         let rest = -self.at(middle);
         Some(core::array::from_fn(|k| {

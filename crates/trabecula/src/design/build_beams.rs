@@ -19,11 +19,13 @@ use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::kind::DesignError;
+use crate::region::HalfSpace;
 use crate::truss::{Beams, Truss, fill};
+use ::beams::Plane;
 use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
-use geometry::math::{Vec3, norm};
+use geometry::math::{Aabb, Vec3, norm, scale};
 use geometry::progress::checkpoint;
 
 pub(super) use beam_report::{held, inside, lone, report, share};
@@ -142,13 +144,34 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
     })
 }
 
-/// The beams that a design is made of, if of nothing else, for a STEP file.
-pub(super) fn exact(built: &Built) -> Result<Arc<Quadors>, Fault> {
-    lone_beams(built, |why| {
+/// The beams that a design is made of, if of nothing else, for a STEP file; and the planes behind which they are kept.
+pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> {
+    let fault = |why: &str| {
         let message =
             format!("a STEP file has the exact surface of beams alone, and {why}; write a mesh (3mf, stl) instead");
         Fault::new("", message)
-    })
+    };
+    let (quadors, whole) = apart(built, &fault)?;
+    if whole {
+        return Ok((quadors, Vec::new()));
+    }
+    let Some(sides) = built.solid.region.half_spaces() else {
+        return Err(fault(
+            "the region cuts some along other surfaces than those of a box, a tetrahedron, half-spaces or an intersection of \
+             these",
+        ));
+    };
+    let crossed = |side: &HalfSpace| {
+        let beyond = |b: Aabb| {
+            let half = scale(b.size(), 0.5);
+            let reach: f64 = (0..3).map(|a| half[a] * side.normal()[a].abs()).sum();
+            side.value(b.center()) + reach > 0.0
+        };
+        (0..quadors.len()).any(|hub| beyond(quadors.hub_bounds(hub)))
+    };
+    let planes = sides.iter().filter(|s| crossed(s)).map(|s| Plane::new(s.point(), s.normal()));
+    let planes = planes.collect::<Result<Vec<Plane>, Fault>>()?;
+    Ok((quadors, planes))
 }
 
 /// The only beams of a design that is made of nothing else, though its region may cut them; or why it is not.
@@ -165,9 +188,9 @@ pub(super) fn only(built: &Built) -> Result<&(String, Beams), &'static str> {
     Ok(beams)
 }
 
-fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quadors>, Fault> {
-    let refuse = |why: &str| Err(fault(why));
-    let (_, beams) = only(built).map_err(&fault)?;
+/// The beams that a design is made of, if of nothing else and if none run into each other; and whether the region cuts none.
+fn apart(built: &Built, fault: &impl Fn(&str) -> Fault) -> Result<(Arc<Quadors>, bool), Fault> {
+    let (_, beams) = only(built).map_err(fault)?;
     let (quadors, apart, whole) = match beams {
         Beams::Truss(t) => (t.quadors.clone(), t.collisions.is_empty(), t.whole),
         Beams::Pattern(laid) => {
@@ -178,17 +201,22 @@ fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quador
         }
     };
     if !apart {
-        return refuse("some of these run into each other without a common node");
+        return Err(fault("some of these run into each other without a common node"));
     }
-    if !whole {
-        return refuse(match beams {
-            Beams::Truss(t) if t.trim != Trim::Drop => {
-                "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")"
-            }
-            _ => "the region cuts some (make it larger by a hub's radius)",
-        });
+    Ok((quadors, whole))
+}
+
+fn lone_beams(built: &Built, fault: impl Fn(&str) -> Fault) -> Result<Arc<Quadors>, Fault> {
+    let (quadors, whole) = apart(built, &fault)?;
+    if whole {
+        return Ok(quadors);
     }
-    Ok(quadors)
+    Err(fault(match only(built) {
+        Ok((_, Beams::Truss(t))) if t.trim != Trim::Drop => {
+            "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")"
+        }
+        _ => "the region cuts some (make it larger by a hub's radius)",
+    }))
 }
 
 /// Errors in the radius of the thinnest beam, unless another resolution is asked for: a circle has eighteen edges.

@@ -24,9 +24,9 @@ pub(super) fn write(
             let message = "tolerance is of patches on lattices; a STEP file of beams is exact: leave it out";
             return refuse("tolerance", message);
         }
-        let quadors = build_beams::exact(built).map_err(Stopped::Refused)?;
-        let StepSummary { solids, faces, edges, vertices } = write_step(&quadors, title, out)?;
-        let volume = quadors.volume().map_err(Stopped::Refused)?;
+        let (quadors, planes) = build_beams::exact(built).map_err(Stopped::Refused)?;
+        let made = write_step(&quadors, &planes, title, out)?;
+        let StepSummary { solids, faces, edges, vertices, volume } = made;
         return Ok(StepReport { solids, faces, edges, vertices, volume, deviation: 0.0, angle: None });
     }
     if !built.beams.is_empty() {

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::halfspace::polyhedron_bounds;
 use super::meshes::{List, Meshes};
-use super::{BuildRegion, CadMesh, Context, Cut, MeshRegion, Region, RegionKind, Shape, bodies};
+use super::{BuildRegion, CadMesh, Context, Cut, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -142,7 +143,12 @@ impl Join for Intersection {
         a.max(b)
     }
     fn extent(&self) -> Aabb {
-        self.regions().iter().map(|r| r.bounds()).fold(Aabb::ALL, Aabb::intersection)
+        let bounds = self.regions().iter().map(|r| r.bounds()).fold(Aabb::ALL, Aabb::intersection);
+        match self.half_spaces() {
+            // Slanted ones may end it together.
+            Some(sides) if !bounds.is_finite() => bounds.intersection(polyhedron_bounds(&sides)),
+            _ => bounds,
+        }
     }
 }
 
@@ -289,6 +295,19 @@ macro_rules! joined {
                 any.then(|| Arc::new(Self(List::new(regions))) as Region)
             }
 
+            fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
+                let mut out = Vec::new();
+                for (i, r) in self.regions().iter().enumerate() {
+                    let own = r.half_spaces().filter(|_| Self::ALL || self.regions().len() == 1)?;
+                    match &own[..] {
+                        [one] if self.negated(i) => out.push(one.complement()),
+                        _ if self.negated(i) => return None,
+                        all => out.extend(all),
+                    }
+                }
+                Some(out)
+            }
+
             fn volume(&self) -> Option<f64> {
                 match self.regions() {
                     [only] => only.volume(),
@@ -313,6 +332,18 @@ mod tests {
             Arc::new(Sphere::new([1.0, 0.2, 0.3], 0.9).unwrap()),
             Arc::new(Cylinder::new([0.0, 0.0, -2.0], [0.0, 0.0, 1.0], 0.4, 4.0).unwrap()),
         ]
+    }
+
+    #[test]
+    fn slanted_half_spaces_end_where_they_meet() {
+        let side = |n: Vec3| -> Region { Arc::new(HalfSpace::new(n.map(|v| 4.0 * v), n).unwrap()) };
+        let normals = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let tetrahedron = Intersection::new(normals.map(side).to_vec()).unwrap().bounds();
+        assert!((0..3).all(|a| (tetrahedron.min[a] + 12.0).abs() < 1e-9 && (tetrahedron.max[a] - 12.0).abs() < 1e-9));
+        let open = Intersection::new(normals[..3].iter().map(|n| side(*n)).collect()).unwrap().bounds();
+        assert!(!open.is_finite() && !open.is_empty());
+        let apart = [side([1.0, 1.0, 0.0]), Arc::new(HalfSpace::new([9.0; 3], [-1.0, -1.0, 0.0]).unwrap())];
+        assert!(Intersection::new(apart.to_vec()).unwrap().bounds().is_empty());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows, flat, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, Region, Shape};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -139,6 +139,15 @@ impl Shape for Cuboid {
         }
         let sides = (0..3).flat_map(|axis| [(axis, self.min[axis] - by, false), (axis, self.max[axis] + by, true)]);
         CsgTree::Intersection(sides.map(|s| flat(s, out)).collect())
+    }
+
+    fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
+        let side = |(axis, upper): (usize, bool)| {
+            let mut normal = [0.0; 3];
+            normal[axis] = if upper { 1.0 } else { -1.0 };
+            HalfSpace { point: if upper { self.max } else { self.min }, normal }
+        };
+        Some((0..3).flat_map(|a| [(a, false), (a, true)]).map(side).collect())
     }
 
     fn volume(&self) -> Option<f64> {

@@ -9,7 +9,7 @@ use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Interval, Vec3, add, dot, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 
 /// One side of a plane; it bounds nothing alone, so combine it.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
@@ -60,6 +60,11 @@ impl HalfSpace {
         self.normal
     }
 
+    /// The other side of the plane.
+    pub(super) fn complement(&self) -> HalfSpace {
+        HalfSpace { point: self.point, normal: scale(self.normal, -1.0) }
+    }
+
     #[inline]
     pub(super) fn distance(&self, p: Vec3) -> f64 {
         dot(sub(p, self.point), self.normal)
@@ -72,6 +77,37 @@ impl HalfSpace {
     pub(super) fn range(&self, b: &Aabb) -> Interval {
         along(b, self.point, self.normal)
     }
+}
+
+/// A distance (mm) beyond all parts.
+const FAR: f64 = 1e7;
+
+/// The bounds of an intersection of half-spaces, infinite where it has no end: of the corners that planes make, those of a large box
+/// included.
+pub(super) fn polyhedron_bounds(sides: &[HalfSpace]) -> Aabb {
+    let mut planes: Vec<(Vec3, f64)> = sides.iter().map(|s| (s.normal, dot(s.normal, s.point))).collect();
+    for a in 0..3 {
+        for sign in [-1.0, 1.0] {
+            planes.push(([0, 1, 2].map(|b| if a == b { sign } else { 0.0 }), FAR));
+        }
+    }
+    let mut bounds = Aabb::EMPTY;
+    for (i, p) in planes.iter().enumerate() {
+        for (j, q) in planes.iter().enumerate().take(i) {
+            for r in &planes[..j] {
+                let six = dot(p.0, cross(q.0, r.0));
+                let sum =
+                    add(scale(cross(q.0, r.0), p.1), add(scale(cross(r.0, p.0), q.1), scale(cross(p.0, q.0), r.1)));
+                let corner = scale(sum, 1.0 / six);
+                let slack = 1e-9 * (1.0 + norm(corner));
+                if six.abs() > 1e-9 && planes.iter().all(|s| dot(s.0, corner) <= s.1 + slack) {
+                    bounds = bounds.with(corner);
+                }
+            }
+        }
+    }
+    let ended = |v: f64| if v.abs() < 0.5 * FAR { v } else { v * f64::INFINITY };
+    Aabb { min: bounds.min.map(ended), max: bounds.max.map(ended) }
 }
 
 impl Shape for HalfSpace {
@@ -99,6 +135,10 @@ impl Shape for HalfSpace {
             Some(a) => flat((a, point[a], self.normal[a] > 0.0), out),
             None => one_surface(Arc::new(HalfSpace { point, ..*self }), out),
         }
+    }
+
+    fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
+        Some(vec![*self])
     }
 
     fn volume(&self) -> Option<f64> {

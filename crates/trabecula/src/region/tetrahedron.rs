@@ -143,6 +143,10 @@ impl Shape for Tetrahedron {
         if by == 0.0 { one_surface(self, out) } else { rounded(self, by, out) }
     }
 
+    fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
+        self.sharpness.is_none().then(|| self.planes.to_vec())
+    }
+
     fn volume(&self) -> Option<f64> {
         let [a, b, c, d] = self.corners;
         let volume = dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0;

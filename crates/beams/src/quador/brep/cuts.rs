@@ -1,8 +1,9 @@
 //! Cutting of faces by planes.
 
-use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::bezier::{Bezier, Path, section_tangent};
+use super::super::hub_quadric::Quadric;
 use super::{Brep, Face, Use};
 
 /// A plane in a hub's frame: normal · x + value = 0, with a unit normal.
@@ -10,6 +11,8 @@ use super::{Brep, Face, Use};
 pub(super) struct Plane {
     pub normal: Vec3,
     pub value: f64,
+    /// Distance from the plane within which a point is on it in any case, mm.
+    pub near: f64,
 }
 
 /// Distance from a plane within which a corner is on it, in lengths of the adjacent curve.
@@ -21,10 +24,38 @@ impl Plane {
         dot(self.normal, x) + self.value
     }
 
+    /// The plane through a point.
+    pub(super) fn through(point: Vec3, normal: Vec3) -> Plane {
+        Plane { normal, value: -dot(normal, point), near: 0.0 }
+    }
+
+    /// Distance within which points of a curve are on the plane.
+    fn tolerance(&self, curve: &Bezier<3>) -> f64 {
+        let [p, q, r] = curve.points;
+        self.near.max(ON_PLANE * (norm(sub(p, q)) + norm(sub(q, r))))
+    }
+
+    /// Whether a curve lies in the plane.
+    pub(super) fn has(&self, curve: &Bezier<3>) -> bool {
+        let near = self.tolerance(curve);
+        curve.points.iter().all(|p| self.at(*p).abs() <= near)
+    }
+
+    /// Whether a face is on the positive side of the plane where it meets a curve of its boundary, which has the face on its
+    /// left: next to the curve, if that lies in the plane.
+    pub(super) fn faces_above(&self, quadric: &Quadric, curve: &Bezier<3>) -> bool {
+        let middle = curve.at(0.5);
+        if self.has(curve) {
+            let along = sub(curve.points[2], curve.points[0]);
+            return dot(self.normal, cross(quadric.half_gradient(middle), along)) > 0.0;
+        }
+        self.at(middle) > 0.0
+    }
+
     /// The parameters strictly inside a curve at which it meets the plane: those of its ends do not count.
     pub(super) fn roots(&self, curve: &Bezier<3>) -> [Option<f64>; 2] {
         let [p, q, r] = curve.points;
-        let near = ON_PLANE * (norm(sub(p, q)) + norm(sub(q, r)));
+        let near = self.tolerance(curve);
         let [mut a, b, mut c] = [self.at(p), curve.weight * self.at(q), self.at(r)];
         for end in [&mut a, &mut c] {
             if end.abs() <= near {
@@ -90,7 +121,7 @@ impl Brep<'_> {
             }
         }
         let loops = self.loops(&self.faces[face as usize]);
-        let side = |of: &Use| plane.at(self.curve(*of, &frame).at(0.5)) > 0.0;
+        let side = |of: &Use| plane.faces_above(&quadric, &self.curve(*of, &frame));
         let sides: Vec<Vec<bool>> = loops.iter().map(|l| l.iter().map(side).collect()).collect();
         let mut crossings: Vec<Crossing> = Vec::new();
         for (boundary, l) in sides.iter().enumerate() {

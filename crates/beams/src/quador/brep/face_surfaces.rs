@@ -63,6 +63,7 @@ impl Brep<'_> {
                 self.faces[face as usize].surface = surface;
                 return Some(());
             }
+            Kind::Cap => return Some(()),
             Kind::Fillet(axis) if several => axis,
             Kind::Fillet(_) => return self.set_halved(face, HALVINGS),
         };
@@ -71,8 +72,8 @@ impl Brep<'_> {
         // Away from the symmetry planes of symmetric hubs.
         let (sin, cos) = 0.2_f64.sin_cos();
         let [one, two] = [add(scale(side, cos), scale(other, sin)), sub(scale(other, cos), scale(side, sin))];
-        for half in self.cut(face, &Plane { normal: one, value: 0.0 })? {
-            for quarter in self.cut(half, &Plane { normal: two, value: 0.0 })? {
+        for half in self.cut(face, &Plane::through([0.0; 3], one))? {
+            for quarter in self.cut(half, &Plane::through([0.0; 3], two))? {
                 if let Kind::Ball(_) = kind {
                     self.faces[quarter as usize].surface = self.sphere(quarter, axis)?;
                 } else {
@@ -174,7 +175,7 @@ impl Brep<'_> {
         }
         let halvings = halvings.checked_sub(1)?;
         let normal = longest(unit(quadric.half_gradient(origin)), &boundary);
-        let parts = self.cut(face, &Plane { normal, value: -dot(normal, origin) })?;
+        let parts = self.cut(face, &Plane::through(origin, normal))?;
         parts.into_iter().try_for_each(|part| self.set_halved(part, halvings))
     }
 }

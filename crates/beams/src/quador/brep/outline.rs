@@ -216,7 +216,7 @@ impl Brep<'_> {
         let through = curves.iter().map(|(_, c)| unit(cross(axis, c.points[0])));
         let mut best = (side, f64::NEG_INFINITY);
         for normal in through.chain((0..PLANES).map(turned)) {
-            let plane = Plane { normal, value: 0.0 };
+            let plane = Plane::through([0.0; 3], normal);
             let (mut clearance, mut crossings, mut at_corners) = (1.0f64, [0; 2], 0);
             for (half, curve) in &curves {
                 let [p, ..] = curve.points;
@@ -236,6 +236,6 @@ impl Brep<'_> {
                 best = (normal, score);
             }
         }
-        Plane { normal: best.0, value: 0.0 }
+        Plane::through([0.0; 3], best.0)
     }
 }

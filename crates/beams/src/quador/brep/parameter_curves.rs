@@ -1,6 +1,6 @@
 //! Curves of edges in the parameter planes of surfaces, with the same parameter as in space.
 //!
-//! On rational patches they are rational quadratic and exact, and on meridians they are segments. Other curves on cylinders,
+//! On rational patches and planes they are rational quadratic and exact, and on meridians they are segments. Other curves on cylinders,
 //! cones, spheres and surfaces of revolution are not rational: polynomials interpolate them at Chebyshev points, nearly
 //! to rounding.
 
@@ -59,6 +59,7 @@ impl Brep<'_> {
                     .into_iter()
                     .for_each(add);
             }
+            Surface::Plane { origin, axes: [u, v] } => [&origin[..], &u, &v, &[6.0]].into_iter().for_each(add),
         }
         key.map(f64::to_bits)
     }
@@ -77,6 +78,10 @@ impl Brep<'_> {
             let [k, l, m] = projected.map(|p| p.1);
             let points = projected.iter().map(|p| scaled(p.0)).collect();
             return (ParameterCurve { points, weights: Some(vec![k, curve.weight * l, m]) }, 0.0);
+        }
+        if let Surface::Plane { .. } = face.surface {
+            let points = curve.points.iter().map(|p| face.surface.parameters(*p)).collect();
+            return (ParameterCurve { points, weights: Some(vec![1.0, curve.weight, 1.0]) }, 0.0);
         }
         let off = |made: &ParameterCurve| {
             let deviation = (0..SAMPLES).map(|k| {
@@ -160,6 +165,7 @@ impl Surface {
                 around(axis, side, dot(x, side), dot(x, axis))
             }
             Surface::Rational { chart, .. } => chart.at([u, v]),
+            Surface::Plane { origin, axes } => add(origin, add(scale(axes[0], u), scale(axes[1], v))),
         }
     }
 
@@ -171,6 +177,7 @@ impl Surface {
             | Surface::Sphere { axis, side, .. }
             | Surface::Revolution { axis, side, .. } => (axis, side),
             Surface::Rational { chart, .. } => return chart.project(x).0,
+            Surface::Plane { origin, axes } => return axes.map(|a| dot(sub(x, origin), a)),
         };
         let z = dot(x, axis);
         let [a, b] = [dot(x, side), dot(x, cross(axis, side))];

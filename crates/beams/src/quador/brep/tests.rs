@@ -5,7 +5,7 @@ use super::parameter_curves::ParameterCurve;
 use super::*;
 use crate::graph::{Beam, Graph, Hub, Profile, catalogue, named};
 use crate::quador::Fillet;
-use geometry::math::{cross, dot, norm, unit};
+use geometry::math::{cross, dot, norm, scale, unit};
 
 /// How far edges are off faces, relative to the distance from the hub's centre. The planes of seams are displaced by some 1e-12
 /// radii so that events are apart; arcs of up to 1e-7 radii that nearly coinciding events leave are collapsed, which
@@ -47,7 +47,22 @@ struct Checked {
 
 /// Checks topology and geometry of a boundary.
 fn check(q: &Quadors) -> Checked {
-    let brep = q.brep().expect("a boundary");
+    let brep = q.brep(&[]).expect("a boundary");
+    let (checked, euler) = check_brep(&brep);
+    // A component of the graph with as many cycles as its genus.
+    assert_eq!(euler, 2 * (q.len() as i64 - q.beams() as i64));
+    let (volume, want) = (volume(&brep), q.volume().expect("a volume"));
+    assert!((volume / want - 1.0).abs() < 1e-9, "{volume} {want}");
+    checked
+}
+
+/// The volume within a boundary.
+fn volume(brep: &Brep) -> f64 {
+    brep.components().iter().map(|faces| brep.volume(faces).expect("boundary forms")).sum()
+}
+
+/// The same of any boundary, and its Euler number.
+fn check_brep(brep: &Brep) -> (Checked, i64) {
     let mut uses: HashMap<u32, Vec<bool>> = HashMap::new();
     let (mut corners, mut rings, mut off) = (HashSet::new(), 0i64, [0; 2]);
     for face in &brep.faces {
@@ -62,8 +77,8 @@ fn check(q: &Quadors) -> Checked {
                 let end = brep.start((of.0, !of.1));
                 assert_eq!(end, brep.start(next), "loops are closed");
                 corners.insert(end);
-                check_edge(&brep, face, of, &curve, &mut off);
-                area += swept(&brep, face, of);
+                check_edge(brep, face, of, &curve, &mut off);
+                area += swept(brep, face, of);
             }
         }
         // Counter-clockwise in the parameter plane, whose normal points outwards.
@@ -74,11 +89,10 @@ fn check(q: &Quadors) -> Checked {
         assert!(of.len() == 2 && of[0] != of[1], "edge {edge} is used {of:?}");
     }
     let euler = corners.len() as i64 - uses.len() as i64 + brep.faces.len() as i64 - rings;
-    // A component of the graph with as many cycles as its genus.
-    assert_eq!(euler, 2 * (q.len() as i64 - q.beams() as i64));
     let shells = brep.components();
     assert_eq!(shells.iter().map(Vec::len).sum::<usize>(), brep.faces.len());
-    Checked { counts: [corners.len(), uses.len(), brep.faces.len()], coarse: off[1] as f64 / off[0] as f64 }
+    let counts = [corners.len(), uses.len(), brep.faces.len()];
+    (Checked { counts, coarse: off[1] as f64 / off[0] as f64 }, euler)
 }
 
 /// An edge begins and ends in its corners, and lies on the face, in space and by its curve in the parameter plane.
@@ -148,7 +162,7 @@ fn a_simple_cubic_hub_has_its_known_faces() {
     let ends: Vec<_> = six().into_iter().map(|u| (u, 10.0, 1.0)).collect();
     let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.7)).expect("a star");
     let of_hub = |kind: fn(&Kind) -> bool| {
-        let brep = q.brep().expect("a boundary");
+        let brep = q.brep(&[]).expect("a boundary");
         brep.faces.iter().filter(|f| f.frame.hub == 0 && kind(&f.kind)).count()
     };
     check(&q);
@@ -177,7 +191,7 @@ fn equal_hubs_have_equal_curves() {
         let graph = block("octet", n, |_| 0.4, |_| Profile::Cone);
         let q = Quadors::new(&graph, Fillet::Auto).expect("a block");
         check(&q);
-        let brep = q.brep().expect("a boundary");
+        let brep = q.brep(&[]).expect("a boundary");
         let used =
             |face: &Face| brep.loops(face).concat().into_iter().map(|u| brep.curve_key(face, u.0)).collect::<Vec<_>>();
         brep.faces.iter().flat_map(used).collect::<HashSet<CurveKey>>().len()
@@ -230,7 +244,57 @@ fn components_are_shells_and_collisions_are_refused() {
     };
     let apart = Quadors::new(&crossed(3.0), Fillet::Auto).expect("two rods and a ball");
     check(&apart);
-    assert_eq!(apart.brep().expect("a boundary").components().len(), 3);
+    assert_eq!(apart.brep(&[]).expect("a boundary").components().len(), 3);
     let crossing = Quadors::new(&crossed(1.0), Fillet::Auto).expect("two rods and a ball");
-    assert!(crossing.brep().is_err_and(|fault| fault.message.contains("intersect without a common hub")));
+    assert!(crossing.brep(&[]).is_err_and(|fault| fault.message.contains("intersect without a common hub")));
+}
+
+/// What is behind a plane and what is in front of it are closed, and together the whole.
+fn check_halves(q: &Quadors, point: Vec3, normal: Vec3, name: &str) {
+    let of = |normal: Vec3| Plane::new(point, normal).expect("a plane");
+    let [behind, front] = [of(normal), of(scale(normal, -1.0))].map(|plane| {
+        let brep = q.brep(&[plane]).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
+        check_brep(&brep);
+        volume(&brep)
+    });
+    let want = q.volume().expect("a volume");
+    assert!(((behind + front) / want - 1.0).abs() < 1e-8, "{name}: {behind} + {front} = {want}");
+}
+
+#[test]
+fn halves_of_cells_are_closed_and_make_the_whole() {
+    let directions = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.3, -0.5, 0.8]];
+    for cell in catalogue() {
+        for fillet in [Fillet::Auto, Fillet::None] {
+            let graph = block(cell.name, 1, |_| 0.4, |_| Profile::Cylinder);
+            let q = Quadors::new(&graph, fillet).expect("a cell");
+            // Through nodes, axes and the symmetry planes of hubs, and through none of them.
+            for point in [[0.0; 3], [5.0; 3], [3.1, 4.3, 5.7]] {
+                for normal in directions {
+                    check_halves(&q, point, normal, &format!("{} {fillet:?} {point:?} {normal:?}", cell.name));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn random_frames_are_cut_by_random_planes() {
+    let mut random = Random(23);
+    for fillet in [Fillet::Auto, Fillet::Tau(0.8), Fillet::None] {
+        let mut graph = block("sc", 2, |_| 0.0, |_| Profile::Cone);
+        for hub in &mut graph.hubs {
+            hub.center = hub.center.map(|v| v + 3.0 * random.next());
+            hub.radius = 0.5 + 0.5 * random.next();
+        }
+        for beam in &mut graph.beams {
+            beam.profile = if random.next() < 0.5 { Profile::Cone } else { Profile::Mid(0.3 + 0.9 * random.next()) };
+        }
+        let q = Quadors::new(&graph, fillet).expect("a frame");
+        for _ in 0..16 {
+            let point = [0; 3].map(|_| 20.0 * random.next());
+            let normal = [0; 3].map(|_| 2.0 * random.next() - 1.0);
+            check_halves(&q, point, normal, &format!("{fillet:?} {point:?} {normal:?}"));
+        }
+    }
 }
