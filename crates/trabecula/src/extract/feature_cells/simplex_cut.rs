@@ -303,6 +303,9 @@ pub(in crate::extract) fn section(right: bool, negative: usize) -> &'static [u8]
     &SECTIONS[usize::from(right)][negative]
 }
 
+/// Least barycentric coordinate of a point that stands for one beyond the simplex.
+const INNER: f64 = 1e-3;
+
 /// Barycentric coordinates of the point of a simplex where as many functions vanish as it has dimensions, given their values at
 /// the corners.
 fn barycentric(values: &[[f64; 4]; 3], dimensions: usize) -> [f64; 4] {
@@ -327,7 +330,18 @@ fn barycentric(values: &[[f64; 4]; 3], dimensions: usize) -> [f64; 4] {
         }
     };
     let sum: f64 = w.iter().sum();
-    w.map(|x| (x / sum).clamp(0.0, 1.0))
+    let w = w.map(|x| x / sum);
+    if w.iter().all(|x| (0.0..=1.0).contains(x)) {
+        return w;
+    }
+    // Signs along a grid edge follow the order of its crossings, which values at its ends may contradict: the functions then vanish
+    // beyond the simplex, and the nearest point within stands for that.
+    let mut inner = [0.0; 4];
+    for c in 0..=dimensions.min(3) {
+        inner[c] = w[c].clamp(INNER, 1.0);
+    }
+    let sum: f64 = inner.iter().sum();
+    inner.map(|x| x / sum)
 }
 
 /// Lists the first bits of a word; returns how many there are.
