@@ -575,3 +575,28 @@ def test_a_chord_error_takes_the_place_of_a_spacing():
     for chord in (0, -1, float("nan")):
         with pytest.raises(ValueError, match="chord"):
             solid.mesh(chord=chord)
+
+
+@pytest.mark.parametrize(("cell", "wavelength", "more"), [
+    ("diamond", 8, {"fillet": {"radius": 0.2}, "radius": lt.grade.linear([0, 0, 1], {0: 0.2, 16: 0.4})}),
+    ("kelvin", [8, 8, 16], {
+        "fillet": "auto",
+        "radius": lt.grade.linear([0, 0, 1], {0: 0.3, 16: 0.7}),
+        "hub": lt.grade.formula("0.45+0.03*z"),
+    }),
+])  # fmt: skip
+def test_filleted_beams_of_many_sizes_are_meshed_within_any_chord_error(cell, wavelength, more):
+    """A triangulation that fails at one chord error is found at a smaller one."""
+    box = lt.region.box(min=[-1, -1, -1], max=[17, 17, 17])
+    solid = built(box, cell=cell, map=lt.map.affine(wavelength=wavelength), trim="drop", dangling="drop", **more)
+    for chord in (None, 0.004, 0.005, 0.01, 0.02):
+        mesh = solid.mesh(chord=chord)
+        assert mesh.closed and mesh.volume == pytest.approx(told(solid).volume, rel=1e-6)
+
+
+def test_beams_may_be_called_as_one_of_their_keys_is(tmp_path):
+    beams = lt.Beams(cell="bcc", map=lt.map.affine(wavelength=5), radius=0.4)
+    assert list(lt.Design(region=BOX, beams={"struts": beams}).build().beams) == ["struts"]
+    (tmp_path / "a.toml").write_text("schema = 1\nregion.box.size = [9, 9, 9]\nbeams.struts = [[0, 1]]\n")
+    with pytest.raises(lt.DesignError, match=r"a name comes first, such as \[beams.core\] with struts"):
+        lt.load(tmp_path / "a.toml")

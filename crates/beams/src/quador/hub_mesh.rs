@@ -14,13 +14,16 @@ use geometry::mesh::Mesh;
 
 use super::Quadors;
 use super::hub::HalfBeam;
-use super::integral::{DEFAULT_ORDER, hub_mass, unresolved_face};
+use super::integral::{DEFAULT_ORDER, hub_mass};
 use super::tessellation::{HubMesh, Tessellation};
 
 /// Number of representative hubs meshed to estimate the number of triangles.
 const ESTIMATE_HUBS: usize = 16;
 /// Minimum chord error used for the estimate, in typical radii; below it the number is extrapolated.
 const MIN_ESTIMATE_CHORD: f64 = 0.01;
+
+/// Shares of the chord error that are tried, where a hub cannot be triangulated within it or triangles of beams that nearly touch cross.
+const FINER: [f64; 7] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125];
 
 fn check(chord: f64) -> Result<(), Fault> {
     if chord > 0.0 && chord.is_finite() {
@@ -43,9 +46,14 @@ impl Quadors {
         let classes = self.classes();
         let step = classes.sample.len().div_ceil(ESTIMATE_HUBS);
         let each = (0..classes.sample.len()).into_par_iter().step_by(step).map(|c| {
-            let mesh = self.hub_mesh(classes.sample[c], coarse)?;
             let n = classes.count[c] as f64;
-            Ok([n * mesh.triangles.len() as f64, n])
+            let triangles = |finer: f64| {
+                let mesh = self.hub_mesh(classes.sample[c], finer * coarse)?;
+                Ok(finer * mesh.triangles.len() as f64)
+            };
+            let made = triangles(FINER[0]);
+            let finer = || FINER[1..].iter().find_map(|finer| triangles(*finer).ok());
+            Ok([n * made.or_else(|fault: Fault| finer().ok_or(fault))?, n])
         });
         let each = each.collect::<Result<Vec<[f64; 2]>, Fault>>()?;
         let sum = |k: usize| each.iter().map(|e| e[k]).sum::<f64>();
@@ -60,7 +68,15 @@ impl Quadors {
         let rings: Vec<usize> = of.half_beams.iter().map(circle_size).collect();
         let complex = self.complex(hub)?;
         let volume = hub_mass::<false>(&of, &complex, DEFAULT_ORDER).map(|m| m.volume);
-        HubMesh::new(&of, &complex, &rings, chord, volume).ok_or_else(|| unresolved_face(hub))
+        HubMesh::new(&of, &complex, &rings, chord, volume).ok_or_else(|| {
+            let message = format!(
+                "the surface of the hub at ({}) mm could not be triangulated within {} mm: give another chord error, or the spacing of \
+                 a grid (edge)",
+                self.center(hub).map(number).join(", "),
+                number(chord)
+            );
+            Fault::new("chord", message)
+        })
     }
 
     /// The surface as one triangle mesh within `chord` (mm) of it, and the greatest distance found, mm.
@@ -83,7 +99,7 @@ impl Quadors {
         let mut tessellation = Tessellation { quadors: self, classes: self.classes(), meshes: Vec::new(), chord };
         // If triangles of beams that nearly touch cross, or vertices cannot be moved, everything is refined.
         let mut fault = None;
-        for finer in [1.0, 0.5, 0.25, 0.125] {
+        for finer in FINER {
             tessellation.chord = chord * finer;
             let meshes = (tessellation.classes.sample.par_iter()).map(|&i| self.hub_mesh(i, tessellation.chord));
             match meshes.collect::<Result<_, _>>() {

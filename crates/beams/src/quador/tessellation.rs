@@ -16,7 +16,7 @@ use super::hub::{HalfBeam, Hub};
 use super::hub_classes::HubClasses;
 
 /// Shares of the chord error that are tried for triangles before their vertices are moved.
-const SHARES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
+const SHARES: [f64; 8] = [1.0, 0.7, 0.5, 0.35, 0.84, 0.6, 0.42, 0.25];
 
 /// A triangulated surface of beams.
 pub struct Tessellation<'a> {

@@ -13,7 +13,13 @@ pub struct BeamsSpecs(pub BTreeMap<String, BeamsSpec>);
 /// Explains that a name comes before the keys of beams.
 fn named_first(at: &At) -> Result<(), DesignError> {
     let keys = BeamsSpec::keys();
-    match at.entries("beams by name, such as [beams.core]")?.iter().find(|e| keys.iter().any(|k| k.name == e.0)) {
+    // Beams may be called as one of their keys is: then they say what they are made of.
+    let named = |at: &At| {
+        let graphs = ["cell", "nodes", "struts", "path", "pattern"];
+        at.entries("beams").is_ok_and(|all| all.iter().any(|e| graphs.contains(&e.0)))
+    };
+    let entries = at.entries("beams by name, such as [beams.core]")?;
+    match entries.iter().find(|e| keys.iter().any(|k| k.name == e.0) && !named(&e.1)) {
         Some((key, at)) => Err(at.error(format!("a name comes first, such as [beams.core] with {key}"))),
         None => Ok(()),
     }
