@@ -1,6 +1,7 @@
 """Cells that turn, from Python: builders, files made by NumPy, the report, and what is refused."""
 
 import struct
+import warnings
 import zlib
 
 import numpy as np
@@ -276,3 +277,36 @@ def test_what_a_map_misses_is_said_of_the_worst_axes():
     few, far = (spread({"mean": mean, "p95": mean, "max": most}) for mean, most in ((8.72, 60.0), (6.1, 70.0)))
     worst = type(off)(dict(off) | {"angle": [few, few, far]})
     assert "off by 8.7° on average, 70.0° at most" in str(worst)
+
+
+def test_a_range_of_stretch_makes_no_map_worse():
+    """Where the map without a range keeps to it, that is the map; where none does, it is the one that comes nearest."""
+    ring = lt.region.difference(lt.region.cylinder([0, 0, 0], 14, 8), lt.region.cylinder([0, 0, -1], 7, 12))
+
+    def stretch(**keys):
+        map = lt.map.phase(wavelength=3, align="surface", **keys)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", lt.DesignWarning)
+            built = lt.Design(region=ring, lattice=lt.Lattice("gyroid", "sheet", map, lt.level.fraction(0.3))).build()
+        return built.report().lattices["core"].distortion.stretch
+
+    free = stretch()
+    assert stretch(stretch=[0.6, 1.7]) == free and free[0] > 0.6 and free[1] < 1.7
+    held = stretch(stretch=[0.9, 1.1])
+    assert max(0.9 / held[0], held[1] / 1.1) <= max(0.9 / free[0], free[1] / 1.1) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("inner", [None, 7])
+def test_flat_ends_of_cylinders_are_fixed_by_boxes_about_them(inner):
+    """The rims lie in the boxes too, and are no faces of their own."""
+    region = lt.region.cylinder([0, 0, 0], 14, 8)
+    if inner:
+        region = lt.region.difference(region, lt.region.cylinder([0, 0, -1], inner, 12))
+    ends = [lt.region.box(min=[-15, -15, z - 0.1], max=[15, 15, z + 0.1]) for z in (0, 8)]
+    map = lt.map.phase(wavelength=3, fix=ends)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lt.DesignWarning)
+        solid = lt.Design(region=region, lattice=lt.Lattice("gyroid", "sheet", map, lt.level.fraction(0.3))).build()
+    # Three cells in 8 mm, where 2.67 would be, and the same all over.
+    spacing = solid.report().lattices["core"].distortion.spacing[2]
+    assert spacing.mean == pytest.approx(9 / 8, abs=0.01) and spacing.max < 9 / 8 + 0.05 and spacing.min > 9 / 8 - 0.05

@@ -24,6 +24,8 @@ const PULL: f64 = 1e3;
 /// gradient of the phase that is fixed on it.
 const SMOOTH: f64 = 0.8;
 const ALONG: f64 = 0.866;
+/// Share of the nodes of the largest face in a region below which another one there does not count.
+const SLIVER: f64 = 0.25;
 /// Solutions: what lies between a node and the face follows from the Jacobian of the last.
 const PASSES: usize = 3;
 
@@ -149,7 +151,7 @@ fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Res
     Ok(Face { index, nodes, axis, mean: 0.0, whole: 0.0 })
 }
 
-/// The faces of the surface that lie in a region, by the nodes next to each.
+/// The faces of the surface that lie in a region, by the nodes next to each, without slivers.
 fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Result<Vec<Vec<Near>>, Fault> {
     let (grid, reach) = (&laid.grid, NEAR * laid.longest());
     let close: Vec<usize> = (0..grid.len()).filter(|n| laid.depth[*n].abs() <= reach).collect();
@@ -174,7 +176,11 @@ fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Re
         );
         return Err(Fault::new(format!("fix[{index}]"), message));
     }
-    Ok(parts(laid, found, &at))
+    let mut faces = parts(laid, found, &at);
+    // A region about a face holds slivers of those next to it too.
+    let least = faces.iter().map(Vec::len).max().unwrap_or(0) as f64 * SLIVER;
+    faces.retain(|f| f.len() as f64 >= least);
+    Ok(faces)
 }
 
 /// The point of the surface nearest to one.

@@ -166,15 +166,21 @@ impl Phase {
     /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
     /// grid that is too coarse or too large; a map that folds.
     pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
-        let made = Phase::solved_once(bounds, wanted, settings);
-        match (made, wanted.stretch) {
-            // The grid for a range is another one, and cells held in it may fold: then the map without is taken, if that does not.
-            (Err(folds), Some(_)) if folds.at.is_empty() => {
-                let free = Wanted { stretch: None, ..wanted.clone() };
-                let made = Phase::solved_once(bounds, &free, settings).map_err(|_| folds)?;
-                Ok(Phase { wanted: wanted.clone(), ..made })
-            }
-            (made, _) => made,
+        let Some(range) = wanted.stretch else {
+            return Phase::solved_once(bounds, wanted, settings);
+        };
+        // The grid for a range is another one, and cells held in it may fold or be stretched by more than those of the map without:
+        // that is taken where it keeps to the range, or comes nearer to it.
+        let free = Phase::solved_once(bounds, &Wanted { stretch: None, ..wanted.clone() }, settings);
+        let excess = |made: &Phase| range.excess(made.distortion.stretch);
+        let free = free.map(|made| Phase { wanted: wanted.clone(), ..made });
+        if free.as_ref().is_ok_and(|free| excess(free) <= 1.0) {
+            return free;
+        }
+        match (Phase::solved_once(bounds, wanted, settings), free) {
+            (Ok(held), Ok(free)) => Ok(if excess(&held) <= excess(&free) { held } else { free }),
+            (Err(folds), Ok(free)) if folds.at.is_empty() => Ok(free),
+            (held, _) => held,
         }
     }
 

@@ -157,8 +157,8 @@ pub enum GradeOrThree {
 #[kind(noun = "cell edges along principal directions")]
 pub struct PrincipalLengths {
     /// Along the direction of the greatest principal stress (tension is positive; of several load cases by the mean, the root mean
-    /// square), of the middle and of the least. Where two values
-    /// are within 10 % they are the same along both.
+    /// square), of the middle and of the least. Where two values are within 10 % lengths go over into one another, and
+    /// are the same along both where the values are equal.
     #[kind(unit = "mm", above = 0.0)]
     principal: Box<[GradeSpec; 3]>,
 }

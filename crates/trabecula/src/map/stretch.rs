@@ -93,20 +93,23 @@ impl Stretch {
 
     /// In words where cells of a map are stretched beyond the range; `None` if nowhere.
     pub(super) fn exceeded(&self, d: &Distortion) -> Option<String> {
-        let [low, high] = d.stretch;
-        let (found, at) = if low < self.least {
-            (low, d.stretch_at[0])
-        } else if high > self.most {
-            (high, d.stretch_at[1])
-        } else {
+        if self.excess(d.stretch) <= 1.0 {
             return None;
-        };
+        }
+        let [low, high] = d.stretch;
+        let worst = usize::from(high / self.most > self.least / low);
+        let (found, at) = (d.stretch[worst], d.stretch_at[worst]);
         let [least, most] = self.range().map(number);
         Some(format!(
             "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map that keeps to that range \
              without folding was found. Give a wider range, or let orientation and wavelength vary more slowly",
             in_mm(at)
         ))
+    }
+
+    /// The factor by which a least and a greatest stretch leave the range, the worse of the two; at most 1 within it.
+    pub(super) fn excess(&self, [low, high]: [f64; 2]) -> f64 {
+        (self.least / low).max(high / self.most)
     }
 
     /// Whether the stretches of a Jacobian are in the range.
