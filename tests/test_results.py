@@ -240,3 +240,21 @@ def test_results_that_cannot_be_read_are_refused(tmp_path, monkeypatch):
         says(name, "cannot be read")
         monkeypatch.setitem(sys.modules, package, None)
         says(name, rf"read by {package}, which is not installed: pip install {package}")
+
+
+def test_a_mesh_in_single_precision_covers_its_region(tmp_path):
+    """The last corner is short of the region by a rounding."""
+    meshio = pytest.importorskip("meshio")
+    size = np.array([20.1, 16.3, 12.2])
+    points = (CORNERS / 8 * size).astype("f4")
+    meshio.write(tmp_path / "single.vtu", meshio.Mesh(points, [("tetra", TETS)], point_data={"s": np.full(8, 0.35)}))
+    level = lt.level.fraction(lt.grade.field(str(tmp_path / "single.vtu"), "s"))
+
+    def built(longer):
+        region = lt.region.box(min=[0, 0, 0], max=list(size * longer))
+        return lt.Design(region=region, lattice=lt.Lattice("primitive", "upper", lt.map.affine(4), level)).build()
+
+    for longer in (1, 1 + 1e-10):
+        assert built(longer).report().lattices["core"].fraction == pytest.approx([0.35, 0.35], abs=1e-6)
+    with pytest.raises(lt.DesignError, match=r"does not cover .* of the region"):
+        built(1.6)

@@ -9,6 +9,8 @@ use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, norm, sub};
 
 /// Cells of the grid along each side of the blocks whose ranges are kept.
 const BLOCK: usize = 4;
+/// Steps on the longest edge of the bounds, at least: what lies within one of a mesh counts as covered by it.
+const COARSEST: f64 = 16.0;
 /// Most nodes of a grid that scattered numbers are put on.
 const NODES: f64 = 1.0e6;
 
@@ -242,7 +244,9 @@ impl Samples {
         let volume = |p: &[Vec3; 4]| determinant(&[sub(p[1], p[0]), sub(p[2], p[0]), sub(p[3], p[0])]).abs() / 6.0;
         let mut sizes: Vec<f64> = tets.iter().map(|t| volume(&corners(t))).collect();
         sizes.sort_by(f64::total_cmp);
-        let (step, shape) = grid(bounds, 0.5 * (6.0 * sizes[sizes.len() / 2]).cbrt().max(1e-12));
+        let typical = (6.0 * sizes[sizes.len() / 2]).cbrt().max(1e-12);
+        let longest = bounds.size().into_iter().fold(0.0, f64::max);
+        let (step, shape) = grid(bounds, (0.5 * typical).min(longest / COARSEST));
         let count: usize = shape.iter().product();
         let mut out = vec![vec![f64::NAN; count]; values.len()];
         for t in tets {
@@ -279,8 +283,10 @@ impl Samples {
         if !found.contains(&true) {
             return Ok((Vec::new(), 1.0));
         }
+        // The lower corner of the grid's cell: on the upper faces of the bounds, of the last cells.
         let node = |p: &Vec3| -> [usize; 3] {
-            core::array::from_fn(|a| ((p[a] - bounds.min[a]) / step[a]).clamp(0.0, (shape[a] - 1) as f64) as usize)
+            let last = |a: usize| shape[a].saturating_sub(2) as f64;
+            core::array::from_fn(|a| ((p[a] - bounds.min[a]) / step[a]).clamp(0.0, last(a)) as usize)
         };
         let missed = |p: &&Vec3| {
             let at = node(p);

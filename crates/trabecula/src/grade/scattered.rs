@@ -11,6 +11,23 @@ use geometry::math::{Aabb, Vec3, scale};
 /// The share of the region's bounds along each axis that a table of tensors has to reach over: middles of large elements do.
 const COVERED: f64 = 0.5;
 
+/// The same for numbers, of which a few may do: the region has to hold some of them, or lie between them.
+const TOUCHED: f64 = 0.0;
+
+/// Refuses points that reach over less than a share of the bounds along an axis.
+fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64) -> Result<(), Fault> {
+    let all = positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+    let (size, met) = (bounds.size(), all.intersection(*bounds).size());
+    if (0..3).all(|a| met[a] >= least * size[a]) {
+        return Ok(());
+    }
+    let message = format!(
+        "the points reach from {:?} to {:?} mm, the region from {:?} to {:?}",
+        all.min, all.max, bounds.min, bounds.max
+    );
+    Err(Fault::new("", message))
+}
+
 /// Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the distance.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Points", noun = "a grade at points")]
@@ -32,6 +49,8 @@ impl BuildGrade for PointsKind {
         let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
         let (positions, values): (Vec<Vec3>, Vec<[f64; 1]>) = rows.iter().map(|r| ([r[0], r[1], r[2]], [r[3]])).unzip();
         let bounds = environment.region.bounds();
+        check_reach(&positions, &bounds, TOUCHED)
+            .map_err(|f| wrong(Fault::new("", f.message + "; are they in mm?")))?;
         let [one] = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
         sampled(one, &self.remap, of)
     }
@@ -67,20 +86,11 @@ impl TableKind {
         let unit = self.unit.map_or(1.0, Unit::in_mm);
         let of = |r: &Vec<f64>| (scale([r[0], r[1], r[2]], unit), [r[3], r[4], r[5], r[6], r[7], r[8]]);
         let (positions, values): (Vec<Vec3>, Vec<[f64; 6]>) = rows.map_err(wrong)?.iter().map(of).unzip();
-        let (bounds, all) = (environment.region.bounds(), positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)));
-        let (size, met) = (bounds.size(), all.intersection(bounds).size());
-        if (0..3).any(|a| met[a] < COVERED * size[a]) {
-            let message = format!(
-                "{}: the points reach from {:?} to {:?} mm, the region from {:?} to {:?}{}",
-                self.path,
-                all.min,
-                all.max,
-                bounds.min,
-                bounds.max,
-                if self.unit.is_none() { "; are they in mm? give their unit, such as unit = \"m\"" } else { "" }
-            );
-            return Err(DesignError::new(at, message).found(&self.path));
-        }
+        let bounds = environment.region.bounds();
+        check_reach(&positions, &bounds, COVERED).map_err(|f| {
+            let unit = if self.unit.is_none() { "; are they in mm? give their unit, such as unit = \"m\"" } else { "" };
+            wrong(Fault::new("", f.message + unit))
+        })?;
         let made = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
         Ok(made.map(Grade::from))
     }

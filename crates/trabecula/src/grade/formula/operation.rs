@@ -143,9 +143,15 @@ impl Operation {
         }
     }
 
-    /// The partial derivatives by the arguments; one-sided at a crease, zero at a jump.
+    /// The partial derivatives by the arguments; one-sided at a crease, zero at a jump and where the slope is infinite, as that of a
+    /// root at zero, or undefined, as that of an angle about its centre.
     #[inline(always)]
-    pub(super) fn partials(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
+    pub(super) fn partials(self, arguments: [f64; 3]) -> [f64; 3] {
+        self.slopes(arguments).map(|d| if d.is_finite() { d } else { 0.0 })
+    }
+
+    #[inline(always)]
+    fn slopes(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
         let one = |d: f64| [d, 0.0, 0.0];
         let two = |d: f64, e: f64| [d, e, 0.0];
         match self {
@@ -194,7 +200,6 @@ impl Operation {
                 }
             }
             Mod => two(1.0, -(a / b).floor()),
-            Hypot if a == 0.0 && b == 0.0 => two(0.0, 0.0),
             Hypot => two(a / a.hypot(b), b / a.hypot(b)),
             Floor | Ceil | Sign | Step => [0.0; 3],
             Smoothstep => {
