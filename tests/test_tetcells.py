@@ -51,17 +51,16 @@ def test_the_stream_is_the_same_surface(tmp_path):
 
 def test_overlapping_cells_are_told_as_they_are_made():
     """A fraction within 0.002, the pieces, and creases before and after; by both methods one solid."""
-    for cell, fraction, overlap in (("primitive", 0.5, 0.2), ("diamond", 0.3, 0.05)):
-        keys = {"level": lt.level.fraction(fraction), "overlap": overlap}
-        solid = design(lt.cell.tet(cell), **keys).build()
-        told = solid.report().lattices["a"]
-        mesh, grid = solid.mesh(edge=told.tets.edge / 24), design(lt.cell.tet(cell), method="implicit", **keys).build()
-        assert told.tets.pieces == mesh.pieces == grid.report().lattices["a"].tets.pieces == 1
-        assert told.fraction == pytest.approx(fraction, abs=0.002)
-        # Second order in 24 steps.
-        assert mesh.solid_fraction == pytest.approx(fraction, abs=0.005)
-        assert grid.mesh(edge=told.tets.edge / 16).volume == pytest.approx(mesh.volume, rel=0.02)
-        assert told.tets.creases.mean > 10 > 0.05 > told.tets.creases.smoothed
+    cell, keys = lt.cell.tet("primitive"), {"level": lt.level.fraction(0.5), "overlap": 0.2}
+    solid = design(cell, **keys).build()
+    told = solid.report().lattices["a"]
+    mesh, grid = solid.mesh(edge=told.tets.edge / 24), design(cell, method="implicit", **keys).build()
+    assert told.tets.pieces == mesh.pieces == grid.report().lattices["a"].tets.pieces == 1
+    assert told.fraction == pytest.approx(0.5, abs=0.002)
+    # Second order in 24 steps.
+    assert mesh.solid_fraction == pytest.approx(0.5, abs=0.005)
+    assert grid.mesh(edge=told.tets.edge / 16).volume == pytest.approx(mesh.volume, rel=0.02)
+    assert told.tets.creases.mean > 10 > 0.05 > told.tets.creases.smoothed
 
 
 def test_crumbs_between_lattice_and_skin_are_closed():
@@ -303,3 +302,30 @@ def test_tiny_tetrahedra_at_fine_features_break_no_guarantee(tmp_path, surface, 
         warnings.simplefilter("ignore", lt.DesignWarning)
         mesh = lt.Design(lt.region.mesh(tmp_path / "block.stl"), core).build().mesh(edge=edge)
     assert mesh.closed and not mesh.defects and np.isfinite(mesh.vertices).all()
+
+
+def test_layers_and_the_surface_have_one_fraction(tmp_path):
+    """On few, much bent tetrahedra, where the surface is made in each by itself, and everything else by position."""
+    asked = 0.25 * 4 / 3 * np.pi * 10**3
+    for size in (10, 6):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", lt.DesignWarning)
+            solid = design(region=lt.region.sphere(radius=10), size=size).build()
+            surface, layers = solid.mesh(edge=0.2).volume, solid.layers(0.25).save(tmp_path / "a.cli").volume
+        # Levels are solved for by samples, to 0.001 of the part, and layers of 0.25 mm to a thousandth.
+        assert surface == pytest.approx(asked, rel=5e-3) and layers == pytest.approx(asked, rel=8e-3)
+
+
+def test_a_grid_too_coarse_for_the_fraction_is_warned_of():
+    solid = design(region=lt.region.sphere(radius=10), size=5, method="implicit").build()
+    with pytest.warns(lt.DesignWarning, match=r"steps of 0\.6 mm are too coarse: .* use an edge of 0\.\d+ mm or less"):
+        solid.mesh(edge=0.6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", lt.DesignWarning)
+        assert solid.mesh(edge=0.2).volume == pytest.approx(0.25 * 4 / 3 * np.pi * 10**3, rel=0.01)
+
+
+def test_the_spacing_resolves_walls_that_are_meshed_on_a_grid():
+    solid = design(lt.cell.tet("diamond_sheet"), "sheet", region=lt.region.sphere(radius=10), size=6, surface="rounded").build()
+    report = solid.report()
+    assert report.spacing <= min(report.lattices["a"].thickness) / 2 * (1 + 1e-9)

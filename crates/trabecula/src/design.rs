@@ -138,8 +138,10 @@ fn in_mm(at: &At) -> Result<(), DesignError> {
 pub struct Tiled {
     /// Its name.
     pub name: String,
-    /// The lattice.
+    /// The lattice, as its surface is made tetrahedron by tetrahedron.
     pub tiling: Arc<Tiling>,
+    /// The lattice by position, at the level at which it has the same fraction.
+    placed: Arc<Tiling>,
     /// The zones, where they have cells of their own.
     pub zones: Vec<CellZone>,
     /// What is known of the mesh.
@@ -165,7 +167,7 @@ impl Tiled {
     fn alone_field(&self) -> Arc<dyn Implicit> {
         match self.ends {
             Ends::Rounded => self.field.clone(),
-            _ => Arc::new(self.tiling.eased()),
+            _ => Arc::new(self.placed.eased()),
         }
     }
 }

@@ -163,10 +163,13 @@ fn tiled(
 ) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
     let build_tiling::Made { done, alone, explicit, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
-    let Finished { tiling, field, net, radius, fraction } = done;
+    let Finished { tiling, placed, field, net, radius, fraction } = done;
     let (name, ends) = (domain.name.to_string(), domain.ends());
     let mesh = domain.report;
-    Ok((Tiled { name, tiling, zones, mesh, alone, explicit, joins, ends, radius, finished: fraction, field }, net))
+    Ok((
+        Tiled { name, tiling, placed, zones, mesh, alone, explicit, joins, ends, radius, finished: fraction, field },
+        net,
+    ))
 }
 
 /// A lattice, with warnings of likely mistakes.

@@ -149,7 +149,8 @@ pub(super) fn blend(
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
     unused(&blend, &names, members, environment, warnings);
     cancelling(&blend, &names, &equal, environment, warnings);
-    if let Some(width) = width.filter(|w| *w < 2.0 * longest) {
+    // But for rounding: exactly two cells are wide enough.
+    if let Some(width) = width.filter(|w| *w < 2.0 * longest * (1.0 - 1e-9)) {
         let message = format!(
             "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
              growing into each other, and the fraction is not held",

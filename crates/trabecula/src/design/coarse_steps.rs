@@ -6,6 +6,8 @@ use geometry::fault::{counted, number};
 
 /// Share of the solid's volume by which a surface may be off.
 const OFF: f64 = 0.01;
+/// The same on a grid, of which a cell is as often solid by mistake as it is void.
+const OFF_GRID: f64 = 0.05;
 /// Share of the mesh that may be solid or not: with an overlap, and where tetrahedra are bent, the fraction is known by samples.
 const SAMPLED: f64 = 0.002;
 /// Fewest steps along the edge of a tetrahedron.
@@ -16,7 +18,7 @@ impl Built {
     /// (mm³) and has this number of `pieces`, and the step that suffices; `None` if nothing is, and for other solids.
     pub fn coarse_steps(&self, edge: f64, volume: f64, pieces: usize) -> Option<String> {
         let [only] = &self.tilings[..] else { return None };
-        if !only.explicit || self.blend.is_some() {
+        if self.blend.is_some() || !self.solid.filled.is_empty() && only.finished.is_none() {
             return None;
         }
         let tiling = &only.tiling;
@@ -26,7 +28,11 @@ impl Built {
         let off = found / share - 1.0;
         let predicted = if pieces > 1 { connectivity(tiling).map(|c| c.components) } else { None };
         let broken = predicted.filter(|p| pieces > *p);
-        let most = if tiling.map.overlap() > 0.0 || only.finished.is_some() { OFF.max(SAMPLED / share) } else { OFF };
+        let most = match only.explicit {
+            false => OFF_GRID,
+            true if tiling.map.overlap() > 0.0 || only.finished.is_some() => OFF.max(SAMPLED / share),
+            true => OFF,
+        };
         if off.abs() <= most && broken.is_none() {
             return None;
         }
@@ -34,7 +40,11 @@ impl Built {
         let steps = (mean / edge).round().max(LEAST);
         // The error of the volume falls with the square of the step.
         let for_volume = (steps * (off.abs() / most).sqrt()).ceil();
-        let for_pieces = broken.and_then(|_| steps_enough(tiling, steps as usize + 1)).unwrap_or(0);
+        let for_pieces = match (broken, only.explicit) {
+            (None, _) => 0,
+            (Some(_), true) => steps_enough(tiling, steps as usize + 1).unwrap_or(0),
+            (Some(_), false) => 2 * steps as usize,
+        };
         let enough = for_volume.max(for_pieces as f64);
         if enough <= steps {
             return None;

@@ -51,15 +51,14 @@ impl Built {
         let report = self.report();
         let (wanted, wavelength) = (report.spacing, self.solid.wavelength);
         let repeat = smallest_repeat(self);
-        let counted = wanted.max(wavelength / COUNTED);
+        let counted = wanted.max((wavelength / COUNTED).min(self.solid.transition.unwrap_or(f64::INFINITY)));
         // What cannot be estimated cannot be meshed: the mesh says why.
         let found = self.surface().estimate(counted).ok()?;
         let triangles = found.triangles * (counted / wanted).powi(2);
         if triangles <= TRIANGLES {
             return None;
         }
-        let gridded = report.lattices.values().filter(|l| l.tets.is_none());
-        let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least());
+        let walls = gridded(self, &report.lattices).filter_map(|l| l.thickness).map(|t| t.least());
         let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
         let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL, wavelength / FEWEST]);
         let limits = limits.chain(self.skin).chain(self.solid.transition).chain(self.whole_steps());
@@ -89,6 +88,15 @@ fn smallest_repeat(built: &Built) -> f64 {
     lattices.chain(tilings).chain(beams).fold(f64::INFINITY, f64::min)
 }
 
+/// The lattices that are meshed on a grid: others over tetrahedra are meshed one by one, with steps of their own.
+fn gridded<'a>(
+    built: &Built,
+    lattices: &'a BTreeMap<String, LatticeReport>,
+) -> impl Iterator<Item = &'a LatticeReport> {
+    let explicit = built.blend.is_none() && built.tilings.iter().all(|t| t.explicit);
+    lattices.values().filter(move |l| !explicit || l.tets.is_none())
+}
+
 /// v, rounded down to three digits.
 fn rounded_down(v: f64) -> f64 {
     let unit = 10f64.powi(v.log10().floor() as i32 - 2);
@@ -105,9 +113,7 @@ pub(super) fn spacing(
 ) -> f64 {
     let wavelength = built.solid.wavelength;
     let waves = built.lattices.iter().map(|(_, l)| l.map.wavelength() / (PER_WAVE * l.cell.series().frequency()));
-    // Tilings are meshed tetrahedron by tetrahedron, with steps of their own.
-    let gridded = lattices.values().filter(|l| l.tets.is_none());
-    let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
+    let walls = gridded(built, lattices).filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
     let beams = beams.values().map(|b| b.thickness / PER_BEAM);
     let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
     let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);

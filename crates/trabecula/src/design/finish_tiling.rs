@@ -28,7 +28,9 @@ const OFF: f64 = 5e-3;
 /// A lattice with its ends.
 pub(super) struct Finished {
     pub tiling: Arc<Tiling>,
-    /// The lattice as it ends.
+    /// The lattice at the level at which it has the fraction asked for by position, where another than that of its surface.
+    pub placed: Arc<Tiling>,
+    /// The lattice as it ends, by position.
     pub field: Arc<dyn Implicit>,
     /// The net that ties its ports.
     pub net: Option<CsgSolid>,
@@ -184,8 +186,11 @@ impl<'a> Finish<'a> {
             last = Some([by, found]);
             by += (asked - found) / rate;
         }
+        // By position tetrahedra are bent as quadratic ones, and made one by one after the surface itself: each has the fraction at a level
+        // of its own.
+        let placed = self.made(tiling.clone(), Some(asked), false)?;
         let (found, tiling) = best.unwrap_or((asked, tiling));
-        Ok(Finished { fraction: Some(found), ..self.finished(Arc::new(tiling), None)? })
+        Ok(Finished { fraction: Some(found), tiling: Arc::new(tiling), ..placed })
     }
 
     /// The middle lines of the net.
@@ -206,7 +211,8 @@ impl<'a> Finish<'a> {
     /// The lattice with its ends at its own level.
     fn finished(&self, tiling: Arc<Tiling>, net: Option<&Net>) -> Result<Finished, DesignError> {
         let sheet = || tiling.thickness().map(|w| w.mean);
-        let plain = Finished { field: tiling.clone(), tiling: tiling.clone(), net: None, radius: None, fraction: None };
+        let (field, placed) = (tiling.clone(), tiling.clone());
+        let plain = Finished { tiling: tiling.clone(), placed, field, net: None, radius: None, fraction: None };
         match (self.ends, net) {
             (Ends::Net, Some(net)) => {
                 // Half a rod has the area of a port, or is as deep as a wall is thick.

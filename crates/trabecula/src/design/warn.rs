@@ -130,11 +130,19 @@ pub(super) fn wrapped_map(lattice: &Lattice, spec: &MapKind, environment: &Envir
     warnings.push(Warning { path: format!("{}.map.{key}.around", environment.path), message });
 }
 
+/// A fraction up to which a solid is found in one piece, and beyond which it is in one piece with its voids closed.
+const FULL: f64 = 0.999;
+
 /// Warns of likely mistakes.
 pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
     let path = &environment.path;
     let fraction = Varied::of_fraction(lattice, environment.points);
-    let whole = lattice.connected_fraction();
+    let mut whole = lattice.connected_fraction();
+    if let Some([_, top]) = whole.last_mut()
+        && *top > FULL
+    {
+        *top = 1.0;
+    }
     let broken = gaps([fraction.min, fraction.max], &whole);
     if !broken.is_empty() {
         let ranges = |of: &[[f64; 2]]| {
