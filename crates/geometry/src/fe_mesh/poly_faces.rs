@@ -42,8 +42,10 @@ const REST: &str = "REST";
 impl FeMesh {
     /// The smallest set of each face that is in sets: an index of `sets`. Of equal ones the last.
     pub fn smallest_sets(&self) -> BTreeMap<(u32, u8), usize> {
+        // Of equal ones that which is not the surface of a kind, such as CUT: what a face of the region is called says more.
+        let kind = |s: &usize| ["CUT", "LATTICE", "SKIN"].contains(&&*self.sets[*s].name);
         let mut order: Vec<usize> = (0..self.sets.len()).collect();
-        order.sort_by_key(|s| std::cmp::Reverse(self.sets[*s].faces.len()));
+        order.sort_by_key(|s| (std::cmp::Reverse(self.sets[*s].faces.len()), !kind(s)));
         let mut of = BTreeMap::new();
         for s in order {
             self.sets[s].faces.iter().for_each(|f| _ = of.insert(*f, s));
@@ -155,7 +157,12 @@ mod tests {
             tets: vec![[0, 1, 2, 3], [1, 4, 2, 3], [1, 5, 2, 4]],
             domain: vec![0; 3],
             domains: vec!["SOLID".into()],
-            sets: vec![set("CUT", vec![(0, 1), (0, 2), (0, 3)]), set("X0", vec![(0, 1)])],
+            sets: vec![
+                set("CUT", vec![(0, 1), (0, 2), (0, 3)]),
+                set("X0", vec![(0, 1)]),
+                set("Z1", vec![(2, 0)]),
+                set("SKIN", vec![(2, 0)]),
+            ],
             ..FeMesh::default()
         };
         let made = mesh.poly_faces();
@@ -163,7 +170,8 @@ mod tests {
         assert_eq!(made.faces[0], [1, 2, 3]);
         let patches: Vec<(&str, usize, usize)> =
             made.patches.iter().map(|p| (p.name.as_str(), p.start, p.count)).collect();
-        assert_eq!(patches, [("CUT", 2, 2), ("X0", 4, 1), ("REST", 5, 5)]);
+        // Of Z1 and SKIN, which are the same face, the one that is named after its place.
+        assert_eq!(patches, [("CUT", 2, 2), ("X0", 4, 1), ("Z1", 5, 1), ("REST", 6, 4)]);
         assert_eq!(made.faces.len(), made.owner.len());
     }
 }

@@ -6,7 +6,8 @@ use crate::kind::Warning;
 pub struct Limit {
     /// The extrapolated entries, or the finest grid's.
     pub tensor: Vec<f64>,
-    /// Distance of the extrapolated entries from the finest grid's, over the size of `tensor`.
+    /// Distance of the extrapolated entries from the finest grid's, over the size of `tensor`; more where the grids do not converge
+    /// by a power of the edge.
     pub error: f64,
     /// The exponent of the voxel's edge.
     pub order: f64,
@@ -18,6 +19,8 @@ pub struct Limit {
 const USUAL: f64 = 2.0;
 /// Observed orders beyond these are not trusted.
 const ORDERS: [f64; 2] = [1.0, 3.0];
+/// How far beyond them steps are still taken to fall by a power.
+const TRUSTED: f64 = 0.5;
 /// Share of an entry of the diagonal by which an extrapolation may change it: the expansion in powers of the edge begins well below one.
 const FARTHEST: f64 = 0.5;
 /// Share of the largest entry of the diagonal below which one is rounding.
@@ -37,14 +40,18 @@ pub fn limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
     };
     let ratio = (voxels(shape) / voxels(coarse)).cbrt();
     let step: Vec<f64> = finest.iter().zip(next).map(|(a, b)| a - b).collect();
-    let order = match rest.get(1) {
-        None => USUAL,
+    let (order, doubt) = match rest.get(1) {
+        None => (USUAL, 0.0),
         Some((_, last)) => {
             let before: Vec<f64> = next.iter().zip(last).map(|(a, b)| a - b).collect();
             let along: f64 = step.iter().zip(&before).map(|(a, b)| a * b).sum();
             let alike = along > 0.5 * size(&step) * size(&before);
             let seen = (size(&before) / size(&step)).ln() / ratio.ln();
-            if alike && seen.is_finite() { seen.clamp(ORDERS[0], ORDERS[1]) } else { USUAL }
+            let order = if alike && seen.is_finite() { seen.clamp(ORDERS[0], ORDERS[1]) } else { USUAL };
+            // Steps that fall by no power of the edge, as where walls lie along the voxels, may be small by chance: the error is then
+            // what is left of the one before at first order.
+            let regular = alike && seen <= ORDERS[1] + TRUSTED;
+            (order, if regular { 0.0 } else { size(&before) / ratio / (ratio - 1.0) })
         }
     };
     let share = 1.0 / (ratio.powf(order) - 1.0);
@@ -57,7 +64,7 @@ pub fn limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
         return Limit { tensor: finest.clone(), error: share * size(&step) / whole, order, finest: true };
     }
     let tensor: Vec<f64> = finest.iter().zip(&step).map(|(c, d)| c + share * d).collect();
-    let error = share * size(&step) / size(&tensor).max(f64::MIN_POSITIVE);
+    let error = (share * size(&step)).max(doubt) / size(&tensor).max(f64::MIN_POSITIVE);
     Limit { tensor, error, order, finest: false }
 }
 
@@ -87,6 +94,18 @@ mod tests {
             assert!((found.order - order).abs() < 1e-9);
             assert!((found.tensor[0] - 2.0).abs() < 1e-12 && (found.tensor[1] + 1.0).abs() < 1e-12);
         }
+    }
+
+    /// Walls along the voxels: the last step is small by chance, and the error is that of the step before.
+    #[test]
+    fn steps_that_follow_no_power_leave_the_error_of_those_before() {
+        let grid = |n: usize, k: f64| ([n; 3], vec![k]);
+        for last in [0.1593, 0.1595] {
+            let found = limit(&[grid(48, 0.1594), grid(24, last), grid(12, 0.1469)]);
+            assert!(found.error > 0.02 && found.error < 0.1, "{}", found.error);
+        }
+        let regular = limit(&[grid(48, 1.01), grid(24, 1.04), grid(12, 1.16)]);
+        assert!((regular.error - 0.01).abs() < 1e-3, "{}", regular.error);
     }
 
     /// Where a power of the edge would take a positive figure to nothing or beyond, the finest grid's stands, and the error says how far.
