@@ -7,6 +7,7 @@ import sys
 import textwrap
 import time
 
+import numpy as np
 import pytest
 import trabecula as lt
 
@@ -137,3 +138,44 @@ def test_an_interrupt_ends_the_work_itself(tmp_path):
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "formula", ["0.2 + 0.05*sqrt(z)", "0.2 + 0.05*sqrt(abs(x - 6))", "0.2 + 0.03*acos(z/12)", "0.3 + 0.02*atan2(y - 6, x - 6)"]
+)
+def test_a_formula_with_an_infinite_slope_gives_a_mesh(tmp_path, formula):
+    """Its values are finite everywhere, so its vertices are too."""
+    level = lt.level.fraction(lt.grade.formula(formula))
+    box = lt.region.box(min=[0, 0, 0], max=[12, 12, 12])
+    solid = lt.Design(region=box, lattice=lt.Lattice("gyroid", "sheet", lt.map.affine(4), level)).build()
+    mesh = solid.mesh(edge=0.2, islands="keep")
+    assert np.isfinite(mesh.vertices).all() and mesh.closed
+    assert solid.layers(0.1).save(tmp_path / "a.cli").volume == pytest.approx(mesh.volume, rel=5e-3)
+
+
+def test_a_transition_narrower_than_an_estimate_is_meshed():
+    """The number of triangles is counted on a grid that resolves it."""
+    lattices = {"a": lt.Lattice("primitive", "upper", lt.map.affine(12), lt.level.fraction(0.25))}
+    lattices["b"] = lt.Lattice("gyroid", "upper", lt.map.affine(3), lt.level.fraction(0.5))
+    blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {0: 0, 0.15: 1}))
+    with pytest.warns(lt.DesignWarning, match=r"a transition is 0\.15 mm wide"):
+        solid = lt.Design(region=lt.region.box(size=[6, 6, 6]), lattice=lattices, blend=blend).build()
+    assert solid.mesh(edge=0.1, islands="keep").closed
+
+
+def test_points_that_lie_elsewhere_are_refused(tmp_path):
+    table = tmp_path / "far.csv"
+    np.savetxt(table, np.random.default_rng(1).uniform(200, 201, (50, 4)), delimiter=",")
+    level = lt.level.fraction(lt.grade.points(str(table)))
+    with pytest.raises(lt.DesignError, match=r"the points reach from .* are they in mm"):
+        lt.Design(
+            region=lt.region.box(size=[10, 10, 10]), lattice=lt.Lattice("gyroid", "sheet", lt.map.affine(4), level)
+        ).build()
+
+
+def test_what_is_full_in_places_is_in_one_piece_there():
+    level = lt.level.thickness(lt.grade.linear([0, 0, 1], {-10: 0.5, 10: 4}))
+    lattice = lt.Lattice("gyroid", "sheet", lt.map.affine(4), level)
+    with pytest.warns(lt.DesignWarning) as found:
+        lt.Design(region=lt.region.box(size=[20, 20, 20]), lattice=lattice).build()
+    assert all("above the folding limit" in str(warning.message) for warning in found)

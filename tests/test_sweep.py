@@ -420,3 +420,12 @@ def test_a_sweep_changes_nothing_for_other_commands(tmp_path: Path):
     assert lt.load(study).to_dict()["sweep"] == {"lattice.a.level.fraction": [0.1]}
     lt.load(study).save(tmp_path / "saved.toml")
     assert lt.load(tmp_path / "saved.toml") == lt.load(study)
+
+
+def test_a_parquet_table_without_pyarrow_is_refused_before_any_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3]')
+    done = command("sweep", study, "-o", tmp_path / "table.parquet")
+    assert done.returncode == 1
+    assert "is written by pyarrow, which is missing: pip install 'trabecula[scale]'" in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]

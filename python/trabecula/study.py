@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,6 +18,22 @@ __all__ = ["Study"]
 
 #: Designs that are tried for one that keeps the conditions, for each that is asked for.
 PATIENCE = 1000
+
+
+def _where(text: str) -> Callable[[Mapping[str, Any]], bool]:
+    """A condition of a study, whose errors say so."""
+    try:
+        holds = condition(text)
+    except ValueError as error:
+        raise ValueError(f"sweep.where: {error}") from None
+
+    def checked(values: Mapping[str, Any]) -> bool:
+        try:
+            return holds(values)
+        except ValueError as error:
+            raise ValueError(f"sweep.where: {error}") from None
+
+    return checked
 
 
 @dataclass(frozen=True)
@@ -64,7 +80,7 @@ class Study:
         Raises ValueError for conditions that no design keeps, or of random ones fewer than asked for, and for what is no
         condition.
         """
-        conditions = [(text, condition(text)) for text in self.settings["where"]]
+        conditions = [(text, _where(text)) for text in self.settings["where"]]
         plain = _by_path(self.design.to_dict())
         wanted = self.settings["count"] if self.settings["count"] is not None else math.inf
         found, missed = 0, ""

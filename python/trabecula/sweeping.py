@@ -7,6 +7,7 @@ import os
 from contextlib import closing
 from typing import Any
 
+from .bridges import package
 from .design import Design
 from .errors import Refused
 from .files import write_svg
@@ -23,6 +24,12 @@ def table_of(design: Design, args) -> dict[str, Any]:
     """Makes the table and writes it; the numbers of rows, of failed ones and of those from an earlier run."""
     if kind_of(args.output) == "svg":
         raise Refused(f"{args.output} is a drawing; name a table (.csv or .parquet), the drawing gets its name")
+    if kind_of(args.output) == "parquet":
+        try:
+            package("pyarrow")
+        except ImportError:
+            words = "is written by pyarrow, which is missing: pip install 'trabecula[scale]', or name a table in .csv"
+            raise Refused(f"{args.output} {words}") from None
     size = Study(design).size()
     if size > FEW and not args.yes:
         raise Refused(f"the sweep has {size} designs; more than {FEW} are made with --yes only")

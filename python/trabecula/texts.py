@@ -29,7 +29,7 @@ def text(report: Report) -> str:
         "TilingReport": _tiling,
         "TransitionReport": _transition,
     }.get(type(report).__name__)
-    return "\n".join(write(report)) if write else table(report)
+    return "\n".join(write(report)) if write else table(report, "none")
 
 
 def counted(n: int, what: str = "piece") -> str:
@@ -263,6 +263,7 @@ UNITS = {
 #: What stands for a figure that is missing.
 ABSENT = {
     "dangling.largest": "none",
+    "edge": "none: made without a grid",
     "quality": "no triangles",
     "quality.largest_aspect": "a triangle has no area",
     "volume_error": "not known: no lattice on a grid",

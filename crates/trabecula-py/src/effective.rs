@@ -48,7 +48,9 @@ impl Cell {
             let solid = own.get();
             Design::from_toml(solid.text()).and_then(|design| solid.built().unit_cell(&design, &Folder(folder)))
         })?;
-        made.map(|cell| Cell { cell }).map_err(|e| error::design(py, &e))
+        // The text is the design's own, in which no one looks up a line.
+        made.map(|cell| Cell { cell })
+            .map_err(|e| error::design(py, &trabecula::design::DesignError { line: None, ..e }))
     }
 
     /// The edges, mm, one row each.

@@ -313,9 +313,9 @@ impl Solid {
     }
 
     /// What a surface at grid spacing `edge` (mm) takes, as `reports.EstimateReport`. It is counted on a grid of at least
-    /// `coarse` (mm) and scaled from there: triangles grow as the spacing to the power −2.
+    /// `coarse` (mm), or as fine as transitions need, and scaled from there: triangles grow as the spacing to the power −2.
     fn estimate(slf: Py<Self>, py: Python<'_>, edge: f64, coarse: f64) -> PyResult<Bound<'_, PyAny>> {
-        let counted = edge.max(coarse);
+        let counted = edge.max(coarse.min(slf.get().built.solid.transition.unwrap_or(f64::INFINITY)));
         let work = move || slf.get().built.surface().estimate(counted);
         let made = run_apart(py, None, work)?.map_err(error::fault)?;
         let (e, times) = (EstimateReport::from(made), (counted / edge).powi(2));
