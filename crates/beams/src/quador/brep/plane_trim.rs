@@ -202,7 +202,7 @@ impl Brep<'_> {
 
     /// Sorts loops in a plane: those around faces, each followed by those of its holes; `None` for a hole outside all.
     fn nested(&self, loops: Vec<Vec<Use>>, frame: &Frame, plane: &Surface) -> Option<Vec<Vec<Vec<Use>>>> {
-        let mut outer: Vec<(f64, Vec<[f64; 2]>, Vec<Vec<Use>>)> = Vec::new();
+        let mut outer: Vec<Outer> = Vec::new();
         let mut holes: Vec<([f64; 2], Vec<Use>)> = Vec::new();
         for l in loops {
             let mut polygon: Vec<[f64; 2]> = Vec::new();
@@ -215,17 +215,26 @@ impl Brep<'_> {
                 flat.flatten(CHORD * self.quadors.scale, &mut polygon);
             }
             if twice > 0.0 {
-                outer.push((twice, polygon, vec![l]));
+                outer.push(Outer { twice, polygon, loops: vec![l] });
             } else {
                 holes.push((*polygon.first()?, l));
             }
         }
         for (at, hole) in holes {
-            let around = outer.iter_mut().filter(|o| is_in(&o.1, at));
-            around.min_by(|p, q| p.0.total_cmp(&q.0))?.2.push(hole);
+            let around = outer.iter_mut().filter(|o| is_in(&o.polygon, at));
+            around.min_by(|p, q| p.twice.total_cmp(&q.twice))?.loops.push(hole);
         }
-        Some(outer.into_iter().map(|o| o.2).collect())
+        Some(outer.into_iter().map(|o| o.loops).collect())
     }
+}
+
+/// A loop around a face, with those of its holes.
+struct Outer {
+    /// Twice the area within it.
+    twice: f64,
+    /// It, in chords.
+    polygon: Vec<[f64; 2]>,
+    loops: Vec<Vec<Use>>,
 }
 
 /// Whether a point is in a polygon.
