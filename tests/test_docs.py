@@ -114,7 +114,7 @@ def test_example_designs_check(path):
 
 
 #: What examples need besides the package, and what makes them quick.
-NEEDS = {"stiffest_gyroid.py": ("scipy", "8")}
+NEEDS = {"stiffest_gyroid.py": ("scipy", "12")}
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.name)
