@@ -12,6 +12,9 @@ import trabecula as lt
 from finite_elements import solid
 from trabecula import cli
 
+# What runs in the background may begin with interrupts ignored, and so would the programs that tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 CUBE = """schema = 1
 units = "mm"
 [region.box]
