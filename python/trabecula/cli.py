@@ -363,7 +363,7 @@ COMMANDS = {
         *(JSON, *NOTICES),
     ),
     "simplify": (
-        "Make a mesh file lighter: fewer triangles; guarantees and sharp edges are kept, the volume nearly, as figures say.",
+        "Make a mesh file lighter: fewer triangles, every guarantee and sharp edges kept; the change of volume is printed.",
         "The distance between the two surfaces is at most the tolerance; with --triangles it is printed.\n"
         "The mesh must be closed and free of self-intersection.\n\n"
         "examples:\n  trabecula simplify part.stl -o light.stl --tolerance 0.02\n"

@@ -64,6 +64,13 @@ impl Bezier<2> {
         let twice = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         twice * self.weight * fullness(self.weight)
     }
+
+    /// Twice the signed area that the line from a point to the curve sweeps, positive counter-clockwise: summed over a loop, twice its
+    /// area.
+    pub fn swept_area_twice(&self, [x, y]: [f64; 2]) -> f64 {
+        let [p, _, r] = self.points;
+        (p[0] - x) * (r[1] - y) - (p[1] - y) * (r[0] - x) + self.segment_area_twice()
+    }
 }
 
 /// (α − sin α cos α)/sin³ α with cos α = w: Σ (½)ₖ/k! yᵏ/(k + 3/2), y = 1 − w².

@@ -103,39 +103,32 @@ impl BoundaryForm {
         let mean = scale(sum, 1.0 / count);
         let normal = unit(q.half_gradient(mean));
         let middle = add(mean, scale(normal, q.intersection_along(mean, normal)));
-        let found = |least: f64| {
-            let bases = core::iter::once(middle).chain(middles());
-            bases
-                .filter_map(|base| BoundaryForm::central(q, base))
-                .find(|form| arcs().all(|a| form.is_clear(&complex.arcs[a].conic, ends[a], least)))
-        };
-        found(PREFERRED_CLEARANCE).or_else(|| BoundaryForm::around_hyperboloid_axis(q)).or_else(|| found(MIN_CLEARANCE))
+        let bases = || core::iter::once(middle).chain(middles());
+        BoundaryForm::chosen(q, bases, |form, least| {
+            arcs().all(|a| form.is_clear(&complex.arcs[a].conic, ends[a], least))
+        })
     }
 
-    /// The boundary form of a part of a quadric within some points, by the first of some base points that suits them.
-    pub(super) fn within(q: &Quadric, bases: impl Iterator<Item = Vec3>, points: &[Vec3]) -> Option<BoundaryForm> {
-        let clearance = |form: &BoundaryForm| match form.projection {
+    /// The boundary form of a part of a quadric whose boundary runs through some points, about one of these or of other base points.
+    pub(super) fn within(q: &Quadric, middle: Option<Vec3>, points: &[Vec3]) -> Option<BoundaryForm> {
+        let bases = || middle.into_iter().chain(points.iter().copied());
+        BoundaryForm::chosen(q, bases, |form, least| match form.projection {
             Projection::Central(nu) => {
-                let at = points.iter().map(|x| 1.0 + 0.5 * nu * dot(form.normal, sub(*x, form.base)));
-                at.fold(f64::INFINITY, f64::min)
+                points.iter().all(|x| 1.0 + 0.5 * nu * dot(form.normal, sub(*x, form.base)) > least)
             }
-            Projection::Axial(..) => f64::INFINITY,
-        };
-        let mut best: Option<(f64, BoundaryForm)> = None;
-        for form in bases.filter_map(|base| BoundaryForm::central(q, base)) {
-            let at = clearance(&form);
-            if best.as_ref().is_none_or(|b| at > b.0) {
-                best = Some((at, form));
-            }
-            if at > PREFERRED_CLEARANCE {
-                break;
-            }
-        }
-        let (at, form) = best?;
-        match at {
-            v if v > PREFERRED_CLEARANCE => Some(form),
-            v => BoundaryForm::around_hyperboloid_axis(q).or((v > MIN_CLEARANCE).then_some(form)),
-        }
+            Projection::Axial(..) => false,
+        })
+    }
+
+    /// Central projection about the first base point that is clear of the face, with the preferred clearance if there is one; or along
+    /// the axis of a hyperboloid.
+    fn chosen<B: Iterator<Item = Vec3>>(
+        q: &Quadric,
+        bases: impl Fn() -> B,
+        is_clear: impl Fn(&BoundaryForm, f64) -> bool,
+    ) -> Option<BoundaryForm> {
+        let found = |least: f64| bases().filter_map(|b| BoundaryForm::central(q, b)).find(|form| is_clear(form, least));
+        found(PREFERRED_CLEARANCE).or_else(|| BoundaryForm::around_hyperboloid_axis(q)).or_else(|| found(MIN_CLEARANCE))
     }
 
     /// The boundary form of a beam, given as one of its half-beams.

@@ -63,7 +63,7 @@ impl Plane {
         [dot(x, self.axes[0]), dot(x, self.axes[1])]
     }
 
-    fn moved(&self, by: f64) -> Plane {
+    pub(super) fn moved(&self, by: f64) -> Plane {
         Plane { origin: add(self.origin, scale(self.normal, by)), ..*self }
     }
 }
@@ -118,15 +118,11 @@ fn area(arcs: &[Arc]) -> f64 {
     let Some(o) = arcs.first().and_then(|a| a.curves.first()).map(|c| c.points[0]) else {
         return 0.0;
     };
-    let twice = |c: &Bezier<2>| {
-        let [p, _, r] = c.points;
-        (p[0] - o[0]) * (r[1] - o[1]) - (p[1] - o[1]) * (r[0] - o[0]) + c.segment_area_twice()
-    };
-    arcs.iter().flat_map(|a| &a.curves).map(twice).sum::<f64>() / 2.0
+    arcs.iter().flat_map(|a| &a.curves).map(|c| c.swept_area_twice(o)).sum::<f64>() / 2.0
 }
 
 /// Displacements tried for a plane that touches the surface, in typical radii: as small as can be resolved.
-const DISPLACEMENTS: [f64; 5] = [0.0, 1e-9, -1e-9, 1e-8, -1e-8];
+pub(super) const DISPLACEMENTS: [f64; 5] = [0.0, 1e-9, -1e-9, 1e-8, -1e-8];
 
 impl Quadors {
     /// The slice by a plane, fillets included; exact up to rounding. Hubs that the plane does not reach are not

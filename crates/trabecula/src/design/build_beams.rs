@@ -25,7 +25,7 @@ use ::beams::Plane;
 use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Vec3, norm, scale};
+use geometry::math::{Vec3, norm};
 use geometry::progress::checkpoint;
 
 pub(super) use beam_report::{held, inside, lone, report, share};
@@ -161,14 +161,7 @@ pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> 
              these",
         ));
     };
-    let crossed = |side: &HalfSpace| {
-        let beyond = |b: Aabb| {
-            let half = scale(b.size(), 0.5);
-            let reach: f64 = (0..3).map(|a| half[a] * side.normal()[a].abs()).sum();
-            side.value(b.center()) + reach > 0.0
-        };
-        (0..quadors.len()).any(|hub| beyond(quadors.hub_bounds(hub)))
-    };
+    let crossed = |side: &HalfSpace| (0..quadors.len()).any(|hub| side.bound(&quadors.hub_bounds(hub)).hi > 0.0);
     let planes = sides.iter().filter(|s| crossed(s)).map(|s| Plane::new(s.point(), s.normal()));
     let planes = planes.collect::<Result<Vec<Plane>, Fault>>()?;
     Ok((quadors, planes))

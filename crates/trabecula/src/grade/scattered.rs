@@ -14,11 +14,11 @@ const COVERED: f64 = 0.5;
 /// The same for numbers, of which a few may do: the region has to hold some of them, or lie between them.
 const TOUCHED: f64 = 0.0;
 
-/// Refuses points that reach over less than a share of the bounds along an axis.
+/// Refuses points that reach over less than a share of the bounds along an axis, but for one along which they do not vary.
 fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64) -> Result<(), Fault> {
     let all = positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
     let (size, met) = (bounds.size(), all.intersection(*bounds).size());
-    if (0..3).all(|a| met[a] >= least * size[a]) {
+    if (0..3).all(|a| all.size()[a] == 0.0 || met[a] >= least * size[a]) {
         return Ok(());
     }
     let message = format!(

@@ -43,7 +43,7 @@ impl Plane {
 
     /// Whether a face is on the positive side of the plane where it meets a curve of its boundary, which has the face on its
     /// left: next to the curve, if that lies in the plane.
-    pub(super) fn faces_above(&self, quadric: &Quadric, curve: &Bezier<3>) -> bool {
+    pub(super) fn is_face_above(&self, quadric: &Quadric, curve: &Bezier<3>) -> bool {
         let middle = curve.at(0.5);
         if self.has(curve) {
             let along = sub(curve.points[2], curve.points[0]);
@@ -121,7 +121,7 @@ impl Brep<'_> {
             }
         }
         let loops = self.loops(&self.faces[face as usize]);
-        let side = |of: &Use| plane.faces_above(&quadric, &self.curve(*of, &frame));
+        let side = |of: &Use| plane.is_face_above(&quadric, &self.curve(*of, &frame));
         let sides: Vec<Vec<bool>> = loops.iter().map(|l| l.iter().map(side).collect()).collect();
         let mut crossings: Vec<Crossing> = Vec::new();
         for (boundary, l) in sides.iter().enumerate() {

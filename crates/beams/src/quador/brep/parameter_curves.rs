@@ -80,8 +80,8 @@ impl Brep<'_> {
             return (ParameterCurve { points, weights: Some(vec![k, curve.weight * l, m]) }, 0.0);
         }
         if let Surface::Plane { .. } = face.surface {
-            let points = curve.points.iter().map(|p| face.surface.parameters(*p)).collect();
-            return (ParameterCurve { points, weights: Some(vec![1.0, curve.weight, 1.0]) }, 0.0);
+            let Bezier { points, weight } = face.surface.flattened(&curve);
+            return (ParameterCurve { points: points.to_vec(), weights: Some(vec![1.0, weight, 1.0]) }, 0.0);
         }
         let off = |made: &ParameterCurve| {
             let deviation = (0..SAMPLES).map(|k| {
@@ -149,6 +149,11 @@ fn along_meridian(surface: &Surface, curve: &Bezier<3>) -> ParameterCurve {
 }
 
 impl Surface {
+    /// A curve in a plane, in its parameters.
+    pub(super) fn flattened(&self, curve: &Bezier<3>) -> Bezier<2> {
+        Bezier { points: curve.points.map(|p| self.parameters(p)), weight: curve.weight }
+    }
+
     /// The point at (u, v).
     pub(super) fn at(&self, [u, v]: [f64; 2]) -> Vec3 {
         let around = |axis: Vec3, side: Vec3, rho: f64, z: f64| {

@@ -10,15 +10,12 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 
-use super::super::bezier::Bezier;
 use super::super::hub_quadric::Quadric;
-use super::super::slice::Plane;
+use super::super::slice::{DISPLACEMENTS, Plane};
 use super::super::tessellation::perpendicular;
 use super::cuts::Plane as Cut;
 use super::{Brep, Corner, Edge, Face, Frame, Kind, NONE, Surface, Use};
 
-/// Displacements that are tried for planes, in typical radii: a displaced plane does not touch what the plane touches.
-const DISPLACEMENTS: [f64; 5] = [0.0, 1e-9, -1e-9, 1e-8, -1e-8];
 /// Distance from a plane within which corners are on it, in typical radii: above the perturbation of seams and the length of
 /// arcs that are collapsed, and far below what files resolve.
 const ON: f64 = 3e-10;
@@ -60,8 +57,7 @@ impl Brep<'_> {
     fn is_trimmed(&mut self, plane: &Plane) -> bool {
         let before = self.state();
         DISPLACEMENTS.iter().any(|by| {
-            let origin = add(plane.origin, scale(plane.normal, by * self.quadors.scale));
-            let done = self.trim_by(&Plane { origin, ..*plane }).is_some();
+            let done = self.trim_by(&plane.moved(by * self.quadors.scale)).is_some();
             if !done {
                 self.restore(&before);
             }
@@ -101,7 +97,7 @@ impl Brep<'_> {
         let of = &self.faces[face as usize];
         let mut sides = self.loops(of).into_iter().flatten().map(|u| {
             let curve = self.curve(u, &of.frame);
-            plane.faces_above(&of.quadric, &curve)
+            plane.is_face_above(&of.quadric, &curve)
         });
         let first = sides.next()?;
         sides.all(|s| s == first).then_some(first)
@@ -208,10 +204,8 @@ impl Brep<'_> {
             let mut polygon: Vec<[f64; 2]> = Vec::new();
             let mut twice = 0.0;
             for of in &l {
-                let Bezier { points, weight } = self.curve(*of, frame);
-                let flat = Bezier::<2> { points: points.map(|p| plane.parameters(p)), weight };
-                let [p, _, r] = flat.points;
-                twice += p[0] * r[1] - p[1] * r[0] + flat.segment_area_twice();
+                let flat = plane.flattened(&self.curve(*of, frame));
+                twice += flat.swept_area_twice([0.0; 2]);
                 flat.flatten(CHORD * self.quadors.scale, &mut polygon);
             }
             if twice > 0.0 {

@@ -200,19 +200,25 @@ fn equal_hubs_have_equal_curves() {
     assert_eq!(of_cells(3), of_cells(4));
 }
 
+/// Eight cells of beams between shaken hubs of different radii, with radii at mid length up to `widest` (mm).
+fn random_frame(random: &mut Random, fillet: Fillet, widest: f64) -> Quadors {
+    let mut graph = block("sc", 2, |_| 0.0, |_| Profile::Cone);
+    for hub in &mut graph.hubs {
+        hub.center = hub.center.map(|v| v + 3.0 * random.next());
+        hub.radius = 0.5 + 0.5 * random.next();
+    }
+    for beam in &mut graph.beams {
+        let mid = Profile::Mid(0.3 + (widest - 0.3) * random.next());
+        beam.profile = if random.next() < 0.5 { Profile::Cone } else { mid };
+    }
+    Quadors::new(&graph, fillet).expect("a frame")
+}
+
 #[test]
 fn random_frames_have_closed_boundaries() {
     let mut random = Random(5);
     for fillet in [Fillet::Auto, Fillet::Tau(0.8), Fillet::None] {
-        let mut graph = block("sc", 2, |_| 0.0, |_| Profile::Cone);
-        for hub in &mut graph.hubs {
-            hub.center = hub.center.map(|v| v + 3.0 * random.next());
-            hub.radius = 0.5 + 0.5 * random.next();
-        }
-        for beam in &mut graph.beams {
-            beam.profile = if random.next() < 0.5 { Profile::Cone } else { Profile::Mid(0.3 + 0.4 * random.next()) };
-        }
-        check(&Quadors::new(&graph, fillet).expect("a frame"));
+        check(&random_frame(&mut random, fillet, 0.7));
     }
 }
 
@@ -282,15 +288,7 @@ fn halves_of_cells_are_closed_and_make_the_whole() {
 fn random_frames_are_cut_by_random_planes() {
     let mut random = Random(23);
     for fillet in [Fillet::Auto, Fillet::Tau(0.8), Fillet::None] {
-        let mut graph = block("sc", 2, |_| 0.0, |_| Profile::Cone);
-        for hub in &mut graph.hubs {
-            hub.center = hub.center.map(|v| v + 3.0 * random.next());
-            hub.radius = 0.5 + 0.5 * random.next();
-        }
-        for beam in &mut graph.beams {
-            beam.profile = if random.next() < 0.5 { Profile::Cone } else { Profile::Mid(0.3 + 0.9 * random.next()) };
-        }
-        let q = Quadors::new(&graph, fillet).expect("a frame");
+        let q = random_frame(&mut random, fillet, 1.2);
         for _ in 0..16 {
             let point = [0; 3].map(|_| 20.0 * random.next());
             let normal = [0; 3].map(|_| 2.0 * random.next() - 1.0);

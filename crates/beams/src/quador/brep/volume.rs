@@ -31,7 +31,7 @@ impl Brep<'_> {
             self.loops(face).into_iter().flatten().map(|u| self.curve(u, &face.frame)).collect();
         let by = sub(self.center(face.frame.hub), about);
         if let Surface::Plane { origin, axes: [u, v] } = face.surface {
-            let area: f64 = curves.iter().map(|c| flat_area_twice(c, origin, [u, v])).sum();
+            let area: f64 = curves.iter().map(|c| face.surface.flattened(c).swept_area_twice([0.0; 2])).sum();
             return Some(0.5 * area * dot(add(origin, by), cross(u, v)));
         }
         let form = match (face.kind, face.surface) {
@@ -46,7 +46,7 @@ impl Brep<'_> {
                     Surface::Rational { chart, .. } => Some(chart.origin),
                     _ => None,
                 };
-                BoundaryForm::within(&face.quadric, middle.into_iter().chain(points.iter().copied()), &points)?
+                BoundaryForm::within(&face.quadric, middle, &points)?
             }
         };
         // With ∫ n dA = ½ ∮ x × dx.
@@ -81,11 +81,4 @@ fn with_derivative(curve: &Bezier<3>, t: f64) -> (Vec3, Vec3) {
     // Of Σ sᵢ (pᵢ − x): less is cancelled.
     let over = add(add(scale(sub(p, x), slopes[0]), scale(sub(q, x), slopes[1])), scale(sub(r, x), slopes[2]));
     (x, scale(over, 1.0 / under))
-}
-
-/// What a curve contributes to twice the area of a planar face, counter-clockwise.
-fn flat_area_twice(curve: &Bezier<3>, origin: Vec3, axes: [Vec3; 2]) -> f64 {
-    let flat = Bezier::<2> { points: curve.points.map(|p| axes.map(|a| dot(sub(p, origin), a))), weight: curve.weight };
-    let [p, _, r] = flat.points;
-    p[0] * r[1] - p[1] * r[0] + flat.segment_area_twice()
 }

@@ -305,6 +305,8 @@ pub(in crate::extract) fn section(right: bool, negative: usize) -> &'static [u8]
 
 /// Least barycentric coordinate of a point that stands for one beyond the simplex.
 const INNER: f64 = 1e-3;
+/// By how much barycentric coordinates of a point of the simplex may leave 0 to 1.
+const ROUNDING: f64 = 1e-9;
 
 /// Barycentric coordinates of the point of a simplex where as many functions vanish as it has dimensions, given their values at
 /// the corners.
@@ -331,8 +333,8 @@ fn barycentric(values: &[[f64; 4]; 3], dimensions: usize) -> [f64; 4] {
     };
     let sum: f64 = w.iter().sum();
     let w = w.map(|x| x / sum);
-    if w.iter().all(|x| (0.0..=1.0).contains(x)) {
-        return w;
+    if w.iter().all(|x| (-ROUNDING..=1.0 + ROUNDING).contains(x)) {
+        return w.map(|x| x.clamp(0.0, 1.0));
     }
     // Signs along a grid edge follow the order of its crossings, which values at its ends may contradict: the functions then vanish
     // beyond the simplex, and the nearest point within stands for that.
