@@ -122,6 +122,19 @@ def test_cuts_along_planes_are_exact(cell, fillet, tmp_path):
     assert measured.volume == pytest.approx(found[0], rel=5e-3)
 
 
+def test_graded_radii_give_finite_numbers(tmp_path):
+    """Beams across the grade have equal radii but for rounding, and are cylinders."""
+    radius = lt.grade.linear([0, 0, 1], {0: 0.4, 8: 0.9})
+    beams = lt.Beams(cell="kelvin", map=lt.map.affine(wavelength=8), radius=radius, fillet="auto")
+    region = lt.region.intersection(BLOCK, lt.region.halfspace(point=[5, 5, 5], normal=[1, 1, 1]))
+    path = tmp_path / "graded.step"
+    made = lt.Design(region=region, beams=beams).build().save_step(path)
+    assert not re.search(r"nan|inf[,)]", path.read_text("ascii"), re.I) and count(entities(path), "CYLINDRICAL_SURFACE") > 0
+    if (judge := judged(path)) is not None:
+        assert judge["valid"] and judge["free_edges"] == 0 and judge["solids"] == made.solids
+        assert judge["volume"] == pytest.approx(made.volume, rel=1e-9)
+
+
 def test_a_box_that_touches_beams_does_not_cut_them(tmp_path):
     """Planes that are tangent to cylinders, and one that cuts."""
     beams = lt.Beams(nodes=[[0, 0, 0], [10, 0, 0]], struts=[[0, 1]], radius=1)

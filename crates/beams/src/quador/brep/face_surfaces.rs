@@ -21,6 +21,8 @@ const CURVE_WEIGHT: f64 = 0.05;
 const ORIENTATIONS: usize = 8;
 /// How often a face without a suitable patch is halved.
 const HALVINGS: u32 = 5;
+/// Deviation of a meridian from a segment, in radii, below which it is one: below that of curves in parameter planes.
+const STRAIGHT: f64 = 1e-11;
 /// Margin of a patch around its face, in sizes of its range.
 const MARGIN: f64 = 1e-3;
 
@@ -59,7 +61,7 @@ impl Brep<'_> {
             }
             Kind::Beam(half_beam) => {
                 let hub = self.quadors.hub(self.faces[face as usize].frame.hub as usize);
-                let surface = self.around_beam(&hub.half_beams[half_beam as usize], &self.boundary(face));
+                let surface = self.around_beam(&hub.half_beams[half_beam as usize], &self.boundary(face))?;
                 self.faces[face as usize].surface = surface;
                 return Some(());
             }
@@ -120,8 +122,8 @@ impl Brep<'_> {
         })
     }
 
-    /// The surface of a beam, with its first meridian opposite a sector with this boundary.
-    fn around_beam(&self, s: &HalfBeam, boundary: &[Bezier<3>]) -> Surface {
+    /// The surface of a beam, with its first meridian opposite a sector with this boundary; `None` if it has no finite numbers.
+    fn around_beam(&self, s: &HalfBeam, boundary: &[Bezier<3>]) -> Option<Surface> {
         let (mut low, mut high, mut out) = (f64::INFINITY, f64::NEG_INFINITY, [0.0; 3]);
         for b in boundary {
             let along = b.points.map(|p| dot(p, s.axis));
@@ -131,16 +133,28 @@ impl Brep<'_> {
         }
         let side = scale(unit(out), -1.0);
         let pencil = self.quadors.pencil(s.beam as usize);
-        if pencil.lambda != pencil.cone_lambda() {
+        if pencil.lambda == pencil.cone_lambda() {
+            if pencil.radii[0] == pencil.radii[1] {
+                return Some(Surface::Cylinder { axis: s.axis, side, radius: pencil.radii[0] });
+            }
+            let (axis, radius) = (scale(s.axis, s.meridian[1].signum()), s.meridian[2].sqrt());
+            return Some(Surface::Cone { axis, side, radius, half_angle: s.meridian[0].sqrt().atan() });
+        }
+        // Radii that are equal but for rounding make a cylinder, or a cone: as a conic, its meridian would be undefined.
+        let [first, middle, last] = [low, 0.5 * (low + high), high].map(|z| s.radius_squared(z).max(0.0).sqrt());
+        let near = STRAIGHT * middle;
+        if (middle - 0.5 * (first + last)).abs() > near {
             let margin = MARGIN * (high - low);
             let meridian = meridian(s, side, [low - margin, high + margin]);
-            Surface::Revolution { axis: s.axis, side, meridian }
-        } else if pencil.radii[0] == pencil.radii[1] {
-            Surface::Cylinder { axis: s.axis, side, radius: pencil.radii[0] }
-        } else {
-            let (axis, radius) = (scale(s.axis, s.meridian[1].signum()), s.meridian[2].sqrt());
-            Surface::Cone { axis, side, radius, half_angle: s.meridian[0].sqrt().atan() }
+            let finite = meridian.points.iter().flatten().all(|v| v.is_finite()) && meridian.weight.is_finite();
+            return finite.then_some(Surface::Revolution { axis: s.axis, side, meridian });
         }
+        if (last - first).abs() <= near {
+            return Some(Surface::Cylinder { axis: s.axis, side, radius: middle });
+        }
+        let slope = (last - first) / (high - low);
+        let (axis, radius) = (scale(s.axis, slope.signum()), middle - 0.5 * (low + high) * slope);
+        Some(Surface::Cone { axis, side, radius, half_angle: slope.abs().atan() })
     }
 
     /// Chooses the patch of a face of a fillet; halves the face where no patch suits all of it.

@@ -4,7 +4,7 @@ use super::super::tests::{Random, random_star, six, star};
 use super::parameter_curves::ParameterCurve;
 use super::*;
 use crate::graph::{Beam, Graph, Hub, Profile, catalogue, named};
-use crate::quador::Fillet;
+use crate::quador::{Fillet, Pencil};
 use geometry::math::{cross, dot, norm, scale, unit};
 
 /// How far edges are off faces, relative to the distance from the hub's centre. The planes of seams are displaced by some 1e-12
@@ -293,6 +293,33 @@ fn random_frames_are_cut_by_random_planes() {
             let point = [0; 3].map(|_| 20.0 * random.next());
             let normal = [0; 3].map(|_| 2.0 * random.next() - 1.0);
             check_halves(&q, point, normal, &format!("{fillet:?} {point:?} {normal:?}"));
+        }
+    }
+}
+
+/// As graded radii are: equal, or on a cone, but for rounding.
+#[test]
+fn beams_that_are_nearly_straight_are_cylinders_and_cones() {
+    let cone = Pencil::new(10.0, [0.5, 0.3], Profile::Cone).expect("a cone").lambda;
+    for (radii, profile) in [
+        ([0.3, 0.3], Profile::Mid(0.1 + 0.2)),
+        ([0.3, 0.3], Profile::Mid(0.3 * (1.0 - 1e-14))),
+        ([0.5, 0.3], Profile::Lambda(cone * (1.0 + 1e-15))),
+        ([0.5, 0.3], Profile::Lambda(cone * (1.0 - 1e-13))),
+    ] {
+        let hub = |x: f64, radius: f64| Hub { center: [x, 0.0, 0.0], radius };
+        let hubs = vec![hub(0.0, radii[0]), hub(10.0, radii[1])];
+        let q =
+            Quadors::new(&Graph { hubs, beams: vec![Beam { ends: [0, 1], profile }] }, Fillet::None).expect("a rod");
+        check(&q);
+        let brep = q.brep(&[]).expect("a boundary");
+        let beams = brep.faces.iter().filter(|f| matches!(f.kind, Kind::Beam(_))).map(|f| f.surface);
+        for surface in beams {
+            match surface {
+                Surface::Cylinder { .. } => assert!(radii[0] == radii[1]),
+                Surface::Cone { .. } => assert!(radii[0] != radii[1]),
+                other => panic!("{other:?}"),
+            }
         }
     }
 }
