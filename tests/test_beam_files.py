@@ -115,6 +115,22 @@ def test_waists_are_frusta_within_the_stated_error_and_hubs_are_balls(tmp_path):
     assert (outside[free] > 0).all() and (inside[free] < 0).all()
 
 
+@pytest.mark.parametrize("radius", ["0.4", '{ linear = { along = [0, 0, 1], stops = [[-6, 0.3], [6, 0.6]] } }'])
+def test_chains_of_frusta_read_back_are_the_quadrics_that_they_were(tmp_path, radius):
+    box = "[region.box]\nsize = [12, 12, 12]\n[beams.core]\n"
+    solid = built(box + f'cell = "kelvin"\nradius = {radius}\nhub = 0.7\nmap.affine.wavelength = 6\n')
+    made = solid.save_beams(tmp_path / "a.3mf")
+    count = len(solid.beams["core"]["struts"])
+    assert made.split == count
+    with pytest.warns(lt.DesignWarning, match=f"frusta in chains that represent quadrics read as {count} beams"):
+        again = built(box + f"path = '{tmp_path / 'a.3mf'}'")
+    assert all(len(again.beams["core"][key]) == len(solid.beams["core"][key]) for key in ("struts", "radii"))
+    points = np.random.default_rng(1).uniform(-6, 6, (20000, 3))
+    # Positions have seven digits of 12 mm; a contact circle's is divided by its distance from the radical plane for λ.
+    assert abs(again.field(points) - solid.field(points)).max() < 1e-4
+    assert not [w for w in again.warnings if "without a common node" in str(w)]
+
+
 def test_what_no_file_of_beams_holds_is_refused(tmp_path):
     skin = CUT + "[skin]\nthickness = 1\n"
     with pytest.raises(ValueError, match=r"skin or a kept zone.*write a mesh"):

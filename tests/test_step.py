@@ -201,6 +201,8 @@ def test_both_protocols_have_the_same_solids(tmp_path, capsys):
     capsys.readouterr()
     assert main(["mesh", str(design), "-o", str(mesh), "--protocol", "ap242"]) == 1
     assert "--protocol is of STEP files" in capsys.readouterr().err and not mesh.exists()
+    assert main(["mesh", str(design), "-o", str(mesh), "--no-assembly"]) == 1
+    assert "--assembly is of STEP files" in capsys.readouterr().err and not mesh.exists()
     with pytest.raises(ValueError, match="protocol is ap203; it must be ap214 or ap242"):
         solid().save_step(path, protocol="ap203")
 
@@ -259,6 +261,11 @@ def test_a_cad_kernel_reads_closed_solids_of_cut_cells(cell, tmp_path):
     assert found["volume"] == pytest.approx(made.volume, rel=1e-7)
 
 
+def test_lattices_of_smooth_surfaces_are_no_assemblies(tmp_path):
+    with pytest.raises(ValueError, match="assembly: the parts of an assembly are hubs with their beams"):
+        cells("gyroid", "sheet").build().save_step(tmp_path / "no.step", assembly=True)
+
+
 def test_a_cad_kernel_reads_closed_voids(tmp_path):
     pytest.importorskip("OCP.STEPControl")
     from step_judge import step_solid
@@ -268,6 +275,51 @@ def test_a_cad_kernel_reads_closed_voids(tmp_path):
     found = step_solid(tmp_path / "void.step")
     assert found["valid"] and found["free_edges"] == 0 and found["solids"] == made.solids == 1
     assert found["volume"] == pytest.approx(made.volume, rel=1e-7) == pytest.approx(0.97 * 512, rel=2e-4)
+
+
+@pytest.mark.parametrize(("cut", "fillet"), [({}, None), ({"min": [-1, 2.5, 1], "max": [11, 10, 8.2]}, "auto")])
+def test_a_cad_kernel_places_the_parts_of_an_assembly(cut, fillet, tmp_path):
+    """Hub by hub the solids are those of the one shell: their volume, and where they are."""
+    pytest.importorskip("OCP.STEPControl")
+    from step_judge import step_solid
+
+    region = lt.region.box(**(cut or {"min": [-1, -1, -1], "max": [11, 11, 11]}))
+    beams = lt.Beams(cell="bcc", map=lt.map.affine(wavelength=5), radius=0.5, **({"fillet": fillet} if fillet else {}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        inner = lt.Design(region=region, beams=beams).build()
+    built = inner if cut else whole(inner, fillet)
+    one, made = built.save_step(tmp_path / "one.step"), built.save_step(tmp_path / "all.step", assembly=True)
+    found = step_solid(tmp_path / "all.step")
+    assert one.parts is None and 0 < made.parts < made.solids
+    assert found["valid"] and found["free_edges"] == 0 and found["solids"] == made.solids
+    # Planes that coincide with the end of a half-beam are moved by two millionths of the radius.
+    assert made.volume == pytest.approx(one.volume, rel=1e-6 if cut else 1e-10)
+    assert found["volume"] == pytest.approx(made.volume, rel=1e-9)
+    points = found["points"]
+    caps = abs(built.field(points)) > 1e-9
+    assert (built.field(points) < 1e-9).all() and 0 < caps.sum() < len(points) / 2
+
+
+def test_large_lattices_of_equal_hubs_are_assemblies(tmp_path):
+    """One part for each kind of hub, by its directions; where all differ it stays one shell."""
+    n = 13
+    nodes = [[2 * x, 2 * y, 2 * z] for x in range(n) for y in range(n) for z in range(n)]
+    index = {tuple(p): i for i, p in enumerate(nodes)}
+    steps = [(2, 0, 0), (0, 2, 0), (0, 0, 2)]
+    struts = [[i, index[q]] for p, i in index.items() for s in steps if (q := tuple(map(sum, zip(p, s, strict=True)))) in index]
+    beams = lt.Beams(nodes=nodes, struts=struts, radius=0.3, fillet="auto")
+    built = lt.Design(region=ROOM, beams=beams).build()
+    made = built.save_step(tmp_path / "sc.step")
+    found = entities(tmp_path / "sc.step")
+    # Corners, edges, faces and the inside of the block.
+    assert (made.parts, made.solids) == (8 + 12 + 6 + 1, n**3)
+    assert count(found, "NEXT_ASSEMBLY_USAGE_OCCURRENCE") == n**3 and count(found, "PRODUCT") == 1 + made.parts
+    assert made.volume == pytest.approx(built.quadors().volume(), rel=1e-10)
+    assert (tmp_path / "sc.step").stat().st_size < 2200 * made.solids
+    graded = lt.Beams(nodes=nodes, struts=struts, radius=lt.grade.linear([1, math.sqrt(2), math.pi], [[-1, 0.2], [140, 0.4]]))
+    other = lt.Design(region=ROOM, beams=graded).build().save_step(tmp_path / "graded.step")
+    assert (other.parts, other.solids) == (None, 1)
 
 
 def test_other_maps_and_levels_have_patches(tmp_path):

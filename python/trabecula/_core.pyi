@@ -317,6 +317,7 @@ class Solid:
         path: str,
         title: tuple[str, str],
         tolerance: float | None = None,
+        assembly: bool | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> StepReport: ...

@@ -360,6 +360,12 @@ COMMANDS = {
         ),
         option("--no-mesh", action="store_true", help="with --beams, no coarse mesh for programs that cannot show beams"),
         option("--protocol", choices=STEP_PROTOCOLS, help="of a .step, the application protocol (default: ap214)"),
+        option(
+            "--assembly",
+            action=argparse.BooleanOptionalAction,
+            help="of a .step of beams, a part for each distinct hub, placed wherever it is (default: for more than 2,000 hubs "
+            "that are alike)",
+        ),
         *(JSON, *NOTICES),
     ),
     "simplify": (

@@ -29,8 +29,9 @@ def mesh(args) -> None:
         raise Refused("--no-mesh belongs to --beams; add it")
     if kind_of(args.output) in STEP_WRITES:
         return mesh_step(args)
-    if args.protocol:
-        raise Refused(f"--protocol is of STEP files, and {args.output} is none; leave it out, or write a .step")
+    for name in ("protocol", "assembly"):
+        if getattr(args, name) is not None:
+            raise Refused(f"--{name} is of STEP files, and {args.output} is none; leave it out, or write a .step")
     if kind_of(args.output) not in MESH_WRITES:
         if not design_of(args.design).beams:
             raise Refused(
@@ -81,15 +82,15 @@ def mesh_step(args) -> None:
         near = "exact"
         if made["angle"] is not None:
             near = f"within {made['deviation']:.2g} mm, normals within {made['angle']:.2g} degrees"
-        return (
-            f"{made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, "
-            f"{counted(made['solids'], 'solid')}; {near}"
-        )
+        whole = counted(made["solids"], "solid")
+        if made["parts"] is not None:
+            whole = f"an assembly of {counted(made['parts'], 'distinct part')}, {whole} in all"
+        return f"{made['faces']} faces, {made['edges']} edges, volume {figure(made['volume'])} mm³, {whole}; {near}"
 
     def save(solid: Solid) -> dict:
         with Progress("fitting patches", args.progress) as progress:
             protocol = args.protocol or STEP_PROTOCOLS[0]
-            return solid.save_step(args.output, args.tolerance, args.threads, progress, protocol).to_dict()
+            return solid.save_step(args.output, args.tolerance, args.threads, progress, protocol, args.assembly).to_dict()
 
     without_mesh(args, save, words)
 
@@ -97,7 +98,7 @@ def mesh_step(args) -> None:
 def mesh_beams(args) -> None:
     """``trabecula mesh --beams``."""
     kind = kind_of(args.output)
-    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "protocol"]
+    names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "protocol", "assembly"]
     names += [] if kind == "3mf" else ["chord", "no_mesh"]
     refuse_others(args, names, ("drop-small",), f"--beams and a .{kind}: it has beams, not their surface")
 
@@ -114,7 +115,8 @@ def mesh_beams(args) -> None:
 
 def mesh_implicit(args) -> None:
     """``trabecula mesh --implicit``."""
-    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord", "protocol")
+    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord")
+    names += ("protocol", "assembly")
     refuse_others(args, names, ("drop-small",), "--implicit: the file has a function, and no triangles")
 
     def words(made: dict) -> str:

@@ -934,9 +934,11 @@ class StepReport(Report):
     edges: int
     """Number of edges."""
     faces: int
-    """Number of faces."""
+    """Number of faces; of an assembly those of distinct parts, as all that follows but the volume."""
+    parts: int | None
+    """Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none."""
     solids: int
-    """Number of solids: connected components."""
+    """Number of solids: connected components, or placed parts of an assembly."""
     vertices: int
     """Number of vertices."""
     volume: float

@@ -516,6 +516,7 @@ class Solid(Seen, Simulated):
         threads: int | None = None,
         progress: Progress | None = None,
         protocol: str = "ap214",
+        assembly: bool | None = None,
     ) -> StepReport:
         """Writes a STEP file (.step or .stp; mm) of smooth faces for CAD systems, and gives its figures. Each connected
         component is a solid. ``protocol`` is "ap214" or "ap242".
@@ -523,6 +524,10 @@ class Solid(Seen, Simulated):
         Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
         rational B-splines; where a box, a tetrahedron, half-spaces or an intersection of these cuts them, the cuts are planar
         faces. A ValueError for other regions that cut them, and beams that run into each other without a node.
+
+        With ``assembly`` a lattice of beams is one, of which each part is a hub with its half-beams, closed by planar faces
+        where beams are halved: equal ones are written once and placed. None makes it one where there are more than 2,000 hubs
+        and at most half as many distinct ones; False keeps every connected component one solid.
 
         Of lattices and blends of them in a box the surface is bicubic patches, with planar faces in the box's planes.
         Patches are no farther than ``tolerance`` (mm; default: a thousandth of ``wavelength``) from the surface, and have its
@@ -534,7 +539,7 @@ class Solid(Seen, Simulated):
         name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
-            return self._core.write_step(temporary, (name, protocol), within, thread_count(threads), progress)
+            return self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
 
     def save_beams(
         self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None

@@ -8,8 +8,8 @@
 use rayon::prelude::*;
 
 use crate::quador::{Pencil, Quadors};
-use geometry::formats::{BeamLattice, Cap, Frustum};
-use geometry::math::{add, norm, scale, sub};
+use geometry::formats::{BeamGraph, BeamLattice, Cap, Frustum};
+use geometry::math::{add, dot, norm, scale, sub};
 
 /// Greatest depth of bisection: an error falls to a quarter with each.
 const DEPTH: usize = 12;
@@ -81,6 +81,147 @@ impl Quadors {
         lattice.balls = balls.map(|i| (i as u32, self.hub(i).radius)).collect();
         out
     }
+}
+
+/// How far the nodes of a chain may be from the meridian of one quadric, as a share of its radius: files give some seven digits.
+const SAME: f64 = 1e-4;
+
+/// What became of chains of frusta.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Joined {
+    /// The beams that were chains: the last ones.
+    pub beams: core::ops::Range<u32>,
+    /// Number of frusta that were parts of them.
+    pub frusta: usize,
+}
+
+/// Makes one beam of each chain of frusta that represents one quadric as [`Quadors::frusta`] does: the radius of its two ends is then
+/// that of the quadric at mid length. What goes on from a hub to a contact circle behind its centre is dropped, as its ball holds it.
+/// Other chains stay.
+pub fn join_chains(graph: &mut BeamGraph) -> Joined {
+    let mut is_joint = vec![false; graph.nodes.len()];
+    graph.flat.iter().for_each(|n| is_joint[*n as usize] = true);
+    let mut links: Vec<Vec<u32>> = vec![Vec::new(); graph.nodes.len()];
+    let mut sizes = graph.radii.clone();
+    sizes.resize(graph.nodes.len(), f64::NAN);
+    for (i, (ends, radii)) in graph.beams.iter().zip(&graph.beam_radii).enumerate() {
+        for (n, r) in ends.iter().zip(radii) {
+            links[*n as usize].push(i as u32);
+            if graph.radii.get(*n as usize).is_none_or(|ball| ball.is_nan()) {
+                sizes[*n as usize] = sizes[*n as usize].max(*r);
+            }
+        }
+    }
+    let mut used = vec![false; graph.beams.len()];
+    let mut made = Vec::new();
+    let mut joined = Joined::default();
+    for first in 0..graph.beams.len() {
+        let Some(at) = graph.beams[first].iter().position(|n| !is_joint[*n as usize]).filter(|_| !used[first]) else {
+            continue;
+        };
+        let chain = follow(graph, &is_joint, &links, first, at);
+        if leads_to_contact(graph, &sizes, &links, &chain) {
+            chain.iter().for_each(|(i, _)| used[*i] = true);
+            joined.frusta += chain.len();
+        } else if let Some(radius) = quadric_of(graph, &sizes, &chain) {
+            chain.iter().for_each(|(i, _)| used[*i] = true);
+            joined.frusta += chain.len();
+            let (last, end) = chain[chain.len() - 1];
+            made.push(([graph.beams[first][at], graph.beams[last][1 - end]], [radius; 2]));
+        }
+    }
+    let kept = used.iter().filter(|u| !**u).count() as u32;
+    joined.beams = kept..kept + made.len() as u32;
+    if joined.frusta > 0 {
+        let mut left = used.iter();
+        graph.beams.retain(|_| left.next() == Some(&false));
+        let mut left = used.iter();
+        graph.beam_radii.retain(|_| left.next() == Some(&false));
+        graph.beams.extend(made.iter().map(|(ends, _)| ends));
+        graph.beam_radii.extend(made.iter().map(|(_, radii)| radii));
+        graph.drop_unused();
+    }
+    joined
+}
+
+/// The frusta from an end on, through joints, each with the end at which it is entered.
+fn follow(
+    graph: &BeamGraph,
+    is_joint: &[bool],
+    links: &[Vec<u32>],
+    first: usize,
+    entered: usize,
+) -> Vec<(usize, usize)> {
+    let mut chain = vec![(first, entered)];
+    loop {
+        let (i, end) = chain[chain.len() - 1];
+        let node = graph.beams[i][1 - end];
+        // A chain ends where it comes back to its start, too.
+        let next = links[node as usize].iter().map(|l| *l as usize).find(|l| *l != i);
+        let Some(next) = next.filter(|_| is_joint[node as usize]) else {
+            return chain;
+        };
+        chain.push((next, usize::from(graph.beams[next][1] == node)));
+    }
+}
+
+/// Whether a chain ends at a circle on the ball of the hub where it begins, and nothing goes on from there.
+fn leads_to_contact(graph: &BeamGraph, sizes: &[f64], links: &[Vec<u32>], chain: &[(usize, usize)]) -> bool {
+    let [(first, entered), ..] = *chain else { return false };
+    let (last, left) = chain[chain.len() - 1];
+    let [hub, tip] = [graph.beams[first][entered], graph.beams[last][1 - left]].map(|n| n as usize);
+    let length = norm(sub(graph.nodes[tip], graph.nodes[hub]));
+    let flat = graph.flat.binary_search(&(tip as u32)).is_ok() && links[tip].len() == 1;
+    flat && (length.hypot(graph.beam_radii[last][1 - left]) / sizes[hub] - 1.0).abs() <= SAME
+}
+
+/// The radius at mid length of the quadric that a chain of frusta represents, mm; `None` if it is none.
+fn quadric_of(graph: &BeamGraph, sizes: &[f64], chain: &[(usize, usize)]) -> Option<f64> {
+    let [(first, entered), .., (last, left)] = *chain else { return None };
+    let ends = [graph.beams[first][entered], graph.beams[last][1 - left]];
+    let [from, to] = ends.map(|n| graph.nodes[n as usize]);
+    let length = norm(sub(to, from));
+    let radii = ends.map(|n| sizes[n as usize]);
+    let least = (radii[0] - radii[1]).abs();
+    if least.is_nan() || length <= least {
+        return None;
+    }
+    let axis = scale(sub(to, from), 1.0 / length);
+    // Positions on the axis and radii at the joints, of both frusta that meet there.
+    let mut joints = Vec::new();
+    for pair in chain.windows(2) {
+        let [(i, end), (j, start)] = [pair[0], pair[1]];
+        let way = sub(graph.nodes[graph.beams[i][1 - end] as usize], from);
+        let z = dot(way, axis);
+        let radii = [graph.beam_radii[i][1 - end], graph.beam_radii[j][start]];
+        if norm(sub(way, scale(axis, z))) > SAME * radii[0] {
+            return None;
+        }
+        joints.push((z, radii));
+    }
+    // Contact circles are L/2λ from the radical plane. A straight neck leads to one; where both lie behind the centres, λ is a root of
+    // u²λ² − qλ + L²/4 at any position u from that plane.
+    let has_neck = |i: usize| graph.beam_radii[i][0] == graph.beam_radii[i][1];
+    let pencil = Pencil { length, radii, lambda: 1.0 };
+    let radical = pencil.radical_plane();
+    let lambdas = if has_neck(first) {
+        [0.5 * length / (radical - joints[0].0); 2]
+    } else if has_neck(last) {
+        [0.5 * length / (joints[joints.len() - 1].0 - radical); 2]
+    } else {
+        let (z, [r, _]) = joints[joints.len() / 2];
+        let u = z - radical;
+        let q = r * r - radii[0] * radii[0] + z * z - length * u;
+        let root = (q * q - (u * length).powi(2)).max(0.0).sqrt();
+        [q + root, q - root].map(|of| 0.5 * length * length / of)
+    };
+    let (low, high) = pencil.lambda_range();
+    let is_on = |of: &Pencil| {
+        let near = |z: f64, r: f64| (r - of.radius_squared(z).max(0.0).sqrt()).abs() <= SAME * r;
+        joints.iter().all(|(z, radii)| radii.iter().all(|r| near(*z, *r)))
+    };
+    let found = lambdas.into_iter().filter(|l| *l > low && *l < high).map(|lambda| Pencil { lambda, ..pencil });
+    found.into_iter().find(is_on).map(|p| p.radius_squared(0.5 * length).max(0.0).sqrt())
 }
 
 /// The frusta of a beam, and the greatest error of its radii, mm.
@@ -226,6 +367,42 @@ mod tests {
                 // By sampling the greatest difference is found from below.
                 assert!(worst <= made.error + 1e-9, "{profile:?} {tolerance}: {worst} > {}", made.error);
                 assert!(worst >= 0.9 * made.error - 1e-9, "{profile:?} {tolerance}: {worst} < {}", made.error);
+            }
+        }
+    }
+
+    #[test]
+    fn chains_become_the_quadrics_that_they_were() {
+        let cases = [
+            (10.0, [1.0, 1.0], Profile::Mid(0.4)),
+            (10.0, [1.0, 2.0], Profile::Mid(0.7)),
+            (10.0, [2.0, 0.5], Profile::Cone),
+            (6.0, [1.0, 1.0], Profile::Mid(1.4)),
+            (4.0, [1.0, 1.3], Profile::Waist(0.3)),
+            (5.0, [1.5, 0.5], Profile::Lambda(0.9)),
+        ];
+        for (length, radii, profile) in cases {
+            let beams = pair(length, radii, profile);
+            let made = beams.frusta(0.003);
+            let mut graph = BeamGraph::from(&made.lattice);
+            graph.flat = (2..graph.nodes.len() as u32).collect();
+            let joined = join_chains(&mut graph);
+            assert_eq!(
+                (graph.nodes.len(), joined.frusta),
+                (2, if made.split == 1 { made.lattice.beams.len() } else { 0 })
+            );
+            if made.split == 1 {
+                let [r, _] = graph.beam_radii[0];
+                let want = beams.pencil(0).radius_squared(0.5 * length).sqrt();
+                assert!((r - want).abs() < 1e-9 && joined.beams == (0..1), "{profile:?}: {r} {want}");
+            }
+            // A joint that is moved is on no quadric.
+            let mut moved = BeamGraph::from(&made.lattice);
+            moved.flat = (2..moved.nodes.len() as u32).collect();
+            let middle = moved.beams.len() / 2;
+            if let Some(r) = moved.beam_radii.get_mut(middle).filter(|_| made.split == 1) {
+                r[0] *= 1.001;
+                assert!(join_chains(&mut moved).beams.is_empty());
             }
         }
     }

@@ -14,15 +14,17 @@ use geometry::math::{Vec3, add, cross};
 use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
-use crate::quador::brep::{Brep, CurveKey, Surface, Use};
+use crate::quador::brep::{Brep, CurveKey, Piece, Surface, Use};
 use crate::quador::slice::Plane;
 
 /// What a STEP file contains.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepSummary {
-    /// Number of solids: connected components.
+    /// Number of solids: connected components, or placed parts of an assembly.
     pub solids: usize,
-    /// Number of faces.
+    /// Number of distinct parts of an assembly, each a hub with its half-beams; `None` if there is none.
+    pub parts: Option<usize>,
+    /// Number of faces written.
     pub faces: usize,
     /// Number of edges.
     pub edges: usize,
@@ -32,8 +34,17 @@ pub struct StepSummary {
     pub volume: f64,
 }
 
+/// Number of hubs up to which a lattice is one shell unless asked otherwise.
+const SHELL: usize = 2000;
+/// Least volume of a solid of an assembly, in cubes of the typical radius: less is what moved planes leave.
+const SLIVER: f64 = 1e-5;
+
 /// Writes the boundary of a quador lattice, or of what is behind all of some planes (on the side away from their normals), as a
 /// STEP file (mm). The same lattice gives the same bytes.
+///
+/// With `assembly` it is one, of which each part is a hub with its half-beams, closed by planar faces where beams are halved:
+/// equal ones are written once and placed by translations. Unless said, it is one if there are more than 2,000 hubs and at most half
+/// as many distinct ones.
 ///
 /// # Errors
 /// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close; planes that touch the boundary and
@@ -42,19 +53,23 @@ pub fn write_step(
     quadors: &Quadors,
     planes: &[Plane],
     title: Title,
+    assembly: Option<bool>,
     out: &mut dyn io::Write,
 ) -> Result<StepSummary, Stopped> {
-    let refused = |message: &str| Stopped::Refused(Fault::new("region", message));
+    let many = assembly.unwrap_or(quadors.len() > SHELL);
+    let pieces = if many { quadors.pieces(planes) } else { Vec::new() };
+    if assembly.unwrap_or(2 * pieces.len() <= quadors.len()) && many {
+        return write_assembly(quadors, &pieces, title, out);
+    }
     let brep = quadors.brep(planes).map_err(Stopped::Refused)?;
     let components = brep.components();
     if components.is_empty() {
-        return Err(refused("no beam is in the region"));
+        return Err(nothing_left());
     }
     let mut volume = 0.0;
     for faces in &components {
         checkpoint();
-        let within =
-            brep.volume(faces).ok_or_else(|| refused("a face is too thin to be resolved: move the region a little"))?;
+        let within = volume_within(&brep, faces)?;
         if within <= 0.0 {
             return Err(refused(
                 "the beams enclose a cavity, which a STEP file of them cannot have: make them thinner",
@@ -63,6 +78,18 @@ pub fn write_step(
         volume += within;
     }
     write(&brep, (&components, volume), title, out).map_err(Stopped::Io)
+}
+
+fn refused(message: &str) -> Stopped {
+    Stopped::Refused(Fault::new("region", message))
+}
+
+fn nothing_left() -> Stopped {
+    refused("no beam is in the region")
+}
+
+fn volume_within(brep: &Brep, faces: &[u32]) -> Result<f64, Stopped> {
+    brep.volume(faces).ok_or_else(|| refused("a face is too thin to be resolved: move the region a little"))
 }
 
 fn write(
@@ -74,23 +101,80 @@ fn write(
     let mut file = Part21::new(out, title)?;
     let product = Product::write(&mut file)?;
     let planar = file.parameter_plane()?;
-    let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
-    let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
-    let mut solids = Vec::new();
-    for faces in components {
-        solids.push(writer.solid(faces)?);
-    }
-    let summary = StepSummary {
-        solids: solids.len(),
-        faces: brep.faces.len(),
-        edges: writer.edges.iter().flatten().count(),
-        vertices: writer.corners.iter().flatten().count(),
-        volume,
-    };
-    let Writer { mut file, .. } = writer;
+    let mut summary = StepSummary { volume, ..StepSummary::default() };
+    let solids = write_solids(brep, components, &mut file, planar, &mut summary)?;
     product.finish(&mut file, &solids)?;
     file.finish()?;
     Ok(summary)
+}
+
+/// Writes solids and counts what they have.
+fn write_solids(
+    brep: &Brep,
+    components: &[Vec<u32>],
+    file: &mut Part21,
+    planar: Id,
+    summary: &mut StepSummary,
+) -> io::Result<Vec<Id>> {
+    let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
+    let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
+    let mut solids = Vec::with_capacity(components.len());
+    for faces in components {
+        solids.push(writer.solid(faces)?);
+        summary.faces += faces.len();
+    }
+    summary.solids += solids.len();
+    summary.edges += writer.edges.iter().flatten().count();
+    summary.vertices += writer.corners.iter().flatten().count();
+    Ok(solids)
+}
+
+fn write_assembly(
+    quadors: &Quadors,
+    pieces: &[Piece],
+    title: Title,
+    out: &mut dyn io::Write,
+) -> Result<StepSummary, Stopped> {
+    quadors.require_brep().map_err(Stopped::Refused)?;
+    let mut file = Part21::new(out, title).map_err(Stopped::Io)?;
+    let whole = Product::write(&mut file).map_err(Stopped::Io)?;
+    let planar = file.parameter_plane().map_err(Stopped::Io)?;
+    let mut parts = Vec::with_capacity(pieces.len());
+    let mut summary = StepSummary::default();
+    let mut solids = 0;
+    for piece in pieces {
+        checkpoint();
+        let brep = quadors.piece(piece).map_err(Stopped::Refused)?;
+        let mut components = brep.components();
+        let mut volume = 0.0;
+        let mut kept = Vec::with_capacity(components.len());
+        for faces in &components {
+            let within = volume_within(&brep, faces)?;
+            let is_solid = within > SLIVER * quadors.typical_radius().powi(3);
+            volume += if is_solid { within } else { 0.0 };
+            kept.push(is_solid);
+        }
+        let mut left = kept.into_iter();
+        components.retain(|_| left.next() == Some(true));
+        if components.is_empty() {
+            continue;
+        }
+        summary.volume += volume * piece.hubs.len() as f64;
+        solids += components.len() * piece.hubs.len();
+        let mut write = || {
+            let product = whole.another(&mut file, &format!("hub {}", parts.len() + 1))?;
+            let solids = write_solids(&brep, &components, &mut file, planar, &mut summary)?;
+            product.finish(&mut file, &solids)
+        };
+        let shape = write().map_err(Stopped::Io)?;
+        parts.push((shape, piece.hubs.iter().map(|h| quadors.center(*h as usize)).collect()));
+    }
+    if parts.is_empty() {
+        return Err(nothing_left());
+    }
+    whole.assemble(&mut file, &parts).map_err(Stopped::Io)?;
+    file.finish().map_err(Stopped::Io)?;
+    Ok(StepSummary { solids, parts: Some(parts.len()), ..summary })
 }
 
 /// A corner: its point and its vertex.
@@ -101,9 +185,9 @@ struct WrittenCorner {
 }
 
 /// Writes faces; edges, corners and curves once each.
-struct Writer<'a> {
+struct Writer<'a, 'f> {
     brep: &'a Brep<'a>,
-    file: Part21<'a>,
+    file: &'a mut Part21<'f>,
     /// The context of curves in parameter planes.
     planar: Id,
     /// The corners, by number.
@@ -114,7 +198,7 @@ struct Writer<'a> {
     edges: Vec<Option<Id>>,
 }
 
-impl Writer<'_> {
+impl Writer<'_, '_> {
     /// A connected component, from the numbers of its faces.
     fn solid(&mut self, faces: &[u32]) -> io::Result<Id> {
         // The surfaces first, since edges refer to those of both their faces.
@@ -283,7 +367,7 @@ mod tests {
 
     fn text() -> (String, StepSummary) {
         let mut out = Vec::new();
-        let made = write_step(&lattice(), &[], Title { name: "it's", ..Title::default() }, &mut out)
+        let made = write_step(&lattice(), &[], Title { name: "it's", ..Title::default() }, None, &mut out)
             .expect("written to memory");
         (String::from_utf8(out).expect("ASCII"), made)
     }

@@ -426,14 +426,15 @@ impl Solid {
     }
 
     /// Writes a STEP file at `path`, of a product's name and a protocol ("ap214", "ap242"): beams alone exactly, lattices in a box as
-    /// patches within `tolerance` (mm); gives its `reports.StepReport`.
-    #[pyo3(signature = (path, title, tolerance=None, threads=None, progress=None))]
+    /// patches within `tolerance` (mm); gives its `reports.StepReport`. `assembly`: whether beams are written hub by hub.
+    #[pyo3(signature = (path, title, tolerance=None, assembly=None, threads=None, progress=None))]
     fn write_step<'py>(
         &self,
         py: Python<'py>,
         path: PathBuf,
         title: (String, String),
         tolerance: Option<f64>,
+        assembly: Option<bool>,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -443,7 +444,7 @@ impl Solid {
         let title = Title { name, protocol: Protocol::of(protocol).ok_or_else(known)? };
         let made = run(py, threads, progress, |p| {
             let mut out = BufWriter::new(file::anew(&path).map_err(Stopped::Io)?);
-            self.built.write_step(title, tolerance, &mut out, p)
+            self.built.write_step(title, tolerance, assembly, &mut out, p)
         })?;
         report(py, "StepReport", &made.map_err(error::stopped)?)
     }

@@ -389,7 +389,8 @@ impl Built {
     }
 
     /// Writes a STEP file (mm): of beams alone their exact surface, of lattices in a box bicubic
-    /// patches no farther than `tolerance` (mm; a thousandth of the smallest wavelength unless given) from it.
+    /// patches no farther than `tolerance` (mm; a thousandth of the smallest wavelength unless given) from it. `assembly`: whether
+    /// beams are written hub by hub, as `beams::write_step` says.
     ///
     /// # Errors
     /// What else the design contains; beams without a boundary in closed form, and as `Patches::new`; a tolerance for beams;
@@ -398,10 +399,11 @@ impl Built {
         &self,
         title: Title,
         tolerance: Option<f64>,
+        assembly: Option<bool>,
         out: &mut dyn io::Write,
         progress: &dyn Progress,
     ) -> Result<StepReport, Stopped> {
-        build_step::write(self, title, tolerance, out, progress)
+        build_step::write(self, title, tolerance, assembly, out, progress)
     }
 
     /// The chord error (mm) at which `beam_surface` makes a surface unless another resolution is asked for: a fiftieth of the radius

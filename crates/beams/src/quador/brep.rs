@@ -19,10 +19,12 @@ mod cuts;
 mod face_surfaces;
 mod outline;
 mod parameter_curves;
+mod pieces;
 mod plane_trim;
 mod volume;
 
 pub(crate) use parameter_curves::CurveKey;
+pub(crate) use pieces::Piece;
 
 const NONE: u32 = u32::MAX;
 
@@ -112,6 +114,8 @@ pub(crate) struct Face {
 /// The boundary of a quador lattice.
 pub(crate) struct Brep<'a> {
     quadors: &'a Quadors,
+    /// The position that all are relative to, mm.
+    origin: Vec3,
     /// The corners.
     pub corners: Vec<Corner>,
     edges: Vec<Edge>,
@@ -126,6 +130,19 @@ impl Quadors {
     /// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close, and faces that
     /// have no rational form; planes that touch the boundary and cut nothing there.
     pub(crate) fn brep(&self, planes: &[Plane]) -> Result<Brep<'_>, Fault> {
+        self.require_brep()?;
+        let mut brep =
+            Brep { quadors: self, origin: [0.0; 3], corners: Vec::new(), edges: Vec::new(), faces: Vec::new() };
+        brep.outline()?;
+        brep.set_surfaces()?;
+        brep.trim(planes)?;
+        brep.divide_edges();
+        Ok(brep)
+    }
+
+    /// # Errors
+    /// Beams that intersect without a common hub or overlap too far.
+    pub(crate) fn require_brep(&self) -> Result<(), Fault> {
         self.require_closed_forms()?;
         if let Some(found) = self.collisions().first() {
             let [a, b] = found.beams;
@@ -136,19 +153,14 @@ impl Quadors {
                 ),
             ));
         }
-        let mut brep = Brep { quadors: self, corners: Vec::new(), edges: Vec::new(), faces: Vec::new() };
-        brep.outline()?;
-        brep.set_surfaces()?;
-        brep.trim(planes)?;
-        brep.divide_edges();
-        Ok(brep)
+        Ok(())
     }
 }
 
 impl Brep<'_> {
     /// The centre of a hub, mm.
     pub(crate) fn center(&self, hub: u32) -> Vec3 {
-        self.quadors.center(hub as usize)
+        sub(self.quadors.center(hub as usize), self.origin)
     }
 
     /// Number of edges, those included that were divided.

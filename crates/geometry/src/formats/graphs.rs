@@ -28,6 +28,8 @@ pub struct BeamGraph {
     pub beams: Vec<[u32; 2]>,
     /// Radii of each beam at its two ends.
     pub beam_radii: Vec<[f64; 2]>,
+    /// Nodes without a ball at which one or two beams end, all of them flat: joints and ends of chains of frusta.
+    pub flat: Vec<u32>,
     /// Whether lengths are in mm once read, because the file names its unit.
     pub in_mm: bool,
     /// What the file has and the graph has not.
@@ -204,6 +206,19 @@ impl BeamGraph {
         self.radii.iter_mut().chain(self.beam_radii.iter_mut().flatten()).for_each(|r| *r *= factor);
     }
 
+    /// Leaves out nodes at which no beam ends, as those of a mesh; flat ones are no longer known.
+    pub fn drop_unused(&mut self) {
+        let mut used = vec![false; self.nodes.len()];
+        self.beams.iter().flatten().for_each(|n| used[*n as usize] = true);
+        let kept: Vec<usize> = (0..used.len()).filter(|i| used[*i]).collect();
+        let mut numbers = vec![0; used.len()];
+        kept.iter().enumerate().for_each(|(new, old)| numbers[*old] = new as u32);
+        self.nodes = kept.iter().map(|i| self.nodes[*i]).collect();
+        self.radii = kept.iter().filter_map(|i| self.radii.get(*i).copied()).collect();
+        self.beams.iter_mut().flatten().for_each(|n| *n = numbers[*n as usize]);
+        self.flat.clear();
+    }
+
     /// The radii of a beam at its ends; NaN where there are none.
     fn radii_of(&self, beam: usize) -> [f64; 2] {
         self.beam_radii.get(beam).copied().unwrap_or([f64::NAN; 2])
@@ -241,7 +256,7 @@ impl From<&BeamLattice> for BeamGraph {
             beams: lattice.beams.iter().map(|b| b.ends).collect(),
             beam_radii: lattice.beams.iter().map(|b| b.radii).collect(),
             in_mm: true,
-            remarks: Vec::new(),
+            ..BeamGraph::default()
         }
     }
 }
@@ -298,7 +313,7 @@ mod tests {
             beams: vec![[0, 1], [2, 1]],
             beam_radii: vec![[0.3, 0.4], [1.0 / 7.0, 0.4]],
             in_mm: true,
-            remarks: Vec::new(),
+            ..BeamGraph::default()
         }
     }
 

@@ -131,27 +131,38 @@ impl<'a> Part21<'a> {
     }
 }
 
-/// The entities that say what the solids are, and in which unit.
+/// A product of a file: a part, or an assembly of parts.
 pub struct Product {
-    context: Id,
+    shared: Shared,
+    definition: Id,
     shape: Id,
+}
+
+/// What the products of a file share: contexts, lengths in mm, the origin.
+#[derive(Clone, Copy)]
+struct Shared {
+    mechanical: Id,
+    design: Id,
+    context: Id,
     placement: Id,
 }
 
+/// The shape of a product.
+#[derive(Clone, Copy)]
+pub struct Shape {
+    definition: Id,
+    representation: Id,
+}
+
 impl Product {
-    /// Writes what stands before the solids: the product, lengths in mm, to be finished with the solids.
+    /// Writes what stands before the solids: the product of the file, to be finished with the solids.
     pub fn write(file: &mut Part21) -> io::Result<Product> {
-        let name = string(file.title.name);
+        let name = file.title.name;
         let [of, protocol] = file.title.protocol.application();
         let application = file.entity(&format!("APPLICATION_CONTEXT('{of}')"))?;
         file.entity(&format!("APPLICATION_PROTOCOL_DEFINITION('international standard',{protocol},{application})"))?;
-        let context = file.entity(&format!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
-        let product = file.entity(&format!("PRODUCT({name},{name},'',({context}))"))?;
-        file.entity(&format!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
-        let formation = file.entity(&format!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
+        let mechanical = file.entity(&format!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
         let design = file.entity(&format!("PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"))?;
-        let definition = file.entity(&format!("PRODUCT_DEFINITION('design','',{formation},{design})"))?;
-        let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
         let length = file.entity("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")?;
         let angle = file.entity("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")?;
         let solid_angle = file.entity("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")?;
@@ -162,20 +173,70 @@ impl Product {
             "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({uncertainty}))\
              GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))"
         ))?;
-        let origin = file.point(&[0.0; 3])?;
-        let [z, x] = [file.direction([0.0, 0.0, 1.0])?, file.direction([1.0, 0.0, 0.0])?];
-        let placement = file.entity(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))?;
-        Ok(Product { context, shape, placement })
+        let placement = placement(file, [0.0; 3])?;
+        Shared { mechanical, design, context, placement }.product(file, name)
+    }
+
+    /// Writes what stands before the solids of another product of the file.
+    pub fn another(&self, file: &mut Part21, name: &str) -> io::Result<Product> {
+        self.shared.product(file, name)
     }
 
     /// Writes what follows the solids.
-    pub fn finish(self, file: &mut Part21, solids: &[Id]) -> io::Result<()> {
-        let Product { context, shape, placement } = self;
-        let items = list([placement].iter().chain(solids));
-        let representation = file.entity(&format!("ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},{context})"))?;
-        file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"))?;
-        Ok(())
+    pub fn finish(&self, file: &mut Part21, solids: &[Id]) -> io::Result<Shape> {
+        let items = list([self.shared.placement].iter().chain(solids));
+        self.shape(file, "ADVANCED_BREP_SHAPE_REPRESENTATION", &items)
     }
+
+    /// Makes it an assembly of others, each with its positions, mm.
+    pub fn assemble(&self, file: &mut Part21, parts: &[(Shape, Vec<Vec3>)]) -> io::Result<Shape> {
+        let mut placements = Vec::new();
+        for at in parts.iter().flat_map(|(_, positions)| positions) {
+            placements.push(placement(file, *at)?);
+        }
+        let origin = self.shared.placement;
+        let whole = self.shape(file, "SHAPE_REPRESENTATION", &list([origin].iter().chain(&placements)))?;
+        let each = parts.iter().flat_map(|(part, positions)| positions.iter().map(move |_| part));
+        for (number, (part, at)) in (1..).zip(each.zip(&placements)) {
+            let of = [self.definition, part.definition];
+            let use_of =
+                file.entity(&format!("NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','','',{},{},$)", of[0], of[1]))?;
+            let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{use_of})"))?;
+            let moved = file.entity(&format!("ITEM_DEFINED_TRANSFORMATION('','',{origin},{at})"))?;
+            let relation = file.entity(&format!(
+                "(REPRESENTATION_RELATIONSHIP('','',{},{})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({moved})\
+                 SHAPE_REPRESENTATION_RELATIONSHIP())",
+                part.representation, whole.representation
+            ))?;
+            file.entity(&format!("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({relation},{shape})"))?;
+        }
+        Ok(whole)
+    }
+
+    fn shape(&self, file: &mut Part21, kind: &str, items: &str) -> io::Result<Shape> {
+        let representation = file.entity(&format!("{kind}('',{items},{})", self.shared.context))?;
+        file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({},{representation})", self.shape))?;
+        Ok(Shape { definition: self.definition, representation })
+    }
+}
+
+impl Shared {
+    fn product(self, file: &mut Part21, name: &str) -> io::Result<Product> {
+        let name = string(name);
+        let product = file.entity(&format!("PRODUCT({name},{name},'',({}))", self.mechanical))?;
+        file.entity(&format!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
+        let formation = file.entity(&format!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
+        let definition = file.entity(&format!("PRODUCT_DEFINITION('design','',{formation},{})", self.design))?;
+        let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
+        Ok(Product { shared: self, definition, shape })
+    }
+}
+
+/// A frame along the axes with its origin at a point.
+fn placement(file: &mut Part21, at: Vec3) -> io::Result<Id> {
+    let origin = file.point(&at)?;
+    let [z, x] = [file.direction([0.0, 0.0, 1.0])?, file.direction([1.0, 0.0, 0.0])?];
+    file.entity(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))
 }
 
 fn point(at: &[f64]) -> String {

@@ -58,7 +58,7 @@ impl Written<'_> {
             beams: self.graph.beams.iter().map(|b| b.ends).collect(),
             beam_radii: (0..self.graph.beams.len()).into_par_iter().map(radii).collect(),
             in_mm: true,
-            remarks: Vec::new(),
+            ..BeamGraph::default()
         }
     }
 

@@ -15,6 +15,7 @@ pub(super) fn write(
     built: &Built,
     title: Title,
     tolerance: Option<f64>,
+    assembly: Option<bool>,
     out: &mut dyn io::Write,
     progress: &dyn Progress,
 ) -> Result<StepReport, Stopped> {
@@ -25,9 +26,9 @@ pub(super) fn write(
             return refuse("tolerance", message);
         }
         let (quadors, planes) = build_beams::exact(built).map_err(Stopped::Refused)?;
-        let made = write_step(&quadors, &planes, title, out)?;
-        let StepSummary { solids, faces, edges, vertices, volume } = made;
-        return Ok(StepReport { solids, faces, edges, vertices, volume, deviation: 0.0, angle: None });
+        let made = write_step(&quadors, &planes, title, assembly, out)?;
+        let StepSummary { solids, parts, faces, edges, vertices, volume } = made;
+        return Ok(StepReport { solids, parts, faces, edges, vertices, volume, deviation: 0.0, angle: None });
     }
     if !built.beams.is_empty() {
         let message = "a STEP file has beams alone, with their exact surface, or a lattice in a box, as patches; this design has \
@@ -39,9 +40,13 @@ pub(super) fn write(
                        write a mesh instead, such as .3mf or .stl";
         return refuse("lattice", message);
     }
+    if assembly == Some(true) {
+        let message = "the parts of an assembly are hubs with their beams; a lattice of smooth surfaces is one solid: leave it out";
+        return refuse("assembly", message);
+    }
     let tolerance = tolerance.unwrap_or(TOLERANCE * built.solid.wavelength);
     let made = Patches::new(&built.solid, tolerance, &Stage { whole: progress, from: 0.0, to: 0.8 })?;
     made.write_step(title, out, &Stage { whole: progress, from: 0.8, to: 1.0 })?;
     let PatchSummary { solids, faces, edges, vertices, volume, deviation, angle } = made.summary();
-    Ok(StepReport { solids, faces, edges, vertices, volume, deviation, angle: Some(angle) })
+    Ok(StepReport { solids, parts: None, faces, edges, vertices, volume, deviation, angle: Some(angle) })
 }

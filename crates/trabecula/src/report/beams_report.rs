@@ -138,9 +138,11 @@ pub struct TrimmedReport {
 /// What a STEP file contains.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct StepReport {
-    /// Number of solids: connected components.
+    /// Number of solids: connected components, or placed parts of an assembly.
     pub solids: usize,
-    /// Number of faces.
+    /// Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none.
+    pub parts: Option<usize>,
+    /// Number of faces; of an assembly those of distinct parts, as all that follows but the volume.
     pub faces: usize,
     /// Number of edges.
     pub edges: usize,

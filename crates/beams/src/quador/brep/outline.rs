@@ -28,14 +28,14 @@ const CLEARANCE: f64 = 1e-4;
 const CORNER_WORTH: f64 = 1.0;
 
 /// The boundary complex of a hub with divided arcs, without faces of zero width.
-struct Outline {
+pub(super) struct Outline {
     corners: Vec<Vec3>,
     edges: Vec<([u32; 2], Bezier<3>)>,
     faces: Vec<(Quadric, Kind, Vec<Vec<Use>>)>,
 }
 
 impl Outline {
-    fn new(hub: &Hub, complex: &Complex) -> Outline {
+    pub(super) fn new(hub: &Hub, complex: &Complex) -> Outline {
         let coincident = complex.coincident_arcs(hub.radius);
         // Vertices at the ends of coincident arcs are one.
         let mut to: Vec<u32> = (0..complex.vertices.len() as u32).collect();
@@ -159,21 +159,8 @@ impl Brep<'_> {
             checkpoint();
             let class = classes.of[hub as usize];
             let outline = &outlines[class as usize];
-            let (corner, edge) = (self.corners.len() as u32, self.edges.len() as u32);
-            outline.corners.iter().for_each(|at| {
-                self.push_corner(hub, *at);
-            });
-            outline.edges.iter().for_each(|(ends, curve)| {
-                self.push_edge(hub, ends.map(|v| v + corner), *curve);
-            });
-            for (index, (quadric, kind, loops)) in outline.faces.iter().enumerate() {
-                let numbered = |l: &Vec<Use>| l.iter().map(|(e, forward)| (e + edge, *forward)).collect();
-                let loops: Vec<Vec<Use>> = loops.iter().map(numbered).collect();
-                // Chosen once all faces are known.
-                let surface = Surface::Sphere { axis: [0.0; 3], side: [0.0; 3], radius: 0.0 };
-                let frame = Frame { hub, other: hub, by: [0.0; 3] };
-                let face = Face { frame, quadric: *quadric, loops, surface, kind: *kind, class: [class, index as u32] };
-                let Kind::Beam(half_beam) = *kind else {
+            for face in self.place(hub, class, outline) {
+                let Kind::Beam(half_beam) = face.kind else {
                     self.faces.push(face);
                     continue;
                 };
@@ -185,7 +172,7 @@ impl Brep<'_> {
                 let start = whole.frame.hub;
                 let (plane, by) = *planes.entry([before[0], before[1], class, half_beam]).or_insert_with(|| {
                     let axis = quadors.hub(classes.sample[before[0] as usize]).half_beams[before[1] as usize].axis;
-                    (self.plane_along(axis, [&whole, &face]), sub(self.center(hub), self.center(start)))
+                    (self.plane_along(axis, &[&whole, &face]), sub(self.center(hub), self.center(start)))
                 });
                 whole.frame = Frame { hub: start, other: hub, by };
                 whole.loops.extend(face.loops);
@@ -197,8 +184,29 @@ impl Brep<'_> {
         Ok(())
     }
 
+    /// Adds the corners and edges of a hub, and gives its faces: their surfaces are chosen once all are known.
+    pub(super) fn place(&mut self, hub: u32, class: u32, outline: &Outline) -> Vec<Face> {
+        let (corner, edge) = (self.corners.len() as u32, self.edges.len() as u32);
+        outline.corners.iter().for_each(|at| {
+            self.push_corner(hub, *at);
+        });
+        outline.edges.iter().for_each(|(ends, curve)| {
+            self.push_edge(hub, ends.map(|v| v + corner), *curve);
+        });
+        let numbered = |l: &Vec<Use>| l.iter().map(|(e, forward)| (e + edge, *forward)).collect();
+        let face = |(index, (quadric, kind, loops)): (usize, &(Quadric, Kind, Vec<Vec<Use>>))| Face {
+            frame: Frame { hub, other: hub, by: [0.0; 3] },
+            quadric: *quadric,
+            loops: loops.iter().map(numbered).collect(),
+            surface: Surface::Sphere { axis: [0.0; 3], side: [0.0; 3], radius: 0.0 },
+            kind: *kind,
+            class: [class, index as u32],
+        };
+        outline.faces.iter().enumerate().map(face).collect()
+    }
+
     /// The plane along the axis of a beam that meets its boundary loops at corners, where one does, or else far from them.
-    fn plane_along(&self, axis: Vec3, halves: [&Face; 2]) -> Plane {
+    pub(super) fn plane_along(&self, axis: Vec3, halves: &[&Face]) -> Plane {
         let side = perpendicular(axis);
         let other = cross(axis, side);
         let turned = |k: usize| {

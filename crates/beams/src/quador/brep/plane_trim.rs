@@ -87,7 +87,7 @@ impl Brep<'_> {
                 }
             }
         }
-        let caps = self.caps(plane, &kept)?;
+        let caps = self.caps(plane, &self.open_edges(&kept))?;
         self.faces = kept.iter().map(|f| self.faces[*f as usize].clone()).chain(caps).collect();
         Some(())
     }
@@ -147,16 +147,21 @@ impl Brep<'_> {
         bounds.grown(0.5 * norm(bounds.size()))
     }
 
-    /// The planar faces in a plane that close some faces; `None` if they do not end in the plane, or touch in a corner.
-    fn caps(&self, plane: &Plane, kept: &[u32]) -> Option<Vec<Face>> {
-        let mut open: BTreeMap<u32, bool> = BTreeMap::new();
-        for face in kept {
+    /// The edges that just one of some faces uses, and how.
+    pub(super) fn open_edges(&self, faces: &[u32]) -> BTreeMap<u32, bool> {
+        let mut open = BTreeMap::new();
+        for face in faces {
             for (edge, forward) in self.loops(&self.faces[*face as usize]).into_iter().flatten() {
                 if open.remove(&edge).is_none() {
                     open.insert(edge, forward);
                 }
             }
         }
+        open
+    }
+
+    /// The planar faces in a plane that open edges bound; `None` if these do not lie in the plane, or touch in a corner.
+    pub(super) fn caps(&self, plane: &Plane, open: &BTreeMap<u32, bool>) -> Option<Vec<Face>> {
         let Some(first) = open.keys().next() else {
             return Some(Vec::new());
         };
@@ -167,7 +172,7 @@ impl Brep<'_> {
         let frame = Frame { hub, other: hub, by: [0.0; 3] };
         let surface = Surface::Plane { origin, axes: plane.axes };
         let mut from: HashMap<u32, Use> = HashMap::new();
-        for (&edge, &forward) in &open {
+        for (&edge, &forward) in open {
             let of = (edge, !forward);
             let curve = self.curve(of, &frame);
             let off = |p: &Vec3| dot(sub(*p, origin), plane.normal).abs() > IN_CAP * self.quadors.scale;
@@ -176,7 +181,7 @@ impl Brep<'_> {
             }
         }
         let mut loops: Vec<Vec<Use>> = Vec::new();
-        for (&edge, &forward) in &open {
+        for (&edge, &forward) in open {
             let mut next = self.start((edge, !forward));
             let mut traced = Vec::new();
             while let Some(of) = from.remove(&next) {

@@ -284,6 +284,50 @@ fn halves_of_cells_are_closed_and_make_the_whole() {
     }
 }
 
+/// The hubs of a lattice, each closed, have together the volume of the whole, also of what is behind some planes.
+fn check_pieces(q: &Quadors, planes: &[Plane], name: &str) {
+    let mut sum = 0.0;
+    for piece in q.pieces(planes) {
+        let brep = q.piece(&piece).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
+        if !brep.faces.is_empty() {
+            check_brep(&brep);
+            sum += volume(&brep) * piece.hubs.len() as f64;
+        }
+    }
+    let want = volume(&q.brep(planes).expect("a boundary"));
+    assert!((sum / want - 1.0).abs() < 1e-6, "{name}: {sum} = {want}");
+}
+
+#[test]
+fn pieces_are_closed_and_make_the_whole() {
+    let plane = |point, normal| Plane::new(point, normal).expect("a plane");
+    for cell in catalogue() {
+        for fillet in [Fillet::Auto, Fillet::None] {
+            let graph = block(cell.name, 1, |_| 0.4, |_| Profile::Cylinder);
+            let q = Quadors::new(&graph, fillet).expect("a cell");
+            let name = format!("{} {fillet:?}", cell.name);
+            check_pieces(&q, &[], &name);
+            // Through nodes, through the middles of beams, and slanted.
+            check_pieces(&q, &[plane([5.0; 3], [1.0, 0.0, 0.0]), plane([3.0; 3], [0.0, -1.0, 0.0])], &name);
+            check_pieces(&q, &[plane([2.5; 3], [0.0, 0.0, 1.0])], &name);
+            check_pieces(&q, &[plane([4.1, 5.3, 4.7], [0.3, -0.5, 0.8])], &name);
+        }
+    }
+    let mut random = Random(29);
+    for fillet in [Fillet::Auto, Fillet::Tau(0.8), Fillet::None] {
+        let q = random_frame(&mut random, fillet, 1.2);
+        check_pieces(&q, &[], &format!("{fillet:?}"));
+    }
+}
+
+#[test]
+fn equal_hubs_are_one_piece() {
+    let q = Quadors::new(&block("sc", 4, |_| 1.0, |_| Profile::Cylinder), Fillet::Auto).expect("a block");
+    let pieces = q.pieces(&[]);
+    // Beams begin at 4³ hubs, of which 8 kinds lack those from below; 3 kinds are ends.
+    assert_eq!((pieces.len(), pieces.iter().map(|p| p.hubs.len()).sum::<usize>()), (8 + 3, 64 + 3 * 16));
+}
+
 #[test]
 fn random_frames_are_cut_by_random_planes() {
     let mut random = Random(23);

@@ -4,6 +4,7 @@ use crate::design::data::*;
 use crate::environment::Environment;
 use crate::kind::{DesignError, Unit, Warning};
 use ::beams::graph::{GivenRadii, Wireframe};
+use ::beams::{Joined, join_chains};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{BeamGraph, read_graph};
 
@@ -30,7 +31,12 @@ pub(super) fn read(
         graph.scale(file.scale * unit);
     }
     let mut remarks = std::mem::take(&mut graph.remarks);
-    let own = radii(&mut graph, spec, environment, &mut remarks)?;
+    let joined = join_chains(&mut graph);
+    if joined.frusta > 0 {
+        let made = counted(joined.beams.len(), "beam");
+        remarks.push(format!("{} frusta in chains that represent quadrics read as {made}", joined.frusta));
+    }
+    let own = radii(&mut graph, &joined, spec, environment, &mut remarks)?;
     let made = remarks.into_iter().map(|r| Warning { path: below("path"), message: format!("{}: {r}", file.path) });
     warnings.extend(made);
     Ok((Wireframe { nodes: graph.nodes, struts: graph.beams }, own))
@@ -39,6 +45,7 @@ pub(super) fn read(
 /// The radii that hold; beams within the ball of one of their hubs are left out.
 fn radii(
     graph: &mut BeamGraph,
+    joined: &Joined,
     spec: &BeamsSpec,
     environment: &Environment,
     remarks: &mut Vec<String>,
@@ -58,7 +65,8 @@ fn radii(
     // A hub holds the ends of its beams.
     let mut sizes = own.nodes.clone();
     sizes.resize(graph.nodes.len(), f64::NAN);
-    for (ends, radii) in graph.beams.iter().zip(&own.struts) {
+    // The radius of a beam that was a chain is that at mid length.
+    for (ends, radii) in graph.beams.iter().zip(&own.struts).take(joined.beams.start as usize) {
         for (n, r) in ends.iter().zip(radii) {
             sizes[*n as usize] = sizes[*n as usize].max(*r);
         }
@@ -77,7 +85,7 @@ fn radii(
         let inside = length > 0.0 && length <= (a - b).abs();
         swallowed += usize::from(inside);
         let unlike = own.struts.get(i).is_some_and(|r| differs(r[0], s[0]) || differs(r[1], s[1]));
-        thinner += usize::from(unlike && !inside);
+        thinner += usize::from(unlike && !inside && !joined.beams.contains(&(i as u32)));
         kept.push(!inside);
     }
     let mut left = kept.iter();
