@@ -115,7 +115,7 @@ def test_waists_are_frusta_within_the_stated_error_and_hubs_are_balls(tmp_path):
     assert (outside[free] > 0).all() and (inside[free] < 0).all()
 
 
-@pytest.mark.parametrize("radius", ["0.4", '{ linear = { along = [0, 0, 1], stops = [[-6, 0.3], [6, 0.6]] } }'])
+@pytest.mark.parametrize("radius", ["0.4", "{ linear = { along = [0, 0, 1], stops = [[-6, 0.3], [6, 0.6]] } }"])
 def test_chains_of_frusta_read_back_are_the_quadrics_that_they_were(tmp_path, radius):
     box = "[region.box]\nsize = [12, 12, 12]\n[beams.core]\n"
     solid = built(box + f'cell = "kelvin"\nradius = {radius}\nhub = 0.7\nmap.affine.wavelength = 6\n')

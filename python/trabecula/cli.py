@@ -829,9 +829,9 @@ def known_command(top: argparse.ArgumentParser, words: list[str]) -> None:
     if name is not None and name not in COMMANDS:
         from difflib import get_close_matches
 
-        near = get_close_matches(name.lower(), COMMANDS, 1)
+        near = get_close_matches(name[:80].lower(), COMMANDS, 1)
         hint = f"; did you mean {near[0]}?" if near else "."
-        top.error(f"no command is named {name}{hint} There are: {', '.join(COMMANDS)}")
+        top.error(f"no command is named {name:.80}{hint} There are: {', '.join(COMMANDS)}")
 
 
 def words_of(error: Exception) -> str:

@@ -9,7 +9,7 @@ from . import _core, cell
 from . import beams as unit_cells
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
-from .errors import Refused
+from .errors import DesignError, Refused
 from .files import check_place, read_text, write_text
 from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
@@ -30,6 +30,8 @@ __all__ = [
 ]
 # fmt: on
 
+#: Characters of a word that are repeated in a message.
+LONGEST = 80
 #: The JSON Schema beside a new design.
 SCHEMA_FILE = "design-schema.json"
 
@@ -403,6 +405,17 @@ def known_cell(name: str, known: list[str]) -> None:
     if name not in known:
         from difflib import get_close_matches
 
-        near = get_close_matches(name, known, 1)
-        hint = f'; did you mean "{near[0]}"?' if near else "."
-        raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
+        near = get_close_matches(name[:LONGEST], known, 1)
+        hint = _other_name(name) or (f'; did you mean "{near[0]}"?' if near else ".")
+        raise Refused(f'no cell is named "{name:.{LONGEST}}"{hint} There are: {", ".join(known)}')
+
+
+def _other_name(name: str) -> str:
+    """What the core says of a surface's name elsewhere, if it knows it."""
+    cell = {"cell": name, "part": "lower", "map": {"affine": {"wavelength": 1}}, "level": {"iso": 0}}
+    try:
+        _core.Design.from_data({"schema": 1, "region": {"box": {"size": [1, 1, 1]}}, "lattice": {"core": cell}})
+    except DesignError as error:
+        said = error.message.partition(".")[0]
+        return f": {said}." if " is called " in said else ""
+    return ""

@@ -37,9 +37,12 @@ class Lattice:
     map: dict
     level: dict
 
+    def __post_init__(self) -> None:
+        _keep(self)
+
     def to_dict(self) -> dict:
         """The lattice as plain data."""
-        return {"cell": self.cell, "part": self.part, "map": self.map, "level": self.level}
+        return copied({"cell": self.cell, "part": self.part, "map": self.map, "level": self.level})
 
 
 @named
@@ -77,6 +80,9 @@ class Beams:
     unit: str | None = None
     scale: float | None = None
 
+    def __post_init__(self) -> None:
+        _keep(self)
+
     def to_dict(self) -> dict:
         """The beams as plain data."""
         return settings(**{f.name: getattr(self, f.name) for f in fields(self)})
@@ -108,7 +114,7 @@ class Design:
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid within the region.
     ``set`` is {name: region}: the surface within each is a set of volume meshes, to hold or to load.
     ``sweep`` is what varies in ``sweep``: {path of a key: values}, of no effect on this design.
-    Nothing is checked before ``build``, the last line that can raise.
+    Nothing is checked before ``build``, the last line that can raise. What is given is copied.
     """
 
     region: dict
@@ -122,7 +128,9 @@ class Design:
     sweep: dict | None = None
     set: Mapping[str, dict] | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
-    _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        _keep(self)
 
     def to_dict(self) -> dict:
         """The design as plain data: what stands in its file."""
@@ -141,7 +149,7 @@ class Design:
 
     def __getstate__(self) -> dict:
         # What was read from a file is read again from the data.
-        return self.__dict__ | {"_read": None}
+        return {name: value for name, value in self.__dict__.items() if name != "_read"}
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
@@ -152,7 +160,9 @@ class Design:
             return repr(data)
 
     def _checked(self) -> _core.Design:
-        return self._read or _core.Design.from_data(self.to_dict())
+        read, data = self.__dict__.get("_read", (None, None))
+        now = self.to_dict()
+        return read if read is not None and data == now else _core.Design.from_data(now)
 
     def to_toml(self) -> str:
         """The design as the text of a TOML file."""
@@ -192,6 +202,14 @@ class Design:
         write_text(path, text)
 
 
+def _keep(data: Any) -> None:
+    """Copies what a frozen data class was given: it does not follow what becomes of that."""
+    for name in (f.name for f in fields(data)):
+        value = getattr(data, name)
+        if hasattr(value, "tolist") or isinstance(value, (Mapping, list)):
+            object.__setattr__(data, name, copied(value))
+
+
 def _by_name(given: Any) -> Any:
     """Lattices or beams as plain data by name."""
     made = {"core": given} if isinstance(given, (Lattice, Beams)) else given
@@ -218,7 +236,8 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
     more = {key: data.get(key) for key in ("skin", "keep", "set", "blend", "sweep")}
     design = Design(data["region"], lattices, data["units"], data["schema"], beams=beams, folder=folder, **more)
-    object.__setattr__(design, "_read", read)
+    # With the lines of the text, as long as the data are those that were read.
+    object.__setattr__(design, "_read", (read, design.to_dict()))
     return design
 
 

@@ -8,11 +8,14 @@ import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence, Set
 
+from .errors import DesignError
+
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeVar
 
+    import numpy as np
     from numpy.typing import NDArray
 
     Builder = TypeVar("Builder", bound=Callable[..., Any])
@@ -23,12 +26,14 @@ __all__ = [
     "control",
     "copied",
     "fixed",
+    "flag",
     "named",
     "number",
     "numbered",
     "pairs",
     "plain",
     "poisson",
+    "positions",
     "positive",
     "settings",
     "thread_count",
@@ -103,6 +108,28 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     return found
 
 
+def flag(name: str, value: Any) -> bool:
+    """True or False, Python's or NumPy's."""
+    if not isinstance(value, bool) and type(value).__name__ not in ("bool", "bool_"):
+        raise TypeError(f"{name} must be True or False, found {value!r}")
+    return bool(value)
+
+
+def positions(name: str, value: Any) -> NDArray[np.float64]:
+    """Points (n, 3) of real numbers, or one point; of a masked array, only where nothing is masked."""
+    import numpy as np
+
+    given = np.asanyarray(value)
+    if np.iscomplexobj(given) or np.ma.is_masked(given):
+        raise TypeError(
+            f"{name} must be real numbers without a mask, found {'complex ones' if np.iscomplexobj(given) else 'masked ones'}"
+        )
+    made = np.asarray(given, dtype=np.float64)
+    if made.ndim == 0 or made.shape[-1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3), found {made.shape}")
+    return made
+
+
 def poisson(name: str, value: Any) -> float:
     """Poisson's ratio: greater than -1 and less than 0.5."""
     found = number(name, value)
@@ -141,16 +168,19 @@ def plain(value: Any) -> Any:
 
 
 def settings(**given: Any) -> dict:
-    """The settings that were given."""
-    return {k: plain(v) for k, v in given.items() if v is not None}
+    """Copies of the settings that were given."""
+    return {k: copied(v) for k, v in given.items() if v is not None}
 
 
 def copied(data: Any, depth: int = 0) -> Any:
-    """A copy of data in lists and dictionaries."""
+    """A copy of data in lists and dictionaries, arrays, tuples, ranges as lists. A DesignError for a name that is no text."""
     if depth > DEPTH:
-        raise ValueError(f"a design is at most {DEPTH} levels deep; does it hold itself?")
+        raise DesignError(f"a design is at most {DEPTH} levels deep; does it hold itself?")
     data = plain(data)
     if isinstance(data, Mapping):
+        for name in data:
+            if not isinstance(name, str):
+                raise DesignError(f"the name {name!r} is no text; names of a design's keys, lattices and regions are")
         return {k: copied(v, depth + 1) for k, v in data.items()}
     return [copied(v, depth + 1) for v in data] if isinstance(data, list) else data
 

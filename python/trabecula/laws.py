@@ -19,7 +19,7 @@ from .design import Beams, Design, Lattice
 from .errors import DesignError, DesignWarning
 from .files import extension, write_text
 from .formats import LAW_WRITES
-from .given import number, poisson, positive, thread_count, whole
+from .given import fixed, number, poisson, positive, thread_count, whole
 from .map import affine, tets
 from .region import box
 
@@ -56,7 +56,7 @@ PROPERTIES: dict[str, dict[str, str]] = {
 FITTED = ("E", "G", "bulk", "k")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Law:
     """What a cell does by its solid fraction. Columns by name, NaN where there is no such number (see ``notes``)."""
 
@@ -75,6 +75,9 @@ class Law:
     notes: dict[float, list[str]] = field(default_factory=dict)
     #: Whether it is a tetrahedral cell.
     tet: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", {name: fixed(np.array(of)) for name, of in self.columns.items()})
 
     def at(self, column: str, fraction: Any) -> np.ndarray:
         """A column at fractions, by monotone cubics between those it was found at. Raises ValueError outside them."""

@@ -34,7 +34,7 @@ AHEAD = 8
 MOST_PIXELS = 1 << 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layer:
     """The cross-section of a part in one layer."""
 
@@ -86,6 +86,7 @@ class Layers(Sequence):
     def __getitem__(self, index):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
+        index = whole("layer", index, -(10**15), 10**15)
         at = index + len(self) if index < 0 else index
         if not 0 <= at < len(self):
             raise IndexError(f"layer {index} of {len(self)}")
@@ -155,6 +156,8 @@ class Layers(Sequence):
         needed = [max(1, math.ceil(e / edge - 1e-9)) for e in extents]
         if size is None:
             size = (needed[0], needed[1])
+        elif len(size) != 2:
+            raise ValueError(f"size is the width and height of a picture in pixels, found {len(size)} numbers")
         size = tuple(whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in size)
         if any(n < m for n, m in zip(size, needed, strict=True)):
             raise ValueError(

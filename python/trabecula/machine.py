@@ -45,10 +45,10 @@ def fewer_threads(threads: int | None) -> None:
         return
     fit = int((limit - COMMAND) // THREAD)
     if fit < (threads or 1):
-        number = "one thread needs" if (threads or 1) == 1 else f"{threads} threads need"
+        number = "one thread" if (threads or 1) == 1 else f"{threads} threads"
         advice = f", or use --threads {fit}" if fit > 0 else ""
         raise ValueError(
-            f"the limit of address space (ulimit -v) is {_bytes(limit)}, and a command with {number} "
+            f"the limit of address space (ulimit -v) is {_bytes(limit)}, and a command with {number} needs "
             f"{_bytes(COMMAND + THREAD * (threads or 1))}; raise the limit{advice}"
         )
     # The core's threads, as many as processors by default.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from collections.abc import Mapping
 from functools import cached_property
 
 from . import _core
@@ -19,7 +20,7 @@ from .transforms import Transformed, determinant
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
     from typing import Any
 
     import numpy as np
@@ -568,6 +569,8 @@ class Mesh(Picture, Transformed):
         import numpy as np
 
         found = []
+        if not isinstance(lines, Mapping):
+            raise TypeError(f"lines must be polylines by name, {{name: [points (n, 3), …]}}, found {lines!r:.80}")
         for kind, (name, some) in enumerate(lines.items()):
             for line in some:
                 points = np.asarray(line, dtype=np.float64)

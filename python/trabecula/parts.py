@@ -51,6 +51,10 @@ def write_parts(path: str | os.PathLike[str], parts: Mapping[str, Mesh]) -> dict
 
     Raises OSError if a file cannot be written, ValueError for an unknown format, no mesh or no room.
     """
+    from .mesh import Mesh
+
+    if not isinstance(parts, Mapping) or any(not isinstance(mesh, Mesh) for mesh in parts.values()):
+        raise TypeError(f"parts must be meshes by name, {{name: Mesh}}, found {parts!r:.80}")
     if not parts:
         raise ValueError("there is no mesh to write")
     files = part_files(path, list(parts))

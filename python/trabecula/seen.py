@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 from .camera import towards
+from .given import positions
 from .mesh import Mesh, Picture
 from .shown import look
 
@@ -61,6 +62,8 @@ class Seen(Picture):
         """
         import numpy as np
 
+        if lattice is not None and not isinstance(lattice, str):
+            raise TypeError(f"lattice must be the name of a lattice, found {lattice!r}")
         names = list(self.report().lattices)
         name = lattice if lattice is not None or not names else names[0]
         found = None if name is None else self._core.cell_at(name, _points(points))
@@ -136,7 +139,7 @@ class Seen(Picture):
 def _points(points: ArrayLike) -> NDArray[np.float64]:
     import numpy as np
 
-    given = np.asarray(points, dtype=np.float64)
-    if given.ndim != 2 or given.shape[-1] != 3:
+    given = positions("points", points)
+    if given.ndim != 2:
         raise ValueError(f"points must have shape (n, 3), found {given.shape}")
     return np.ascontiguousarray(given)

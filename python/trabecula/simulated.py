@@ -10,7 +10,7 @@ from functools import cached_property
 
 from . import _core
 from .errors import DesignWarning
-from .given import number, poisson, positive, thread_count, whole
+from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, Carrier, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
 
@@ -34,6 +34,12 @@ PERMEABILITY_BYTES = 1300
 SHORT_EDGE = math.sqrt(0.75)
 #: Most tetrahedra of a volume mesh for which no size was given: about 2 GB.
 MOST_TETS = 5e6
+
+
+def _order(given: int) -> int:
+    if isinstance(given, bool) or given not in (1, 2):
+        raise ValueError(f"order is {given}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+    return int(given)
 
 
 class Simulated:
@@ -81,8 +87,7 @@ class Simulated:
         """
         if of not in OF:
             raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
-        if order not in (1, 2):
-            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        order, periodic = _order(order), flag("periodic", periodic)
         size = self._volume_edge(edge, per_cell, wall)
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
@@ -114,8 +119,7 @@ class Simulated:
         a net are left out, with a warning. Raises ValueError for a design that is more or other than one such lattice, for an
         empty set, and for more than 256 domains.
         """
-        if order not in (1, 2):
-            raise ValueError(f"order is {order}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        order = _order(order)
         made = Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
         if left := self._core.bodies:
             warnings.warn(f"{', '.join(left)}: no part of the carrier, which is the lattice alone", DesignWarning, stacklevel=2)
@@ -226,6 +230,8 @@ class Simulated:
         """
         import numpy as np
 
+        if C is not None and (E, nu) != (1.0, 0.3):
+            raise ValueError("E and nu are of an isotropic solid, C is a stiffness of its own: give one of them")
         given = None if C is None else np.asarray(C, dtype=float)
         if given is not None and given.shape != (6, 6):
             raise ValueError(f"expected C of shape (6, 6), found {given.shape}")

@@ -14,7 +14,7 @@ from .beam_files import save_beams
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
-from .given import number, positive, thread_count
+from .given import flag, number, positions, positive, thread_count
 from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
 from .layers import Layers
@@ -61,6 +61,8 @@ OF_BEAMS = (
 TRIANGLE = 2 * (12 + 12)
 #: Bytes for each triangle of the temporary files of vertices and triangles.
 SPOOLED = 24
+#: Share of the volume by which voxels may reach beyond plane faces of the region unwarned.
+BEYOND = 0.01
 #: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
 SMOOTHED = 200
 
@@ -166,9 +168,7 @@ class Solid(Seen, Simulated):
         """Values at points (n, 3) in mm: negative in the solid, positive outside, continuous; not a distance."""
         import numpy as np
 
-        given = np.asarray(points, dtype=np.float64)
-        if given.ndim == 0 or given.shape[-1] != 3:
-            raise ValueError(f"points must have shape (n, 3), found {given.shape}")
+        given = positions("points", points)
         flat = np.ascontiguousarray(given.reshape(-1, 3))
         return self._core.field(flat).reshape(given.shape[:-1])
 
@@ -271,6 +271,22 @@ class Solid(Seen, Simulated):
                     stacklevel=3,
                 )
 
+    def _warn_beyond(self, step: float) -> None:
+        """Warns of voxels that reach beyond plane faces of the region: their centres are inside, and so they count."""
+        low, high = self.bounds
+        sizes = [b - a for a, b, flat in zip(low, high, self._core.flat_axes, strict=True) if flat]
+        covered = [step * math.ceil(size / step - 1e-9) for size in sizes]
+        more = math.prod(covered) / math.prod(sizes) - 1
+        if more > BEYOND:
+            whole = min(sizes)
+            warnings.warn(
+                f"voxels of {step:g} mm reach beyond the region's plane faces, {max(covered):.4g} mm along one of "
+                f"{max(sizes):.4g} mm: their volume and fraction are up to {100 * more:.1f} % too large; use a step that "
+                f"divides its size, such as {whole / math.ceil(whole / step - 1e-9):.6g} mm",
+                DesignWarning,
+                stacklevel=3,
+            )
+
     def _warn_coarse(self, volume: float, spacing: float, word: str = "edge", pieces: int | None = None) -> None:
         """Warns of a result whose solid fraction has little to do with the design's, for want of grid steps; over tetrahedra
         also of one that falls into more ``pieces`` than the lattice has.
@@ -325,6 +341,7 @@ class Solid(Seen, Simulated):
         single-precision numbers. ``Mesh.smoothing`` says what was done. Not for ``chord``.
         """
         check_islands(islands)
+        smooth = flag("smooth", smooth)
         if smooth and chord is not None:
             raise ValueError("smooth is for meshes on a grid; with chord the triangles follow the patches of beams")
         if not smooth:
@@ -659,13 +676,17 @@ class Solid(Seen, Simulated):
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Voxels:
-        """Occupancy on cubic voxels of edge ``step`` (mm) over the region's bounds."""
+        """Occupancy on cubic voxels of edge ``step`` (mm) that cover the region's bounds and are centred on them: solid where
+        their centres are. Warns where they reach so far beyond the bounds that the volume may be more than 1 % too large.
+        """
+        step = step if step is None else positive("step", step)
         spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
         low, high = self.bounds
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
         fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
         made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
+        self._warn_beyond(spacing)
         self._warn_coarse(made.volume, spacing, "step")
         return made
 
@@ -705,6 +726,7 @@ class Solid(Seen, Simulated):
         self._warn_thin(spacing, "step")
 
         def accept(volume: float) -> None:
+            self._warn_beyond(spacing)
             self._warn_coarse(volume, spacing, "step")
             settle()
 

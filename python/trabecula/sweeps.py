@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import itertools
 import json
 import os
@@ -20,6 +21,7 @@ from .formats import MESH_WRITES, SWEEP_WRITES
 from .given import whole
 from .rows import PROPERTIES, UNITS, Job, named
 from .sent import digests
+from .simulated import Simulated
 from .study import Study
 from .workers import rows_by_processes, rows_here
 
@@ -85,6 +87,8 @@ def objective(
             raise TypeError(f"expected paths of keys as text, found {path!r}")
 
     def of(values: Mapping[str, Any]) -> dict[str, float]:
+        if not isinstance(values, Mapping):
+            raise TypeError(f"expected {{path: value}}, found {values!r:.80}")
         if set(values) != set(paths):
             raise ValueError(f"expected values of {', '.join(paths)}, found {', '.join(values) or 'none'}")
         from .rows import row_of
@@ -113,6 +117,10 @@ def settings_of(properties: Mapping[str, Mapping[str, Any]] | Iterable[str]) -> 
     for name in given:
         if name not in PROPERTIES:
             raise ValueError(f'unknown property "{name}"; there are {", ".join(PROPERTIES) or "none"}')
+        known = list(inspect.signature(getattr(Simulated, name)).parameters)[1:]
+        for setting in given[name]:
+            if setting not in known:
+                raise ValueError(f'{name} has no setting "{setting}"; it has {", ".join(known)}')
     return {name: dict(settings) for name, settings in given.items()}
 
 

@@ -283,10 +283,10 @@ def table(figures: Mapping[str, Any], absent: str = "needs a region") -> str:
 
 
 def _cell(key: str, value: Any, absent: str) -> str:
-    if key == "bounds":
-        return " to ".join(map(point, value)) + " mm"
     if value is None:
         return ABSENT.get(key, absent)
+    if key == "bounds" and isinstance(value[0], list):
+        return " to ".join(map(point, value)) + " mm"
     if key == "dangling.largest":
         return f"{figure(value['volume'])} mm³ at {point(value['place'])} mm"
     if isinstance(value, list):

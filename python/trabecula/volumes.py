@@ -11,13 +11,14 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 from . import _core
 from .errors import DesignWarning
 from .files import extension, whole_file
 from .formats import SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
-from .given import number, poisson, positive, thread_count, whole
+from .given import fixed, number, poisson, positive, thread_count, whole
 from .mesh import Mesh
 from .texts import counted
 
@@ -74,8 +75,9 @@ class FiniteElements:
         """
         return self._figures.volume
 
-    def _named_sets(self) -> dict[str, VolumeSet]:
-        return {name: VolumeSet(*self._core.set(name)) for name in self._core.sets}  # type: ignore[misc]
+    def _named_sets(self) -> Mapping[str, VolumeSet]:
+        found = {name: VolumeSet(*map(fixed, self._core.set(name))) for name in self._core.sets}  # type: ignore[arg-type]
+        return MappingProxyType(found)
 
     def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
@@ -169,19 +171,19 @@ class VolumeMesh(FiniteElements):
     @cached_property
     def nodes(self) -> NDArray[np.float64]:
         """Nodes (n, 3), mm: corners first, then those of edges."""
-        return self._core.nodes
+        return fixed(self._core.nodes)
 
     @cached_property
     def elements(self) -> NDArray[np.uint32]:
         """Nodes of each tetrahedron (m, 4) or (m, 10), of positive volume, in the order of VTK, Abaqus and Nastran: corners
         0 1 2 3, then the edges 01 12 02 03 13 23.
         """
-        return self._core.elements
+        return fixed(self._core.elements)
 
     @cached_property
     def domain(self) -> NDArray[np.uint8]:
         """The domain of each tetrahedron, an index of ``domains``; ascending."""
-        return self._core.domain
+        return fixed(self._core.domain)
 
     @property
     def domains(self) -> list[str]:
@@ -204,7 +206,7 @@ class VolumeMesh(FiniteElements):
         """Of a periodic mesh (n, 5): each node on upper bounding planes, its image on none of them, and by which of the three
         periods they differ (0 or 1). All other coordinates are equal in every bit.
         """
-        return self._core.pairs
+        return fixed(self._core.pairs)
 
     def report(self) -> VolumeReport:
         """The figures: numbers of elements and nodes, volume, dihedral angles, distance from the surface, domains, sets."""
@@ -296,7 +298,7 @@ class Carrier(VolumeMesh):
     @cached_property
     def fraction(self) -> NDArray[np.float64]:
         """The solid fraction of each tetrahedron."""
-        return self._core.fraction
+        return fixed(self._core.fraction)
 
     def moduli(
         self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
@@ -348,17 +350,17 @@ class VoxelElements(FiniteElements):
     @cached_property
     def nodes(self) -> NDArray[np.float64]:
         """Nodes (n, 3), mm, x fastest."""
-        return self._core.nodes
+        return fixed(self._core.nodes)
 
     @cached_property
     def elements(self) -> NDArray[np.uint32]:
         """Nodes of each hexahedron (m, 8), in the order of VTK, Abaqus and Gmsh: round the lower face, then the upper one."""
-        return self._core.elements
+        return fixed(self._core.elements)
 
     @cached_property
     def fraction(self) -> NDArray[np.float64]:
         """The share of each hexahedron that is solid."""
-        return self._core.fraction
+        return fixed(self._core.fraction)
 
     @cached_property
     def sets(self) -> Mapping[str, VolumeSet]:
@@ -407,19 +409,19 @@ class ShellMesh(FiniteElements):
     @cached_property
     def nodes(self) -> NDArray[np.float64]:
         """Nodes (n, 3), mm: corners first, then those of edges."""
-        return self._core.nodes
+        return fixed(self._core.nodes)
 
     @cached_property
     def elements(self) -> NDArray[np.uint32]:
         """Nodes of each triangle (m, 3) or (m, 6), counter-clockwise seen from the upper side of the sheet: corners 0 1 2, then
         the edges 01 12 20.
         """
-        return self._core.elements
+        return fixed(self._core.elements)
 
     @cached_property
     def thickness(self) -> NDArray[np.float64]:
         """The wall's thickness (n,) at each node, mm: the length of the mid-surface's normal between the two faces."""
-        return self._core.thickness
+        return fixed(self._core.thickness)
 
     @cached_property
     def sets(self) -> Mapping[str, VolumeSet]:

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use geometry::formats::{Encoded, LAYER_FORMATS, LayerFormat, Raster, Stack};
 use geometry::layer::Layer;
 use geometry::math::Aabb;
-use geometry::progress::Stopped;
+use geometry::progress::{Cancellation, Stopped};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -79,8 +79,10 @@ impl Layers {
         threads: Option<usize>,
     ) -> PyResult<Vec<Section<'py>>> {
         let end = self.slicer.len().min(first.saturating_add(count));
-        let made: Vec<Layer> =
-            run(py, threads, None, |_| (first..end).into_par_iter().map(|i| self.slicer.layer(i)).collect())?;
+        let made: Vec<Layer> = run(py, threads, None, |_| {
+            let request = Cancellation::current();
+            (first..end).into_par_iter().map(|i| request.enter(|| self.slicer.layer(i))).collect()
+        })?;
         made.iter().map(|l| section(py, l)).collect()
     }
 

@@ -96,9 +96,9 @@ mod _core {
     use crate::voxels::Voxels;
 
     #[pymodule_init]
-    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         crate::error::watch();
-        Ok(())
+        crate::run::watch_forks(module.py())
     }
 
     /// Version of the core.

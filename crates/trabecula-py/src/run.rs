@@ -7,6 +7,7 @@ use std::time::Duration;
 use geometry::progress::{Cancellation, Progress};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::IntoPyDict;
 
 use crate::error;
 
@@ -37,9 +38,36 @@ fn stop_children(py: Python<'_>) {
     drop(stop()); // the interrupt itself is what is raised
 }
 
+/// Whether this process was forked: the threads of its parent's pool are not in it.
+static FORKED: AtomicBool = AtomicBool::new(false);
+
+/// Asks to be told of forks, where the system has these.
+pub fn watch_forks(py: Python<'_>) -> PyResult<()> {
+    let os = py.import("os")?;
+    if !os.hasattr("register_at_fork")? {
+        return Ok(());
+    }
+    let options = [("after_in_child", pyo3::wrap_pyfunction!(after_fork, py)?)].into_py_dict(py)?;
+    os.call_method("register_at_fork", (), Some(&options)).map(drop)
+}
+
+/// Makes threads anew in a forked process, for what this thread does itself; work off the interpreter has a pool of its own there.
+#[pyfunction]
+fn after_fork() {
+    FORKED.store(true, Relaxed);
+    // It fails where this thread has such a pool, as in the child of a child.
+    if let Ok(pool) = rayon::ThreadPoolBuilder::new().use_current_thread().build() {
+        std::mem::forget(pool); // as long as the thread
+    }
+}
+
 /// The threads of a pool of their own, if a number is given.
 fn pool(threads: Option<usize>) -> PyResult<Option<rayon::ThreadPool>> {
     match threads {
+        None if FORKED.load(Relaxed) => {
+            let built = rayon::ThreadPoolBuilder::new().build();
+            Ok(Some(built.map_err(|e| PyValueError::new_err(format!("threads cannot be started: {e}")))?))
+        }
         None => Ok(None),
         Some(n @ 1..=4096) => {
             let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();

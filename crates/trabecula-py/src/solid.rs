@@ -428,6 +428,7 @@ impl Solid {
     /// Writes a STEP file at `path`, of a product's name and a protocol ("ap214", "ap242"): beams alone exactly, lattices in a box as
     /// patches within `tolerance` (mm); gives its `reports.StepReport`. `assembly`: whether beams are written hub by hub.
     #[pyo3(signature = (path, title, tolerance=None, assembly=None, threads=None, progress=None))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn write_step<'py>(
         &self,
         py: Python<'py>,
@@ -495,6 +496,17 @@ impl Solid {
         })?;
         let s = summary.map_err(error::stopped)?;
         Ok((report(py, "SurfaceReport", &SurfaceReport::from(&s))?, s.components.words()))
+    }
+
+    /// Along which axes the region begins and ends in plane faces.
+    #[getter]
+    fn flat_axes(&self) -> [bool; 3] {
+        let (region, bounds) = (&self.built.solid.region, self.built.solid.region.bounds());
+        [0, 1, 2].map(|a| {
+            let mut planes = Vec::new();
+            region.planes(a, &mut planes);
+            [bounds.min[a], bounds.max[a]].iter().all(|end| planes.contains(end))
+        })
     }
 
     /// Occupancy on cubic voxels of edge `step` (mm).

@@ -18,7 +18,7 @@ mod roots;
 
 use geometry::fault::{Fault, number};
 use geometry::layer::Layer;
-use geometry::progress::{Progress, Stopped};
+use geometry::progress::{Cancellation, Progress, Stopped, checkpoint};
 use rayon::prelude::*;
 
 use crate::csg_tree::CsgTree;
@@ -168,8 +168,10 @@ impl Slicer {
         let mut outline = Outline::default();
         let mut cells = LeafCells::new(&self.grid, &self.surfaces, &self.tree, z);
         cells.each_polygon(&mut |cells, block, corners| outline.add(cells, &self.grid, block, corners));
+        checkpoint();
         solve(&mut outline, &self.grid, plane, accuracy);
         outline.separate(&self.grid, self.gap);
+        checkpoint();
         let rings = self.rings(&outline, &cells, plane, accuracy);
         let limits = Limits { tolerance: self.tolerance, accuracy, box_edge: self.grid.step };
         rings.polygons(plane, limits)
@@ -238,8 +240,10 @@ impl Slicer {
     ) -> Result<(), Stopped> {
         let total = self.len();
         let batch = 2 * rayon::current_num_threads();
+        let request = Cancellation::current();
         for first in (0..total).step_by(batch) {
-            let made = (first..total.min(first + batch)).into_par_iter().map(|i| map(i, &self.layer(i)));
+            let made =
+                (first..total.min(first + batch)).into_par_iter().map(|i| request.enter(|| map(i, &self.layer(i))));
             let made: Vec<T> = made.collect();
             let done = (first + made.len()) as u64;
             made.into_iter().try_for_each(&mut take)?;

@@ -44,6 +44,7 @@ fn rows<'a>(text: &'a str, heading: &'a dyn Fn(&[&str]) -> bool) -> impl Iterato
 pub fn nodes(text: &str) -> Result<Nodes, Fault> {
     let mut nodes = Nodes::default();
     let heading = |words: &[&str]| words.iter().skip(1).all(|w| w.parse::<f64>().is_err());
+    check_order(text, &heading)?;
     for (line, words) in rows(text, &heading) {
         let fault = |message: String| Fault::new("", format!("line {line}: {message}"));
         let numbers: Vec<Option<f64>> = words.iter().skip(1).map(|w| w.parse().ok()).collect();
@@ -78,6 +79,21 @@ pub fn nodes(text: &str) -> Result<Nodes, Fault> {
         nodes.radii.clear();
     }
     Ok(nodes)
+}
+
+/// Refuses headings that name x, y and z in other places than the table has them.
+fn check_order(text: &str, heading: &dyn Fn(&[&str]) -> bool) -> Result<(), Fault> {
+    let Some((line, names)) = rows(text, &|_| false).next().filter(|(_, words)| heading(words)) else { return Ok(()) };
+    let place = |wanted: &str| names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
+    let found = ["x", "y", "z"].map(place);
+    if found.iter().any(Option::is_none) || found == [Some(1), Some(2), Some(3)] {
+        return Ok(());
+    }
+    let message = format!(
+        "line {line}: the columns are {}; they must be id, x, y, z and perhaps a radius, in this order",
+        names.join(", ")
+    );
+    Err(Fault::new("", message))
 }
 
 /// Parses strut rows, the ids of two nodes each, to a wireframe.

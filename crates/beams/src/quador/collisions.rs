@@ -22,12 +22,17 @@ impl Quadors {
     /// Pairs of beams without a common hub whose axes come as close as the sum of their radii there, hubs included;
     /// sorted by the first beam. Each pair is tested where the axes are closest.
     pub fn collisions(&self) -> Vec<Collision> {
+        self.near_misses(0.0)
+    }
+
+    /// As `collisions`, and pairs that are at most a distance (mm) apart.
+    pub(super) fn near_misses(&self, apart: f64) -> Vec<Collision> {
         let axis = |b: usize| self.ends[b].map(|h| self.center(h as usize));
         let bounds: Vec<Aabb> = (0..self.beams())
             .into_par_iter()
             .map(|b| {
                 let [p, q] = axis(b);
-                Aabb::EMPTY.with(p).with(q).grown(self.max_radius(b))
+                Aabb::EMPTY.with(p).with(q).grown(self.max_radius(b) + 0.5 * apart)
             })
             .collect();
         let index = BoxIndex::new(bounds.iter().copied());
@@ -49,7 +54,7 @@ impl Quadors {
                     let position_text = |[p, q]: [Vec3; 2], s: f64| add(p, scale(sub(q, p), s));
                     let (x, y) = (position_text(axis(a), s), position_text(axis(b), t));
                     let radius_at = self.radius_at(a, s) + self.radius_at(b, t);
-                    (norm(sub(x, y)) <= radius_at * (1.0 + 1e-9))
+                    (norm(sub(x, y)) <= radius_at * (1.0 + 1e-9) + apart)
                         .then_some(Collision { beams: [a as u32, b as u32], at: scale(add(x, y), 0.5) })
                 })
                 .collect::<Vec<_>>()

@@ -170,7 +170,8 @@ pub(super) fn fillet_sizes(hub: Hub, fillet: Fillet) -> FilletSizes {
         _ => least.clone(),
     };
     let mut pairs = wanted;
-    if !pairs.allowed(floor) {
+    // What is asked for may be narrower than what is needed.
+    if !pairs.allowed(floor.min((1.0 - pairs.narrowest()) / 2.0)) {
         let adjacent = known.get_or_insert_with(|| hub.adjacent_pairs());
         let most = if least.allowed(floor) {
             least.clone()

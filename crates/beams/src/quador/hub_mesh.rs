@@ -8,11 +8,13 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use crate::graph::position_text;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, add, dot, sub};
 use geometry::mesh::Mesh;
 
 use super::Quadors;
+use super::collisions::Collision;
 use super::hub::HalfBeam;
 use super::integral::{DEFAULT_ORDER, hub_mass};
 use super::tessellation::{HubMesh, Tessellation};
@@ -24,6 +26,10 @@ const MIN_ESTIMATE_CHORD: f64 = 0.01;
 
 /// Shares of the chord error that are tried, where a hub cannot be triangulated within it or triangles of beams that nearly touch cross.
 const FINER: [f64; 7] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125];
+
+/// Distance of beams within which their triangles may cross, in chord errors: vertices are at most one off the surface, and so are
+/// chords.
+const NEAR: f64 = 4.0;
 
 fn check(chord: f64) -> Result<(), Fault> {
     if chord > 0.0 && chord.is_finite() {
@@ -97,6 +103,7 @@ impl Quadors {
         check(chord)?;
         self.require_closed_forms()?;
         let mut tessellation = Tessellation { quadors: self, classes: self.classes(), meshes: Vec::new(), chord };
+        let misses = self.near_misses(NEAR * chord);
         // If triangles of beams that nearly touch cross, or vertices cannot be moved, everything is refined.
         let mut fault = None;
         for finer in FINER {
@@ -109,43 +116,56 @@ impl Quadors {
                     continue;
                 }
             }
-            if !tessellation.has_crossings() {
+            if !tessellation.has_crossings(&misses) {
                 return Ok(tessellation);
             }
         }
         if let Some(fault) = fault {
             return Err(fault);
         }
-        Err(Fault::new("chord", "triangles of adjacent beams intersect at this chord error: use a smaller one"))
+        let place = misses.first().map_or(String::new(), |m| {
+            let [a, b] = m.beams;
+            format!(", such as beams {a} and {b}, which all but touch at {}", position_text(m.at))
+        });
+        let message = format!(
+            "triangles of beams next to each other intersect at this chord error{place}: use a smaller one, give the spacing of a grid \
+             (edge), or move them apart"
+        );
+        Err(Fault::new("chord", message))
     }
 }
 
 impl Tessellation<'_> {
-    /// Whether triangles of two hubs cross that are adjacent or have a common neighbour: those of beams that nearly
-    /// touch, at a coarse chord error. Within a hub triangles cannot cross.
-    fn has_crossings(&self) -> bool {
+    /// Whether triangles of two hubs cross that are adjacent, have a common neighbour or beams that nearly miss each other: those of
+    /// beams that nearly touch, at a coarse chord error. Within a hub triangles cannot cross.
+    fn has_crossings(&self, misses: &[Collision]) -> bool {
         let (quadors, meshes) = (self.quadors, &self.meshes);
         let mut pairs: HashMap<[i64; 5], [usize; 2]> = HashMap::new();
         let per = 1e6 / quadors.scale;
+        let mut meet = |a: usize, b: usize| {
+            let [a, b] = [a.min(b), a.max(b)];
+            let [ca, cb] = [a, b].map(|i| self.classes.of[i] as usize);
+            let by = sub(quadors.center(b), quadors.center(a));
+            let apart = (0..3).any(|k| {
+                let (p, q) = (meshes[ca].bounds, meshes[cb].bounds);
+                p.max[k] < by[k] + q.min[k] || p.min[k] > by[k] + q.max[k]
+            });
+            if !apart {
+                let [x, y, z] = by.map(|v| (v * per).round() as i64);
+                pairs.entry([ca as i64, cb as i64, x, y, z]).or_insert([a, b]);
+            }
+        };
         for i in 0..quadors.len() {
             let hub = quadors.hub(i);
             let other = |s: &HalfBeam| quadors.ends[s.beam as usize][1 - s.end] as usize;
             let near: Vec<usize> = core::iter::once(i).chain(hub.half_beams.iter().map(other)).collect();
             for (n, &a) in near.iter().enumerate() {
-                for &b in &near[n + 1..] {
-                    let [a, b] = [a.min(b), a.max(b)];
-                    let [ca, cb] = [a, b].map(|i| self.classes.of[i] as usize);
-                    let by = sub(quadors.center(b), quadors.center(a));
-                    let apart = (0..3).any(|k| {
-                        let (p, q) = (meshes[ca].bounds, meshes[cb].bounds);
-                        p.max[k] < by[k] + q.min[k] || p.min[k] > by[k] + q.max[k]
-                    });
-                    if !apart {
-                        let [x, y, z] = by.map(|v| (v * per).round() as i64);
-                        pairs.entry([ca as i64, cb as i64, x, y, z]).or_insert([a, b]);
-                    }
-                }
+                near[n + 1..].iter().for_each(|&b| meet(a, b));
             }
+        }
+        for miss in misses {
+            let [p, q] = miss.beams.map(|b| quadors.ends[b as usize].map(|h| h as usize));
+            p.iter().for_each(|&a| q.iter().for_each(|&b| meet(a, b)));
         }
         let pairs: Vec<[usize; 2]> = pairs.into_values().collect();
         pairs.into_par_iter().any(|[a, b]| self.hubs_cross(a, b))

@@ -151,9 +151,10 @@ pub(super) fn blend(
     cancelling(&blend, &names, &equal, environment, warnings);
     // But for rounding: exactly two cells are wide enough.
     if let Some(width) = width.filter(|w| *w < 2.0 * longest * (1.0 - 1e-9)) {
+        let lost = if by == By::Fraction { ", and the fraction is not held" } else { "" };
         let message = format!(
             "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
-             growing into each other, and the fraction is not held",
+             growing into each other{lost}",
             figure(width),
             number(longest)
         );

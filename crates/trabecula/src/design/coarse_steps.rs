@@ -18,7 +18,7 @@ impl Built {
     /// (mm³) and has this number of `pieces`, and the step that suffices; `None` if nothing is, and for other solids.
     pub fn coarse_steps(&self, edge: f64, volume: f64, pieces: usize) -> Option<String> {
         let [only] = &self.tilings[..] else { return None };
-        if self.blend.is_some() || !self.solid.filled.is_empty() && only.finished.is_none() {
+        if self.blend.is_some() || !self.solid.filled.is_empty() {
             return None;
         }
         let tiling = &only.tiling;

@@ -2,10 +2,11 @@
 
 use geometry::fault::Fault;
 
-/// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width; one
-/// header line is ignored.
+/// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width. Where a
+/// header line names x, y and z, they are taken from there.
 pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
+    let mut order: Vec<usize> = Vec::new();
     let what = match widths {
         [4] => "four numbers x, y, z, value",
         [9] => "nine numbers x, y, z, 11, 22, 33, 23, 13, 12 (or columns that name them)",
@@ -20,6 +21,7 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         let words: Vec<&str> = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty()).collect();
         let row: Vec<Option<f64>> = words.iter().map(|w| w.trim_matches('"').parse().ok()).collect();
         if rows.is_empty() && row.iter().all(Option::is_none) {
+            order = places(&words);
             continue;
         }
         let wide = rows.first().map_or(row.len(), Vec::len);
@@ -30,12 +32,22 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         if row.iter().any(|v| !v.is_finite()) {
             return Err(fault(n, format!("numbers must be finite, found \"{line}\"")));
         }
-        rows.push(row);
+        let moved = order.iter().map(|place| row[*place]).collect();
+        rows.push(if order.len() == wide { moved } else { row });
     }
     if rows.is_empty() {
         return Err(Fault::new("", format!("the file has no rows of {what}")));
     }
     Ok(rows)
+}
+
+/// The places of x, y, z and of what else there is, in this order, by the first line; none if it does not name these three.
+fn places(names: &[&str]) -> Vec<usize> {
+    let named = |wanted: &&str| names.iter().position(|n| n.trim_matches('"').eq_ignore_ascii_case(wanted));
+    let Some(mut found) = ["x", "y", "z"].iter().map(named).collect::<Option<Vec<usize>>>() else { return Vec::new() };
+    let others = (0..names.len()).filter(|i| !found.contains(i));
+    found.extend(others.collect::<Vec<usize>>());
+    found
 }
 
 /// The columns that the first line names so, in this order. Other columns may hold anything.

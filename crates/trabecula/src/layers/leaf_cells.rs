@@ -4,6 +4,7 @@
 //! one sign at the corners may still reach in: second differences say how far it may bend. Adjacent cells of different size share
 //! all nodes on their common side, because a cell with nodes on its sides is divided into triangles about its centre.
 
+use geometry::progress::checkpoint;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::plane_grid::{FINE, LiveBlock, Node, PlaneGrid, lifted};
@@ -69,6 +70,7 @@ impl<'a> LeafCells<'a> {
     pub fn each_polygon(&mut self, found: &mut impl FnMut(&Self, u32, &[Corner])) {
         let (mut crossed, mut refined) = (Vec::new(), Vec::new());
         for b in 0..self.blocks.len() {
+            checkpoint();
             self.classify(b as u32, &mut crossed, &mut refined);
         }
         let coarse: FxHashSet<Node> = refined.iter().map(|l: &Leaf| l.at).collect();

@@ -188,6 +188,9 @@ impl Missed {
     }
 }
 
+/// The golden section: no fraction is further from simple ones.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
 /// The target at points throughout the region.
 struct Probe<'a> {
     wanted: &'a Wanted,
@@ -233,8 +236,14 @@ impl<'a> Probe<'a> {
         Ok([self.missed_along(0, step[0])?, self.missed_along(1, step[1])?, self.missed_along(2, step[2])?])
     }
 
+    /// What is missed within half a step, and within a part of it: what has the period of the nodes, or half of it, shows there only.
     fn missed_along(&self, axis: usize, step: f64) -> Result<Missed, Fault> {
         let half = 0.5 * step.min(self.bounds.size()[axis]);
+        let [whole, part] = [self.missed_within(axis, half)?, self.missed_within(axis, GOLDEN * half)?];
+        Ok(if part.share > whole.share { part } else { whole })
+    }
+
+    fn missed_within(&self, axis: usize, half: f64) -> Result<Missed, Fault> {
         // Both ends of the step lie in the box.
         let (low, high) = (self.bounds.min[axis] + half, self.bounds.max[axis] - half);
         let moved = |p: &Vec3, by: f64| {

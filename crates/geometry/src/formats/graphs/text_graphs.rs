@@ -22,15 +22,41 @@ pub fn write_table(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Reads rows of x1, y1, z1, x2, y2, z2 and no, one or two radii, between commas, semicolons, tabs or spaces; one line of headings.
-/// Ends at the same position are one node.
+/// The columns of a table of end points.
+const COLUMNS: [&str; 6] = ["x1", "y1", "z1", "x2", "y2", "z2"];
+
+/// The places of the ends' coordinates and of the radii (r1 and r2, r or radius) by headings; `None` if these name none of the
+/// coordinates, a fault if they lack one.
+fn places(headings: &[&[u8]]) -> Result<Option<Vec<usize>>, String> {
+    let named = |wanted: &str| headings.iter().position(|h| h.eq_ignore_ascii_case(wanted.as_bytes()));
+    let found: Vec<Option<usize>> = COLUMNS.iter().map(|c| named(c)).collect();
+    if found.iter().all(Option::is_none) {
+        return Ok(None);
+    }
+    if let Some(lacking) = found.iter().position(Option::is_none) {
+        return Err(format!(
+            "no column is named {}; expected {}, and perhaps r1, r2",
+            COLUMNS[lacking],
+            COLUMNS.join(", ")
+        ));
+    }
+    let radii = match [named("r1"), named("r2")] {
+        [None, None] => [named("r").or_else(|| named("radius")), None],
+        both => both,
+    };
+    Ok(Some(found.into_iter().chain(radii).flatten().collect()))
+}
+
+/// Reads rows of x1, y1, z1, x2, y2, z2 and no, one or two radii, between commas, semicolons, tabs or spaces. Columns are found by
+/// their headings, if a first line names these; others are left out then. Ends at the same position are one node.
 pub fn read_table(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut graph, mut seen, mut first) = (BeamGraph::default(), FxHashMap::default(), true);
+    let mut order: Option<Vec<usize>> = None;
     for (line, text) in Lines::new(bytes) {
         let text = text.split(|b| *b == b'#').next().unwrap_or_default();
         let separated = text.iter().any(|b| b",;\t".contains(b));
         let fields: Vec<&[u8]> = match separated {
-            true => text.split(|b| b",;\t".contains(b)).map(<[u8]>::trim_ascii).collect(),
+            true => text.split(|b| b",;\t".contains(b)).map(unquoted).collect(),
             false => words(text).collect(),
         };
         if fields.iter().all(|f| f.is_empty()) {
@@ -38,8 +64,16 @@ pub fn read_table(bytes: &[u8]) -> Result<BeamGraph, Fault> {
         }
         let numbers: Vec<Option<f64>> = fields.iter().map(|f| parse(f)).collect();
         if std::mem::take(&mut first) && numbers.iter().all(Option::is_none) {
+            order = places(&fields).map_err(|message| at_line(line, message))?;
             continue;
         }
+        let (fields, numbers) = match &order {
+            None => (fields, numbers),
+            Some(order) => order
+                .iter()
+                .map(|i| (fields.get(*i).copied().unwrap_or_default(), numbers.get(*i).copied().flatten()))
+                .unzip(),
+        };
         let expected = "x1, y1, z1, x2, y2, z2 and no, one or two radii";
         if !(6..=8).contains(&fields.len()) {
             return Err(at_line(line, format!("{} values found; expected {expected}", fields.len())));
@@ -64,6 +98,13 @@ pub fn read_table(bytes: &[u8]) -> Result<BeamGraph, Fault> {
         graph.join(ends, radii, on_line(line))?;
     }
     Ok(graph)
+}
+
+/// A field without the spaces and quotes about it.
+fn unquoted(field: &[u8]) -> &[u8] {
+    let field = field.trim_ascii();
+    let inner = field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\""));
+    inner.map_or(field, <[u8]>::trim_ascii)
 }
 
 /// Reads rows "GRID id x y z" and "STRUT id node node", perhaps with a radius, as TPMS Designer and homo3D have them; `//` begins a
@@ -111,9 +152,12 @@ mod tests {
         let made = read_table(b"x1;y1;z1;x2;y2;z2;r\n0;0;0;1;0;0;0.5\n1;0;0;1;2;0;\n# end\n").unwrap();
         assert_eq!((made.nodes.len(), &made.beams), (3, &vec![[0, 1], [1, 2]]));
         assert!(made.beam_radii[0] == [0.5; 2] && made.beam_radii[1][0].is_nan());
+        let named = read_table(b"id,\"x1\",x2,y1,y2,z1,z2,R2,r1,d\n7,\"0\",5,0,1,0,2,.5,.4,1\n").unwrap();
+        assert!(named.nodes == [[0.0; 3], [5.0, 1.0, 2.0]] && named.beam_radii == [[0.4, 0.5]]);
         let plain = read_table(b"0 0 0 1 1 1\n-0 0 0 2 2 2 .1 .2\n").unwrap();
         assert!(plain.beams == [[0, 1], [0, 2]] && plain.beam_radii[1] == [0.1, 0.2]);
         for (text, expected) in [
+            ("x1,y1,z1,x2,y2\n0,0,0,1,1", "line 1: no column is named z2; expected x1"),
             ("0,0,0,1,1", "line 1: 5 values found; expected x1"),
             ("a,b\n0,0,0,1,1,x", "line 2: \"x\" is not a finite number"),
             ("0,0,0,1,1,inf", "line 1: \"inf\" is not"),
