@@ -310,3 +310,23 @@ def test_flat_ends_of_cylinders_are_fixed_by_boxes_about_them(inner):
     # Three cells in 8 mm, where 2.67 would be, nearly all over.
     spacing = solid.report().lattices["core"].distortion.spacing[2]
     assert spacing.mean == pytest.approx(9 / 8, abs=0.01) and spacing.p95 == pytest.approx(9 / 8, abs=0.01)
+
+
+@pytest.mark.parametrize("times", [2, 4, 8])
+def test_an_orientation_with_the_period_of_the_nodes_is_warned_of(times):
+    """At the nodes, and halfway between them, it is zero."""
+    turned = lt.map.phase(wavelength=4, rotate_z={"formula": f"30*sin({times}*pi*x)"})
+    lattice = lt.Lattice("gyroid", "sheet", turned, lt.level.fraction(0.3))
+    with pytest.warns(lt.DesignWarning, match="the orientation turns by .* nodes of the phase grid are 1 mm apart"):
+        lt.Design(lt.region.box(min=[0, 0, 0], max=[40, 6, 6]), lattice).build()
+
+
+def test_points_of_a_table_are_found_by_its_headings(tmp_path):
+    table = tmp_path / "points.csv"
+    fractions = []
+    for text in ("x,y,z,value\n1,2,0.45,0.3\n3,1,0.5,0.4\n", "value,x,y,z\n0.3,1,2,0.45\n0.4,3,1,0.5\n"):
+        table.write_text(text)
+        level = lt.level.fraction(lt.grade.points(table))
+        lattice = lt.Lattice("gyroid", "sheet", lt.map.affine(2), level)
+        fractions.append(lt.Design(lt.region.box([6, 6, 6]), lattice).build().report().lattices["core"].fraction)
+    assert fractions[0] == fractions[1] and 0.3 <= fractions[1][0] < fractions[1][1] <= 0.4

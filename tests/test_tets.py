@@ -456,6 +456,16 @@ def test_physical_groups_are_zones_by_name(tmp_path):
     assert [z.count for z in zoned(path, {"core": "p43m", 7: "f43m"}).values()] == [3, 3]
 
 
+def test_a_skin_is_no_share_of_the_lattice():
+    """What is solid anyway does not make steps too coarse."""
+    lattice = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=5), level=lt.level.fraction(0.25))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*(tetrahedra|void|powder)")
+        solid = lt.Design(region=lt.region.sphere(radius=8), lattice={"a": lattice}, skin=lt.skin(0.8)).build()
+        solid.mesh(edge=0.3)
+
+
 def test_coarse_steps_are_warned_of_with_the_step_that_suffices():
     """A network that falls apart between the steps of its tetrahedra, and is whole and as full as asked at the step named."""
     lattice = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=3), level=lt.level.fraction(0.25))

@@ -25,7 +25,7 @@ const ESTIMATE_HUBS: usize = 16;
 const MIN_ESTIMATE_CHORD: f64 = 0.01;
 
 /// Shares of the chord error that are tried, where a hub cannot be triangulated within it or triangles of beams that nearly touch cross.
-const FINER: [f64; 7] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125];
+const FINER: [f64; 9] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125, 0.06, 0.03];
 
 /// Distance of beams within which their triangles may cross, in chord errors: vertices are at most one off the surface, and so are
 /// chords.

@@ -160,3 +160,20 @@ fn fillets_take_triangles_as_the_chord_error_says() {
         assert!(mean > 0.25 / 3.0 * 0.005, "{}: {mean}", axes.len());
     }
 }
+
+#[test]
+fn beams_that_nearly_touch_without_a_common_hub_do_not_cross() {
+    let hub = |center: Vec3| crate::graph::Hub { center, radius: 0.5 };
+    let beam = |ends| Beam { ends, profile: Profile::Cylinder };
+    for apart in [1e-3, 3e-3, 1e-2, 0.1] {
+        let h = 1.0 + apart;
+        let crossed = [[-10.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, -10.0, h], [0.0, 10.0, h]];
+        let parallel = [[-10.0, 0.0, 0.0], [10.0, 0.0, 0.0], [-8.0, 0.0, h], [11.0, 0.0, h]];
+        for centers in [crossed, parallel] {
+            let graph = Graph { hubs: centers.map(hub).to_vec(), beams: vec![beam([0, 1]), beam([2, 3])] };
+            let q = Quadors::new(&graph, Fillet::None).expect("two rods");
+            let (mesh, _) = q.mesh(0.01).expect("a mesh");
+            assert_eq!(geometry::mesh::self_intersections(&mesh, 1), 0, "{apart}");
+        }
+    }
+}
