@@ -264,7 +264,7 @@ def test_check_tells_and_draws_the_transitions(tmp_path):
         capture_output=True,
         text=True,
     )
-    assert alone.returncode == 1 and "blend" in alone.stderr
+    assert alone.returncode == 2 and "blend" in alone.stderr
 
 
 def test_a_lattice_over_tetrahedra_takes_part():

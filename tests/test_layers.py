@@ -370,11 +370,11 @@ def test_the_command_says_what_is_wrong(cube, tmp_path):
         ((), 2, "slice needs --layer MM"),
         (("--layer", "1"), 2, "slice --layer needs -o OUT"),
         (("--layer", "0", "-o", "a.cli"), 2, "expected a length in mm greater than 0, found 0"),
-        (("--layer", "1", "-o", tmp_path / "a.zip"), 1, "add --pixel MM"),
-        (("--layer", "1", "--least", "0.1", "-o", "a.cli"), 1, "add --adaptive MM"),
-        (("--layer", "1", "--beams", "b", "-o", "a.cli"), 1, "--beams belongs to --z"),
-        (("--z", "0", "--from", "0"), 1, "--from belongs to --layer"),
-        (("--z", "0", "--binary"), 1, "--binary belongs to --layer"),
+        (("--layer", "1", "-o", tmp_path / "a.zip"), 2, "add --pixel MM"),
+        (("--layer", "1", "--least", "0.1", "-o", "a.cli"), 2, "add --adaptive MM"),
+        (("--layer", "1", "--beams", "b", "-o", "a.cli"), 2, "--beams belongs to --z"),
+        (("--z", "0", "--from", "0"), 2, "--from belongs to --layer"),
+        (("--z", "0", "--binary"), 2, "--binary belongs to --layer"),
         (("--z", "50"), 1, "outside the part, which lies from -4 to 4 mm"),
     ]:
         done = command("slice", cube, *words)

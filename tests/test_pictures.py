@@ -94,7 +94,7 @@ def test_the_command_draws_at_a_size_in_print(mesh, tmp_path):
     in_process("render", tmp_path / "box.stl", "-o", tmp_path / "t.png", "--size", "80x60", "--show", "thickness")
     assert header((tmp_path / "t.png").read_bytes()) == (80, 60, 2, None)
     for wrong in (["--show", "thickness"], ["--turn", "4"], ["--background", "white"]):
-        in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.svg", *wrong, status=1)
+        in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.svg", *wrong, status=2)
     in_process("render", tmp_path / "box.stl", "-o", tmp_path / "b.png", "--size", "900mm", "--dpi", 600, status=1)
     assert not (tmp_path / "b.svg").exists() and not (tmp_path / "b.png").exists()
     # Lines have no pixels to run out of.

@@ -190,6 +190,6 @@ def test_the_command_makes_shells(tmp_path, capsys):
     in_process("volume", design, "-o", tmp_path / "shell.inp", "--of", "shell", "--order", "2", "--per-cell", "10")
     assert (tmp_path / "shell.inp").read_text().count("TYPE=S6") == 1
     for wrong in (["--wall", "3"], ["--periodic"]):
-        in_process("volume", design, "-o", tmp_path / "b.inp", "--of", "shell", *wrong, status=1)
+        in_process("volume", design, "-o", tmp_path / "b.inp", "--of", "shell", *wrong, status=2)
     in_process("volume", design, "-o", tmp_path / "b.msh", "--of", "shell", status=1)
     assert not (tmp_path / "b.inp").exists() and not (tmp_path / "b.msh").exists()

@@ -73,7 +73,7 @@ def test_the_command_tells_and_writes(tmp_path):
     read = lt.TetMesh.read(tmp_path / "ball.vtu")
     assert read.report()["quality"] == report["quality"] and read.report()["fit"] is None
     assert "no lattice of the design" in command("tets", design, "--lattice", "other", expected=1)[1]
-    assert "--unit and --split belong" in command("tets", design, "--split", expected=1)[1]
+    assert "--unit and --split belong" in command("tets", design, "--split", expected=2)[1]
     same = command("tets", tmp_path / "ball.vtu", "-o", tmp_path / "ball.vtu", expected=1)[1]
     assert "name another output" in same
     command("tets", design, "-o", tmp_path / "ball.stl", expected=2)

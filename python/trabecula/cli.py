@@ -820,7 +820,7 @@ def serve(argv: list[str] | None) -> int:
         if os.environ.get("TRABECULA_DEBUG"):
             raise
         fail("trabecula: " + words_of(error))
-        return 1
+        return getattr(error, "status", 1)
 
 
 def known_command(top: argparse.ArgumentParser, words: list[str]) -> None:

@@ -9,7 +9,7 @@ from . import _core, cell
 from . import beams as unit_cells
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
-from .errors import DesignError, Refused
+from .errors import DesignError, Refused, WrongUsage
 from .files import check_place, read_text, write_text
 from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
@@ -183,29 +183,29 @@ def check_elements(args) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
     kind = kind_of(args.output)
     if args.fields and kind not in ("vtu", "xdmf"):
-        raise Refused(f"--fields is for .vtu and .xdmf, not {args.output}")
+        raise WrongUsage(f"--fields is for .vtu and .xdmf, not {args.output}")
     check_steps(kind, args.hold or (), dict(args.load or ()))
     if args.hold and args.periodic:
-        raise Refused("a periodic mesh has steps of its own; leave out --hold and --load")
+        raise WrongUsage("a periodic mesh has steps of its own; leave out --hold and --load")
     if args.hold and args.of not in ("solid", "shell", "carrier"):
-        raise Refused(f"--hold and --load are for --of solid, shell or carrier, not {args.of}")
+        raise WrongUsage(f"--hold and --load are for --of solid, shell or carrier, not {args.of}")
     if args.voxels is None:
         if args.least is not None:
-            raise Refused("--least belongs to --voxels; add it")
+            raise WrongUsage("--least belongs to --voxels; add it")
         check_order(kind, args.order)
         if args.of == "carrier":
             sized = {"--edge": args.edge, "--per-cell": args.per_cell, "--wall": args.wall, "--periodic": args.periodic}
             for name in (name for name, given in sized.items() if given):
-                raise Refused(f"{name} is for other meshes than --of carrier, whose tetrahedra are the design's; leave it out")
+                raise WrongUsage(f"{name} is for other meshes than --of carrier, of the design's own tetrahedra; leave it out")
         if args.of == "shell":
             for name in (name for name, given in {"--wall": args.wall, "--periodic": args.periodic}.items() if given):
-                raise Refused(f"{name} is for tetrahedra; leave it out, or --of shell")
+                raise WrongUsage(f"{name} is for tetrahedra; leave it out, or --of shell")
             if kind_of(args.output) not in SHELL_WRITES:
                 raise Refused(f"{args.output}: the name of shells must end in {dotted(SHELL_WRITES)}")
         return
     given = {"--order": args.order != 1, "--of": args.of != "solid", "--periodic": args.periodic}
     for name in (name for name, is_given in given.items() if is_given):
-        raise Refused(f"{name} is for tetrahedra; leave it out, or --voxels")
+        raise WrongUsage(f"{name} is for tetrahedra; leave it out, or --voxels")
     if kind_of(args.output) not in VOXEL_ELEMENT_WRITES:
         raise Refused(f"{args.output}: the name of voxels must end in {dotted(VOXEL_ELEMENT_WRITES)}")
 
@@ -261,9 +261,9 @@ def tets(args) -> None:
 
     of_file = kind_of(args.file) not in DESIGNS
     if of_file and args.lattice:
-        raise Refused("--lattice belongs to a design; a file of tetrahedra has none")
+        raise WrongUsage("--lattice belongs to a design; a file of tetrahedra has none")
     if not of_file and (args.unit or args.split):
-        raise Refused("--unit and --split belong to a file of tetrahedra; in a design they stand under map.tets")
+        raise WrongUsage("--unit and --split belong to a file of tetrahedra; in a design they stand under map.tets")
     if args.output:
         check_place(args.output)
         keep_file(args.file, args.output)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .camera import VIEWS, section_plane, towards
-from .errors import Refused
+from .errors import Refused, WrongUsage
 from .files import check_place, kind_of, write_bytes
 from .formats import is_design
 from .inputs import build, meshed, surface
@@ -80,14 +80,14 @@ def drawn_in_lines(args) -> bool:
         return False
     for name in ("show", "turn", "background"):
         if getattr(args, name) is not None:
-            raise Refused(f"--{name} is for a .png; an .svg is a drawing in lines of one view, on no background")
+            raise WrongUsage(f"--{name} is for a .png; an .svg is a drawing in lines of one view, on no background")
     return True
 
 
 def camera(args) -> tuple[float, float]:
     """Azimuth and elevation; the section with the side that is kept, refused if it cannot be read."""
     if args.view and (args.azimuth is not None or args.elevation is not None):
-        raise Refused("--view says from where; leave out --azimuth and --elevation")
+        raise WrongUsage("--view says from where; leave out --azimuth and --elevation")
     azimuth, elevation = VIEWS[args.view] if args.view else (30.0, 25.0)
     azimuth = azimuth if args.azimuth is None else args.azimuth
     elevation = elevation if args.elevation is None else args.elevation

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["DesignError", "DesignWarning", "IslandsWarning", "Refused"]
+__all__ = ["DesignError", "DesignWarning", "IslandsWarning", "Refused", "WrongUsage"]
 
 
 class DesignError(ValueError):
@@ -54,3 +54,11 @@ class IslandsWarning(DesignWarning):
 
 class Refused(Exception):
     """A file or a request that cannot be served: one line, exit status 1."""
+
+    status = 1
+
+
+class WrongUsage(Refused):
+    """Options that do not go together, or with a file of this kind: one line, exit status 2."""
+
+    status = 2

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import cache
 
 from .design import Design, load, parsed
-from .errors import DesignWarning, IslandsWarning, Refused
+from .errors import DesignWarning, IslandsWarning, Refused, WrongUsage
 from .formats import STDIN, is_design
 from .machine import fits
 from .mesh import Mesh
@@ -97,7 +97,7 @@ def surface(args) -> Mesh:
     if is_design(args.file):
         return meshed(build(args.file), args)
     if args.edge is not None or args.per_cell is not None:
-        raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
+        raise WrongUsage(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
     return Mesh.read(args.file, solid=getattr(args, "solid", None))
 
 

@@ -7,7 +7,7 @@ import re
 import warnings
 
 from . import _core
-from .errors import DesignWarning, Refused
+from .errors import DesignWarning, Refused, WrongUsage
 from .files import check_place
 from .formats import STDIN, VOLUME_READS, is_design, kind_of
 from .inputs import build, keep_inputs, meshed, same_file, surface
@@ -27,18 +27,18 @@ def measure(args) -> None:
     if kind_of(args.file) in VOLUME_READS:
         return measure_tets(args)
     if args.solid is not None and is_design(args.file):
-        raise Refused("--solid names an object of a 3MF or a solid of a file from a CAD system; a design has none")
+        raise WrongUsage("--solid names an object of a 3MF or a solid of a file from a CAD system; a design has none")
     solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:
-        raise Refused("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
+        raise WrongUsage("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
     if solid is None and args.transitions is not None:
-        raise Refused("--transitions is for designs with a blend; this is a mesh")
+        raise WrongUsage("--transitions is for designs with a blend; this is a mesh")
     found = () if solid is None else transitions(solid, args.transitions, args.file)
     held, figures = None, None
     apart = apart_of(args)
     if solid is None or args.region or args.thickness or closely(solid, args):
         if apart is not None:
-            raise Refused(
+            raise WrongUsage(
                 "--resume and --cluster measure a design on a grid, tile by tile; mesh files, --region, --thickness and "
                 "beams without --edge need the whole surface in memory: leave out one or the other"
             )
@@ -98,7 +98,7 @@ def apart_of(args) -> dict | None:
     if not (args.resume or args.cluster or args.new):
         return None
     if args.file == STDIN and (args.resume or args.new):
-        raise Refused("--resume keeps what is done beside the design; name a file")
+        raise WrongUsage("--resume keeps what is done beside the design; name a file")
     return {"cluster": args.cluster, "new": args.new, "design_file": args.file if args.resume or args.new else None}
 
 
@@ -112,7 +112,7 @@ def measure_tets(args) -> None:
 
     others = ("region", "solid", "thickness", "dangling", "transitions", "edge", "per_cell", "step", "resume", "cluster", "new")
     if any(getattr(args, name) for name in others):
-        raise Refused(f"{args.file} holds tetrahedra: of the options --json alone applies")
+        raise WrongUsage(f"{args.file} holds tetrahedra: of the options --json alone applies")
     with warnings.catch_warnings(record=True) as heard, elements.keeping() as arrays:
         warnings.simplefilter("always", DesignWarning)
         made = TetMesh.read(args.file, split=True)
@@ -154,7 +154,7 @@ def measure_tets(args) -> None:
 def check_measure(args) -> None:
     """Refuses options of ``measure`` that do not go together, before any work is done."""
     if not args.thickness and (args.step is not None or args.histogram is not None):
-        raise Refused("--step and --histogram belong to --thickness; add it")
+        raise WrongUsage("--step and --histogram belong to --thickness; add it")
     if args.region is not None and not os.path.exists(args.region):
         raise Refused(f"{args.region} does not exist")
     if args.histogram is not None:
@@ -198,7 +198,7 @@ def transitions(solid: Solid, picture: str | None, design: str | None = None, te
     settle()
     if picture is not None:
         if not found:
-            raise Refused("--transitions is for designs with a blend; this one has none")
+            raise WrongUsage("--transitions is for designs with a blend; this one has none")
         check_place(picture)
         if design is not None:
             keep_inputs(design, picture)

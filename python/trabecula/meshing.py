@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 
-from .errors import Refused
+from .errors import Refused, WrongUsage
 from .files import check_place
 from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, dotted, kind_of
 from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
@@ -26,19 +26,19 @@ def mesh(args) -> None:
     if args.implicit:
         return mesh_implicit(args)
     if args.no_mesh:
-        raise Refused("--no-mesh belongs to --beams; add it")
+        raise WrongUsage("--no-mesh belongs to --beams; add it")
     if kind_of(args.output) in STEP_WRITES:
         return mesh_step(args)
     for name in ("protocol", "assembly"):
         if getattr(args, name) is not None:
-            raise Refused(f"--{name} is of STEP files, and {args.output} is none; leave it out, or write a .step")
+            raise WrongUsage(f"--{name} is of STEP files, and {args.output} is none; leave it out, or write a .step")
     if kind_of(args.output) not in MESH_WRITES:
         if not design_of(args.design).beams:
             raise Refused(
                 f"a .{kind_of(args.output)} holds beams, and {args.design} has none; name another output: "
                 f"{dotted((*MESH_WRITES, *STEP_WRITES))}"
             )
-        raise Refused(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
+        raise WrongUsage(f"a .{kind_of(args.output)} holds beams, not their surface: add --beams")
     if args.parts:
         return mesh_parts(args)
     check_place(args.output)
@@ -131,7 +131,7 @@ def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) 
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
     given += [] if args.islands in islands else [f"--islands {args.islands}"]
     if given:
-        raise Refused(f"{given[0]} does not go with {why}; leave it out")
+        raise WrongUsage(f"{given[0]} does not go with {why}; leave it out")
 
 
 def without_mesh(args, save: Callable[[Solid], dict], words: Callable[[dict], str]) -> None:
@@ -158,11 +158,11 @@ def mesh_parts(args) -> None:
         "--triangles": args.triangles,
     }
     if alone := [name for name, value in others.items() if value]:
-        raise Refused(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
+        raise WrongUsage(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
     if apart_of(args) is not None:
-        raise Refused("--resume, --cluster and --shards do not go with --parts: these are held in memory; leave one out")
+        raise WrongUsage("--resume, --cluster and --shards do not go with --parts: these are held in memory; leave one out")
     if args.islands == "drop":
-        raise Refused("--islands drop does not go with --parts: a dropped piece would leave a gap between them; leave it out")
+        raise WrongUsage("--islands drop does not go with --parts: a dropped piece leaves a gap between them; leave it out")
     files = part_files(args.output, args.parts)
     start = time.perf_counter()
     for name in files.values():
@@ -205,7 +205,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     if apart is not None:
         if whole:
             out = given_of(args) or "them: the design's ends are open"
-            raise Refused(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
+            raise WrongUsage(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
         if kind_of(args.output) != "stl":
             raise Refused(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
     streams = kind_of(args.output) == "stl" if asked else apart is not None or not closes(solid, resolution(args))

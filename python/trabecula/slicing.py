@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from .errors import Refused
+from .errors import Refused, WrongUsage
 from .files import check_place
 from .formats import LAYERS, kind_of
 from .inputs import build, keep_file
@@ -25,11 +25,11 @@ def slice(args) -> None:
 
     others = ("beams", "chord") if args.layer is not None else LAYERED
     for name in (name for name in others if getattr(args, name) is not None and getattr(args, name) is not False):
-        raise Refused(f"--{WORDS.get(name, name)} belongs to --{'layer' if args.layer is None else 'z'}; leave it out")
+        raise WrongUsage(f"--{WORDS.get(name, name)} belongs to --{'layer' if args.layer is None else 'z'}; leave it out")
     if args.least is not None and args.adaptive is None:
-        raise Refused("--least is for adaptive layers; add --adaptive MM, the greatest height of steps on the surface")
+        raise WrongUsage("--least is for adaptive layers; add --adaptive MM, the greatest height of steps on the surface")
     if args.layer is not None and args.output and LAYERS[kind_of(args.output)].pictures and args.pixel is None:
-        raise Refused(f"{args.output} holds pictures; add --pixel MM, the edge of a pixel")
+        raise WrongUsage(f"{args.output} holds pictures; add --pixel MM, the edge of a pixel")
     if args.output:
         if args.z is not None and kind_of(args.output) != "svg":
             raise Refused(f"{args.output}: a section is drawn as .svg; other formats take --layer")

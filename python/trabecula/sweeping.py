@@ -9,7 +9,7 @@ from typing import Any
 
 from .bridges import package
 from .design import Design
-from .errors import Refused
+from .errors import Refused, WrongUsage
 from .files import write_svg
 from .formats import kind_of
 from .scatter import scatter
@@ -35,7 +35,7 @@ def table_of(design: Design, args) -> dict[str, Any]:
         raise Refused(f"the sweep has {size} designs; more than {FEW} are made with --yes only")
     names = [name.strip() for name in args.properties.split(",")] if args.properties else []
     if args.n is not None and not names:
-        raise Refused("--n is of --properties; name some, or leave it out")
+        raise WrongUsage("--n is of --properties; name some, or leave it out")
     properties = {name: {} if args.n is None else {"n": args.n} for name in names}
     job, points = prepared(design, args.edge, args.per_cell, properties, args.meshes, args.pictures)
     journal = Journal(args.output, job)
@@ -66,7 +66,7 @@ def table_of(design: Design, args) -> dict[str, Any]:
 def draw(table: str, args, drawing: str) -> None:
     """Draws two columns of a table, or three."""
     if not 2 <= len(args.plot) <= 3:
-        raise Refused(f"--plot takes two columns, or three: X Y COLOUR; found {len(args.plot)}")
+        raise WrongUsage(f"--plot takes two columns, or three: X Y COLOUR; found {len(args.plot)}")
     columns = columns_of_table(table)
     try:
         write_svg(drawing, lambda: scatter(columns, *args.plot, front=args.front))

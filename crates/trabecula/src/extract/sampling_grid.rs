@@ -427,6 +427,9 @@ fn node_planes(
     Ok(nodes)
 }
 
+/// Share of the part's extent above which an edge is no advice.
+const FEW: f64 = 0.02;
+
 /// The least distance of points from the ends of their grid edges, as a share of the edge, that rounding to single precision
 /// requires.
 fn margin(axes: &[Vec<f64>; 3]) -> Result<f64, Fault> {
@@ -437,14 +440,17 @@ fn margin(axes: &[Vec<f64>; 3]) -> Result<f64, Fault> {
     let resolution = farthest * f64::from(f32::EPSILON);
     let needed = 8.0 * resolution / finest;
     if needed > 0.125 {
+        let enough = 64.0 * farthest * f64::from(f32::EPSILON);
+        let extent = axes.iter().filter_map(|n| Some(n.last()? - n.first()?)).fold(0.0, f64::max);
+        let coarser =
+            if enough < FEW * extent { format!(", or use an edge above {} mm", number(enough)) } else { String::new() };
         return Err(Fault::new(
             "edge",
             format!(
                 "steps of {} mm at {} mm from the origin vanish in the files' single precision; move the part nearer to the \
-                 origin, or use an edge above {} mm",
+                 origin{coarser}",
                 number(finest),
                 number(farthest),
-                number(64.0 * farthest * f64::from(f32::EPSILON))
             ),
         ));
     }
