@@ -41,7 +41,7 @@ fn stop_children(py: Python<'_>) {
 /// Whether this process was forked: the threads of its parent's pool are not in it.
 static FORKED: AtomicBool = AtomicBool::new(false);
 
-/// Asks to be told of forks, where the system has these.
+/// Has forks handled, where the system has these.
 pub fn watch_forks(py: Python<'_>) -> PyResult<()> {
     let os = py.import("os")?;
     if !os.hasattr("register_at_fork")? {

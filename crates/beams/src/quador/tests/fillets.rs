@@ -41,7 +41,7 @@ fn a_fillet_smaller_than_the_largest_that_fits_is_achieved_in_every_crotch() {
                 let all = radii(&got);
                 assert!(all.iter().all(|r| *r >= asked * (1.0 - 1e-9)), "{n} beams: asked for {asked}, got {all:?}");
                 assert_eq!(got.shortfalls(), [], "{n} beams, {asked}");
-                // Nor is it larger, but for the narrowest that can be told from a crease.
+                // Nor is it larger, but for the narrowest that differs from a crease.
                 let of = got.hub(0);
                 let narrowest = |&(i, j): &(usize, usize)| of.tau(i, j) > 0.999 * (1.0 - 1e-9);
                 for (pair, r) in of.adjacent_pairs().iter().zip(&all).filter(|(_, r)| r.is_finite()) {
