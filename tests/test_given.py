@@ -45,6 +45,18 @@ def test_designs_keep_copies_of_what_they_are_given():
     )
 
 
+def test_designs_keep_copies_of_lattices_and_beams():
+    lattice = gyroid()
+    design = lt.Design(BOX, {"core": lattice})
+    before = hash(design)
+    lattice.map["affine"]["wavelength"] = 2
+    assert hash(design) == before
+    start = [0.0, 0, 0]
+    beams = lt.Beams(nodes=(start, [5, 0, 0]), struts=((0, 1),), radius=0.5)
+    start[0] = 3
+    assert beams.to_dict()["nodes"][0] == [0, 0, 0]
+
+
 def test_a_design_of_a_file_that_is_changed_is_what_it_says(tmp_path):
     file = tmp_path / "a.toml"
     lt.Design(BOX, gyroid()).save(file)
@@ -79,7 +91,9 @@ def test_arrays_and_sets_of_meshes_do_not_change(solid):
 
 
 def test_reports_layers_and_laws_compare_and_print(solid):
-    assert "conductivity" in str(solid.conductivity(n=8)) or str(solid.conductivity(n=8))
+    assert "bounds" in str(solid.conductivity(n=8))
+    law = lt.law("gyroid", "sheet", start=0.2, stop=0.3, count=2, n=8, properties=["area"])
+    assert law == law and law in [law] and law != 3
     layers = solid.layers(layer=1.0)
     one = layers[2]
     assert one == one and one in [one] and one != layers[3] and isinstance(hash(one), int)
@@ -92,6 +106,7 @@ def test_reports_layers_and_laws_compare_and_print(solid):
         (lambda s: s.mesh(edge=0.5, smooth="no"), "smooth must be True or False"),
         (lambda s: s.volume_mesh(periodic="no"), "periodic must be True or False"),
         (lambda s: s.volume_mesh(order=True), "order is True"),
+        (lambda s: s.shell_mesh(order=True), "order is True"),
         (lambda s: s.field(np.array([[0, 0, 1j]])), "points must be real numbers"),
         (lambda s: s.field(np.ma.array([[0.0, 0, 0]], mask=[[1, 0, 0]])), "masked"),
         (lambda s: s.cell_at([[0, 0, 0]], lattice=0), "lattice must be the name"),
@@ -128,7 +143,11 @@ def test_voxels_beyond_plane_faces_are_warned_of(solid):
     ):
         coarse = solid.voxels(step=0.17)
     assert coarse.volume > 1.04 * 0.3 * 512
+    wide = lt.Design(lt.region.box([8, 8, 10.1]), gyroid()).build()
+    with pytest.warns(lt.DesignWarning, match=r"10.5 mm along one of 10.1 mm: .* use a smaller step"):
+        wide.voxels(step=0.5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        wide.voxels()
         # Sampled at places that are alike in every cell: 2 % off, by chance either way.
         assert solid.voxels(step=8 / 48).volume == pytest.approx(0.3 * 512, rel=0.03)

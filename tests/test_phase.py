@@ -324,9 +324,13 @@ def test_an_orientation_with_the_period_of_the_nodes_is_warned_of(times):
 def test_points_of_a_table_are_found_by_its_headings(tmp_path):
     table = tmp_path / "points.csv"
     fractions = []
-    for text in ("x,y,z,value\n1,2,0.45,0.3\n3,1,0.5,0.4\n", "value,x,y,z\n0.3,1,2,0.45\n0.4,3,1,0.5\n"):
+    for text in (
+        "x,y,z,value\n1,2,0.45,0.3\n3,1,0.5,0.4\n",
+        "value,x,y,z\n0.3,1,2,0.45\n0.4,3,1,0.5\n",
+        "the value, x, y, z\n0.3,1,2,0.45\n0.4,3,1,0.5\n",
+    ):
         table.write_text(text)
         level = lt.level.fraction(lt.grade.points(table))
         lattice = lt.Lattice("gyroid", "sheet", lt.map.affine(2), level)
         fractions.append(lt.Design(lt.region.box([6, 6, 6]), lattice).build().report().lattices["core"].fraction)
-    assert fractions[0] == fractions[1] and 0.3 <= fractions[1][0] < fractions[1][1] <= 0.4
+    assert fractions[0] == fractions[1] == fractions[2] and 0.3 <= fractions[1][0] < fractions[1][1] <= 0.4

@@ -35,7 +35,7 @@ def run(command: list[str], folder: str, limit: float) -> str | None:
         try:
             status = child.wait(limit)
         except subprocess.TimeoutExpired:
-            return f"did not finish within {limit:.3g} s and was stopped"
+            return f"did not finish within {limit:{'.3g' if limit < 100 else '.0f'}} s and was stopped"
         finally:
             if child.poll() is None:
                 child.kill()

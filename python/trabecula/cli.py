@@ -49,7 +49,8 @@ examples:
   trabecula measure first.toml --json
   trabecula render first.toml -o first.png
 
-exit status: 0 done, 1 the design or a file is wrong, 2 wrong usage.
+exit status: 0 done, 1 the design or a file is wrong, 2 wrong usage,
+or options that do not go together.
 Set TRABECULA_DEBUG=1 for the traceback of an internal error.
 """
 UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
@@ -363,8 +364,8 @@ COMMANDS = {
         option(
             "--assembly",
             action=argparse.BooleanOptionalAction,
-            help="of a .step of beams, a part for each distinct hub, placed wherever it is (default: for more than 2,000 hubs "
-            "that are alike)",
+            help="of a .step of beams, a part for each distinct hub, placed wherever it is (default: for more than 2,000 hubs, "
+            "of which at most half differ)",
         ),
         *(JSON, *NOTICES),
     ),
@@ -820,7 +821,7 @@ def serve(argv: list[str] | None) -> int:
         if os.environ.get("TRABECULA_DEBUG"):
             raise
         fail("trabecula: " + words_of(error))
-        return getattr(error, "status", 1)
+        return status_of(error)
 
 
 def known_command(top: argparse.ArgumentParser, words: list[str]) -> None:
@@ -832,6 +833,13 @@ def known_command(top: argparse.ArgumentParser, words: list[str]) -> None:
         near = get_close_matches(name[:80].lower(), COMMANDS, 1)
         hint = f"; did you mean {near[0]}?" if near else "."
         top.error(f"no command is named {name:.80}{hint} There are: {', '.join(COMMANDS)}")
+
+
+def status_of(error: Exception) -> int:
+    """The exit status of an error."""
+    from .errors import Refused
+
+    return error.status if isinstance(error, Refused) else 1
 
 
 def words_of(error: Exception) -> str:

@@ -6,7 +6,7 @@ import json
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
@@ -114,7 +114,8 @@ class Design:
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid within the region.
     ``set`` is {name: region}: the surface within each is a set of volume meshes, to hold or to load.
     ``sweep`` is what varies in ``sweep``: {path of a key: values}, of no effect on this design.
-    Nothing is checked before ``build``, the last line that can raise. What is given is copied.
+    What is given is copied; names that are no text, and data that are too deep, are refused at once, all else that is wrong by
+    ``build``, the last line that can raise.
     """
 
     region: dict
@@ -206,8 +207,11 @@ def _keep(data: Any) -> None:
     """Copies what a frozen data class was given: it does not follow what becomes of that."""
     for name in (f.name for f in fields(data)):
         value = getattr(data, name)
-        if hasattr(value, "tolist") or isinstance(value, (Mapping, list)):
-            object.__setattr__(data, name, copied(value))
+        if hasattr(value, "tolist") or isinstance(value, (Mapping, list, tuple, range)):
+            value = copied(value)
+        if isinstance(value, dict):
+            value = {k: replace(v) if isinstance(v, (Lattice, Beams)) else v for k, v in value.items()}
+        object.__setattr__(data, name, replace(value) if isinstance(value, (Lattice, Beams)) else value)
 
 
 def _by_name(given: Any) -> Any:

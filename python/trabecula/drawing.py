@@ -27,7 +27,8 @@ def render(args) -> None:
         made, shown = surface(args), {}
     elif not is_design(args.file):
         if args.show not in OF_MESH:
-            raise Refused(f"{args.file} is a mesh; --show {args.show} is for a design with a solved map (map.phase) or a blend")
+            words = f"--show {args.show} is for a design with a solved map (map.phase) or a blend"
+            raise WrongUsage(f"{args.file} is a mesh; {words}")
         made, shown = surface(args), dict(OF_MESH[args.show])
     else:
         solid = build(args.file)

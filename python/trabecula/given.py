@@ -120,10 +120,10 @@ def positions(name: str, value: Any) -> NDArray[np.float64]:
     import numpy as np
 
     given = np.asanyarray(value)
-    if np.iscomplexobj(given) or np.ma.is_masked(given):
-        raise TypeError(
-            f"{name} must be real numbers without a mask, found {'complex ones' if np.iscomplexobj(given) else 'masked ones'}"
-        )
+    if np.iscomplexobj(given):
+        raise TypeError(f"{name} must be real numbers, found complex ones")
+    if np.ma.is_masked(given):
+        raise TypeError(f"{name} must have no masked values; leave these points out")
     made = np.asarray(given, dtype=np.float64)
     if made.ndim == 0 or made.shape[-1] != 3:
         raise ValueError(f"{name} must have shape (n, 3), found {made.shape}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -86,7 +87,10 @@ class Layers(Sequence):
     def __getitem__(self, index):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        index = whole("layer", index, -(10**15), 10**15)
+        try:
+            index = operator.index(index)
+        except TypeError:
+            raise TypeError(f"layer must be a whole number, found {index!r}") from None
         at = index + len(self) if index < 0 else index
         if not 0 <= at < len(self):
             raise IndexError(f"layer {index} of {len(self)}")

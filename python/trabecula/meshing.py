@@ -129,6 +129,7 @@ def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) 
     """Refuses options that do not go with a file without triangles; ``islands`` are what --islands may be."""
     names = [*names, "resume", "cluster", "new", "shards"]
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
+    given += ["--no-assembly"] if "assembly" in names and args.assembly is False else []
     given += [] if args.islands in islands else [f"--islands {args.islands}"]
     if given:
         raise WrongUsage(f"{given[0]} does not go with {why}; leave it out")
@@ -207,7 +208,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
             out = given_of(args) or "them: the design's ends are open"
             raise WrongUsage(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
         if kind_of(args.output) != "stl":
-            raise Refused(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
+            raise WrongUsage(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
     streams = kind_of(args.output) == "stl" if asked else apart is not None or not closes(solid, resolution(args))
     if streams and not whole:
         given = {"edge": None, "per_cell": None, "chord": None} | options

@@ -932,15 +932,15 @@ class StepReport(Report):
     """Greatest distance of patches from the surface that they stand for, mm, at 49 points of each; 0 for beams, which are
     exact."""
     edges: int
-    """Number of edges."""
+    """Number of edges; of an assembly, of its distinct parts."""
     faces: int
-    """Number of faces; of an assembly those of distinct parts, as all that follows but the volume."""
+    """Number of faces; of an assembly, of its distinct parts."""
     parts: int | None
     """Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none."""
     solids: int
     """Number of solids: connected components, or placed parts of an assembly."""
     vertices: int
-    """Number of vertices."""
+    """Number of vertices; of an assembly, of its distinct parts."""
     volume: float
     """Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches."""
 

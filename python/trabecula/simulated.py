@@ -36,9 +36,9 @@ SHORT_EDGE = math.sqrt(0.75)
 MOST_TETS = 5e6
 
 
-def _order(given: int) -> int:
+def _order(given: int, of: str = "tetrahedra") -> int:
     if isinstance(given, bool) or given not in (1, 2):
-        raise ValueError(f"order is {given}; it must be 1 (linear tetrahedra) or 2 (quadratic ones)")
+        raise ValueError(f"order is {given}; it must be 1 (linear {of}) or 2 (quadratic ones)")
     return int(given)
 
 
@@ -166,8 +166,7 @@ class Simulated:
         The same for any number of ``threads``. Warns of a wall that is thicker than two edges. Raises ValueError for what is no
         sheet, for a skin or keep zones, and for a wall without thickness.
         """
-        if order not in (1, 2):
-            raise ValueError(f"order is {order}; it must be 1 (linear triangles) or 2 (quadratic ones)")
+        order = _order(order, "triangles")
         size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
         made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
         if found := made._core.warning:

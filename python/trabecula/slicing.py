@@ -32,7 +32,7 @@ def slice(args) -> None:
         raise WrongUsage(f"{args.output} holds pictures; add --pixel MM, the edge of a pixel")
     if args.output:
         if args.z is not None and kind_of(args.output) != "svg":
-            raise Refused(f"{args.output}: a section is drawn as .svg; other formats take --layer")
+            raise WrongUsage(f"{args.output}: a section is drawn as .svg; other formats take --layer")
         check_place(args.output)
         keep_file(args.design, args.output)
     solid = build(args.design, tell=not args.json)

@@ -275,14 +275,21 @@ class Solid(Seen, Simulated):
         """Warns of voxels that reach beyond plane faces of the region: their centres are inside, and so they count."""
         low, high = self.bounds
         sizes = [b - a for a, b, flat in zip(low, high, self._core.flat_axes, strict=True) if flat]
-        covered = [step * math.ceil(size / step - 1e-9) for size in sizes]
-        more = math.prod(covered) / math.prod(sizes) - 1
+
+        def beyond(step: float) -> list[float]:
+            return [step * math.ceil(size / step - 1e-9) / size for size in sizes]
+
+        more = math.prod(beyond(step)) - 1
         if more > BEYOND:
-            whole = min(sizes)
+            # Of the axis along which they reach farthest.
+            ratio, size = max(zip(beyond(step), sizes, strict=True))
+            better = size / math.ceil(size / step - 1e-9)
+            hint = f"use a step that divides its sizes, such as {better:.6g} mm"
+            if math.prod(beyond(float(f"{better:.6g}"))) - 1 > BEYOND:
+                hint = "use a smaller step, or one that divides its sizes"
             warnings.warn(
-                f"voxels of {step:g} mm reach beyond the region's plane faces, {max(covered):.4g} mm along one of "
-                f"{max(sizes):.4g} mm: their volume and fraction are up to {100 * more:.1f} % too large; use a step that "
-                f"divides its size, such as {whole / math.ceil(whole / step - 1e-9):.6g} mm",
+                f"voxels of {step:g} mm reach beyond the region's plane faces, {ratio * size:.4g} mm along one of {size:.4g} "
+                f"mm: their volume and fraction are up to {100 * more:.1f} % too large; {hint}",
                 DesignWarning,
                 stacklevel=3,
             )
@@ -677,7 +684,8 @@ class Solid(Seen, Simulated):
         progress: Progress | None = None,
     ) -> Voxels:
         """Occupancy on cubic voxels of edge ``step`` (mm) that cover the region's bounds and are centred on them: solid where
-        their centres are. Warns where they reach so far beyond the bounds that the volume may be more than 1 % too large.
+        their centres are. Warns where a step that was asked for reaches so far beyond the bounds that the volume may be more
+        than 1 % too large.
         """
         step = step if step is None else positive("step", step)
         spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
@@ -686,7 +694,8 @@ class Solid(Seen, Simulated):
         fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
         made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
-        self._warn_beyond(spacing)
+        if step is not None or per_cell is not None:
+            self._warn_beyond(spacing)
         self._warn_coarse(made.volume, spacing, "step")
         return made
 
@@ -726,7 +735,8 @@ class Solid(Seen, Simulated):
         self._warn_thin(spacing, "step")
 
         def accept(volume: float) -> None:
-            self._warn_beyond(spacing)
+            if step is not None or per_cell is not None:
+                self._warn_beyond(spacing)
             self._warn_coarse(volume, spacing, "step")
             settle()
 

@@ -117,7 +117,8 @@ def settings_of(properties: Mapping[str, Mapping[str, Any]] | Iterable[str]) -> 
     for name in given:
         if name not in PROPERTIES:
             raise ValueError(f'unknown property "{name}"; there are {", ".join(PROPERTIES) or "none"}')
-        known = list(inspect.signature(getattr(Simulated, name)).parameters)[1:]
+        taken = list(inspect.signature(getattr(Simulated, name)).parameters)[1:]
+        known = [setting for setting in taken if setting not in ("threads", "progress")]
         for setting in given[name]:
             if setting not in known:
                 raise ValueError(f'{name} has no setting "{setting}"; it has {", ".join(known)}')

@@ -96,34 +96,39 @@ pub struct Joined {
 }
 
 /// Makes one beam of each chain of frusta that represents one quadric as [`Quadors::frusta`] does: the radius of its two ends is then
-/// that of the quadric at mid length. What goes on from a hub to a contact circle behind its centre is dropped, as its ball holds it.
-/// Other chains stay.
+/// that of the quadric at mid length. Its hubs have balls, of their own or as other beams' ends. What goes on from a hub to a contact
+/// circle behind its centre is dropped, as its ball holds it. Other chains stay.
 pub fn join_chains(graph: &mut BeamGraph) -> Joined {
-    let mut is_joint = vec![false; graph.nodes.len()];
-    graph.flat.iter().for_each(|n| is_joint[*n as usize] = true);
-    let mut links: Vec<Vec<u32>> = vec![Vec::new(); graph.nodes.len()];
-    let mut sizes = graph.radii.clone();
-    sizes.resize(graph.nodes.len(), f64::NAN);
+    let mut joined = Joined { beams: graph.beams.len() as u32..graph.beams.len() as u32, frusta: 0 };
+    if graph.flat.is_empty() {
+        return joined;
+    }
+    let count = graph.nodes.len();
+    let mut balls = graph.radii.clone();
+    balls.resize(count, f64::NAN);
+    let mut chains = Chains { graph, links: vec![Vec::new(); count], balls, is_joint: vec![true; count] };
     for (i, (ends, radii)) in graph.beams.iter().zip(&graph.beam_radii).enumerate() {
-        for (n, r) in ends.iter().zip(radii) {
-            links[*n as usize].push(i as u32);
-            if graph.radii.get(*n as usize).is_none_or(|ball| ball.is_nan()) {
-                sizes[*n as usize] = sizes[*n as usize].max(*r);
+        for ((n, r), is_flat) in ends.iter().zip(radii).zip(graph.flat[i]) {
+            let n = *n as usize;
+            chains.links[n].push(i as u32);
+            if !is_flat {
+                chains.balls[n] = chains.balls[n].max(*r);
             }
         }
     }
+    for (n, is_joint) in chains.is_joint.iter_mut().enumerate() {
+        *is_joint = chains.balls[n].is_nan() && matches!(chains.links[n].len(), 1 | 2);
+    }
     let mut used = vec![false; graph.beams.len()];
     let mut made = Vec::new();
-    let mut joined = Joined::default();
     for first in 0..graph.beams.len() {
-        let Some(at) = graph.beams[first].iter().position(|n| !is_joint[*n as usize]).filter(|_| !used[first]) else {
-            continue;
-        };
-        let chain = follow(graph, &is_joint, &links, first, at);
-        if leads_to_contact(graph, &sizes, &links, &chain) {
+        let hub = graph.beams[first].iter().position(|n| !chains.is_joint[*n as usize]);
+        let Some(at) = hub.filter(|_| !used[first]) else { continue };
+        let chain = chains.follow(first, at);
+        if chains.lead_to_contact(&chain) {
             chain.iter().for_each(|(i, _)| used[*i] = true);
             joined.frusta += chain.len();
-        } else if let Some(radius) = quadric_of(graph, &sizes, &chain) {
+        } else if let Some(radius) = chains.quadric_of(&chain) {
             chain.iter().for_each(|(i, _)| used[*i] = true);
             joined.frusta += chain.len();
             let (last, end) = chain[chain.len() - 1];
@@ -133,95 +138,116 @@ pub fn join_chains(graph: &mut BeamGraph) -> Joined {
     let kept = used.iter().filter(|u| !**u).count() as u32;
     joined.beams = kept..kept + made.len() as u32;
     if joined.frusta > 0 {
-        let mut left = used.iter();
-        graph.beams.retain(|_| left.next() == Some(&false));
-        let mut left = used.iter();
-        graph.beam_radii.retain(|_| left.next() == Some(&false));
-        graph.beams.extend(made.iter().map(|(ends, _)| ends));
-        graph.beam_radii.extend(made.iter().map(|(_, radii)| radii));
+        // What was the ball of another beam's end holds those that are joined.
+        graph.radii = core::mem::take(&mut chains.balls);
+        let keep = |n: usize| !used[n];
+        graph.beams =
+            (0..used.len()).filter(|i| keep(*i)).map(|i| graph.beams[i]).chain(made.iter().map(|m| m.0)).collect();
+        let radii = (0..used.len()).filter(|i| keep(*i)).map(|i| graph.beam_radii[i]);
+        graph.beam_radii = radii.chain(made.iter().map(|m| m.1)).collect();
+        let flat = (0..used.len()).filter(|i| keep(*i)).map(|i| graph.flat[i]);
+        graph.flat = flat.chain(made.iter().map(|_| [false; 2])).collect();
         graph.drop_unused();
     }
     joined
 }
 
-/// The frusta from an end on, through joints, each with the end at which it is entered.
-fn follow(
-    graph: &BeamGraph,
-    is_joint: &[bool],
-    links: &[Vec<u32>],
-    first: usize,
-    entered: usize,
-) -> Vec<(usize, usize)> {
-    let mut chain = vec![(first, entered)];
-    loop {
-        let (i, end) = chain[chain.len() - 1];
-        let node = graph.beams[i][1 - end];
-        // A chain ends where it comes back to its start, too.
-        let next = links[node as usize].iter().map(|l| *l as usize).find(|l| *l != i);
-        let Some(next) = next.filter(|_| is_joint[node as usize]) else {
-            return chain;
-        };
-        chain.push((next, usize::from(graph.beams[next][1] == node)));
-    }
+/// Frusta by their nodes.
+struct Chains<'a> {
+    graph: &'a BeamGraph,
+    /// The frusta that end at each node.
+    links: Vec<Vec<u32>>,
+    /// The radius of the ball at each node, NaN where there is none.
+    balls: Vec<f64>,
+    /// Whether one or two frusta end at a node, and no ball is there.
+    is_joint: Vec<bool>,
 }
 
-/// Whether a chain ends at a circle on the ball of the hub where it begins, and nothing goes on from there.
-fn leads_to_contact(graph: &BeamGraph, sizes: &[f64], links: &[Vec<u32>], chain: &[(usize, usize)]) -> bool {
-    let [(first, entered), ..] = *chain else { return false };
-    let (last, left) = chain[chain.len() - 1];
-    let [hub, tip] = [graph.beams[first][entered], graph.beams[last][1 - left]].map(|n| n as usize);
-    let length = norm(sub(graph.nodes[tip], graph.nodes[hub]));
-    let flat = graph.flat.binary_search(&(tip as u32)).is_ok() && links[tip].len() == 1;
-    flat && (length.hypot(graph.beam_radii[last][1 - left]) / sizes[hub] - 1.0).abs() <= SAME
-}
-
-/// The radius at mid length of the quadric that a chain of frusta represents, mm; `None` if it is none.
-fn quadric_of(graph: &BeamGraph, sizes: &[f64], chain: &[(usize, usize)]) -> Option<f64> {
-    let [(first, entered), .., (last, left)] = *chain else { return None };
-    let ends = [graph.beams[first][entered], graph.beams[last][1 - left]];
-    let [from, to] = ends.map(|n| graph.nodes[n as usize]);
-    let length = norm(sub(to, from));
-    let radii = ends.map(|n| sizes[n as usize]);
-    let least = (radii[0] - radii[1]).abs();
-    if least.is_nan() || length <= least {
-        return None;
+impl Chains<'_> {
+    /// The frusta from an end on, through joints, each with the end at which it is entered.
+    fn follow(&self, first: usize, entered: usize) -> Vec<(usize, usize)> {
+        let beams = &self.graph.beams;
+        let mut chain = vec![(first, entered)];
+        loop {
+            let (i, end) = chain[chain.len() - 1];
+            let node = beams[i][1 - end];
+            // A chain ends where it comes back to its start, too.
+            let next = self.links[node as usize].iter().map(|l| *l as usize).find(|l| *l != i);
+            let Some(next) = next.filter(|_| self.is_joint[node as usize]) else {
+                return chain;
+            };
+            chain.push((next, usize::from(beams[next][1] == node)));
+        }
     }
-    let axis = scale(sub(to, from), 1.0 / length);
-    // Positions on the axis and radii at the joints, of both frusta that meet there.
-    let mut joints = Vec::new();
-    for pair in chain.windows(2) {
-        let [(i, end), (j, start)] = [pair[0], pair[1]];
-        let way = sub(graph.nodes[graph.beams[i][1 - end] as usize], from);
-        let z = dot(way, axis);
-        let radii = [graph.beam_radii[i][1 - end], graph.beam_radii[j][start]];
-        if norm(sub(way, scale(axis, z))) > SAME * radii[0] {
+
+    /// The nodes at the ends of a chain.
+    fn ends(&self, chain: &[(usize, usize)]) -> Option<[usize; 2]> {
+        let ((first, entered), (last, left)) = (chain.first()?, chain.last()?);
+        let beams = &self.graph.beams;
+        Some([beams[*first][*entered] as usize, beams[*last][1 - left] as usize])
+    }
+
+    /// Whether a chain ends at a circle on the ball of the hub where it begins, and nothing goes on from there.
+    fn lead_to_contact(&self, chain: &[(usize, usize)]) -> bool {
+        let (Some([hub, tip]), Some((last, left))) = (self.ends(chain), chain.last()) else { return false };
+        let length = norm(sub(self.graph.nodes[tip], self.graph.nodes[hub]));
+        let radius = self.graph.beam_radii[*last][1 - left];
+        self.is_joint[tip] && (length.hypot(radius) / self.balls[hub] - 1.0).abs() <= SAME
+    }
+
+    /// The radius at mid length of the quadric that a chain of frusta represents, mm; `None` if it is none.
+    fn quadric_of(&self, chain: &[(usize, usize)]) -> Option<f64> {
+        let BeamGraph { nodes, beams, beam_radii, .. } = self.graph;
+        let ends = self.ends(chain)?;
+        let ((first, entered), (last, left)) = (*chain.first()?, *chain.last()?);
+        let [from, to] = ends.map(|n| nodes[n]);
+        let (length, radii) = (norm(sub(to, from)), ends.map(|n| self.balls[n]));
+        let least = (radii[0] - radii[1]).abs();
+        if least.is_nan() || length <= least {
             return None;
         }
-        joints.push((z, radii));
+        let axis = scale(sub(to, from), 1.0 / length);
+        // Positions on the axis and radii, of both frusta that meet there.
+        let mut joints = Vec::new();
+        for pair in chain.windows(2) {
+            let [(i, end), (j, start)] = [pair[0], pair[1]];
+            let way = sub(nodes[beams[i][1 - end] as usize], from);
+            let z = dot(way, axis);
+            let radii = [beam_radii[i][1 - end], beam_radii[j][start]];
+            if norm(sub(way, scale(axis, z))) > SAME * radii[0] {
+                return None;
+            }
+            joints.push((z, radii));
+        }
+        let (z1, z2) = (joints.first()?.0, joints.last()?.0);
+        // Contact circles are L/2λ from the radical plane. A straight neck leads to one; where both lie behind the centres, λ is a
+        // root of u²λ² − qλ + L²/4 at any position u from that plane.
+        let necks = [first, last].map(|i| beam_radii[i][0] == beam_radii[i][1]);
+        let pencil = Pencil { length, radii, lambda: 1.0 };
+        let radical = pencil.radical_plane();
+        let lambdas = match necks {
+            [true, _] => [0.5 * length / (radical - z1); 2],
+            [_, true] => [0.5 * length / (z2 - radical); 2],
+            _ => {
+                let (z, [r, _]) = joints[joints.len() / 2];
+                let u = z - radical;
+                let q = r * r - radii[0] * radii[0] + z * z - length * u;
+                let root = (q * q - (u * length).powi(2)).max(0.0).sqrt();
+                [q + root, q - root].map(|of| 0.5 * length * length / of)
+            }
+        };
+        // Without a neck a chain begins in the plane of the centre.
+        let at_hubs = [(0.0, beam_radii[first][entered]), (length, beam_radii[last][1 - left])];
+        let bare = at_hubs.into_iter().zip(necks).filter(|(_, neck)| !neck).map(|((z, r), _)| (z, [r; 2]));
+        joints.extend(bare);
+        let (low, high) = pencil.lambda_range();
+        let is_on = |of: &Pencil| {
+            let near = |z: f64, r: f64| (r - of.radius_squared(z).max(0.0).sqrt()).abs() <= SAME * r;
+            joints.iter().all(|(z, radii)| radii.iter().all(|r| near(*z, *r)))
+        };
+        let found = lambdas.into_iter().filter(|l| *l > low && *l < high).map(|lambda| Pencil { lambda, ..pencil });
+        found.into_iter().find(is_on).map(|p| p.radius_squared(0.5 * length).max(0.0).sqrt())
     }
-    // Contact circles are L/2λ from the radical plane. A straight neck leads to one; where both lie behind the centres, λ is a root of
-    // u²λ² − qλ + L²/4 at any position u from that plane.
-    let has_neck = |i: usize| graph.beam_radii[i][0] == graph.beam_radii[i][1];
-    let pencil = Pencil { length, radii, lambda: 1.0 };
-    let radical = pencil.radical_plane();
-    let lambdas = if has_neck(first) {
-        [0.5 * length / (radical - joints[0].0); 2]
-    } else if has_neck(last) {
-        [0.5 * length / (joints[joints.len() - 1].0 - radical); 2]
-    } else {
-        let (z, [r, _]) = joints[joints.len() / 2];
-        let u = z - radical;
-        let q = r * r - radii[0] * radii[0] + z * z - length * u;
-        let root = (q * q - (u * length).powi(2)).max(0.0).sqrt();
-        [q + root, q - root].map(|of| 0.5 * length * length / of)
-    };
-    let (low, high) = pencil.lambda_range();
-    let is_on = |of: &Pencil| {
-        let near = |z: f64, r: f64| (r - of.radius_squared(z).max(0.0).sqrt()).abs() <= SAME * r;
-        joints.iter().all(|(z, radii)| radii.iter().all(|r| near(*z, *r)))
-    };
-    let found = lambdas.into_iter().filter(|l| *l > low && *l < high).map(|lambda| Pencil { lambda, ..pencil });
-    found.into_iter().find(is_on).map(|p| p.radius_squared(0.5 * length).max(0.0).sqrt())
 }
 
 /// The frusta of a beam, and the greatest error of its radii, mm.
@@ -371,6 +397,32 @@ mod tests {
         }
     }
 
+    fn flat_ends(of: &BeamLattice) -> Vec<[bool; 2]> {
+        of.beams.iter().map(|b| b.caps.map(|c| c == Cap::Butt)).collect()
+    }
+
+    #[test]
+    fn chains_of_other_programs_stay() {
+        let line = |radii: &[[f64; 2]], flat: bool| BeamGraph {
+            nodes: (0..=radii.len()).map(|i| [5.0 * i as f64, 0.0, 0.0]).collect(),
+            radii: vec![f64::NAN; radii.len() + 1],
+            beams: (0..radii.len() as u32).map(|i| [i, i + 1]).collect(),
+            beam_radii: radii.to_vec(),
+            flat: (0..radii.len()).map(|i| [flat || i > 0, flat || i + 1 < radii.len()]).collect(),
+            ..BeamGraph::default()
+        };
+        let chains: [&[[f64; 2]]; 4] =
+            [&[[1.0, 0.4], [0.4, 1.0]], &[[1.0, 0.7], [0.7, 0.4]], &[[0.5; 2]; 3], &[[1.0, 0.4], [0.4; 2], [0.4, 1.0]]];
+        for radii in chains {
+            for flat in [false, true] {
+                let mut graph = line(radii, flat);
+                let before = graph.clone();
+                assert_eq!(join_chains(&mut graph).frusta, 0, "{radii:?} {flat}");
+                assert_eq!((graph.beams, graph.beam_radii), (before.beams, before.beam_radii));
+            }
+        }
+    }
+
     #[test]
     fn chains_become_the_quadrics_that_they_were() {
         let cases = [
@@ -385,7 +437,7 @@ mod tests {
             let beams = pair(length, radii, profile);
             let made = beams.frusta(0.003);
             let mut graph = BeamGraph::from(&made.lattice);
-            graph.flat = (2..graph.nodes.len() as u32).collect();
+            graph.flat = flat_ends(&made.lattice);
             let joined = join_chains(&mut graph);
             assert_eq!(
                 (graph.nodes.len(), joined.frusta),
@@ -398,7 +450,7 @@ mod tests {
             }
             // A joint that is moved is on no quadric.
             let mut moved = BeamGraph::from(&made.lattice);
-            moved.flat = (2..moved.nodes.len() as u32).collect();
+            moved.flat = flat_ends(&made.lattice);
             let middle = moved.beams.len() / 2;
             if let Some(r) = moved.beam_radii.get_mut(middle).filter(|_| made.split == 1) {
                 r[0] *= 1.001;

@@ -1,6 +1,6 @@
 //! STEP files: the boundary of a quador lattice in exact form, for CAD systems.
 //!
-//! ISO 10303-21 text of the application protocol AP214 or AP242, in mm. Each connected component is a `MANIFOLD_SOLID_BREP`.
+//! ISO 10303-21 text of the application protocol AP214 or AP242, in mm. Each connected component is a `MANIFOLD_SOLID_BREP`, unless the file is an assembly.
 //! Cylinders, cones and balls are written as such, other beams as surfaces of revolution of a conic, and fillets as rational
 //! biquadratic B-spline surfaces, all of which represent them exactly. Edges are rational quadratic B-splines, with curves
 //! in the parameter planes of both their faces: a reader that has to find these itself does so to 1e-5 only.
@@ -71,14 +71,15 @@ pub fn write_step(
         checkpoint();
         let within = volume_within(&brep, faces)?;
         if within <= 0.0 {
-            return Err(refused(
-                "the beams enclose a cavity, which a STEP file of them cannot have: make them thinner",
-            ));
+            return Err(refused(CAVITY));
         }
         volume += within;
     }
     write(&brep, (&components, volume), title, out).map_err(Stopped::Io)
 }
+
+/// What is refused where a shell is turned inside out.
+const CAVITY: &str = "the beams enclose a cavity, which a STEP file of them cannot have: make them thinner";
 
 fn refused(message: &str) -> Stopped {
     Stopped::Refused(Fault::new("region", message))
@@ -150,7 +151,11 @@ fn write_assembly(
         let mut kept = Vec::with_capacity(components.len());
         for faces in &components {
             let within = volume_within(&brep, faces)?;
-            let is_solid = within > SLIVER * quadors.typical_radius().powi(3);
+            // What moved planes leave is no solid.
+            let is_solid = !piece.is_cut() || within > SLIVER * quadors.typical_radius().powi(3);
+            if is_solid && within <= 0.0 {
+                return Err(refused(CAVITY));
+            }
             volume += if is_solid { within } else { 0.0 };
             kept.push(is_solid);
         }
@@ -162,7 +167,7 @@ fn write_assembly(
         summary.volume += volume * piece.hubs.len() as f64;
         solids += components.len() * piece.hubs.len();
         let mut write = || {
-            let product = whole.another(&mut file, &format!("hub {}", parts.len() + 1))?;
+            let product = whole.another(&mut file, &format!("{} hub {}", title.name, parts.len() + 1))?;
             let solids = write_solids(&brep, &components, &mut file, planar, &mut summary)?;
             product.finish(&mut file, &solids)
         };

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use geometry::progress::{Cancellation, Progress};
@@ -51,27 +52,42 @@ pub fn watch_forks(py: Python<'_>) -> PyResult<()> {
     os.call_method("register_at_fork", (), Some(&options)).map(drop)
 }
 
-/// Makes threads anew in a forked process, for what this thread does itself; work off the interpreter has a pool of its own there.
+/// In a forked process: what this thread does itself has this thread, work off the interpreter a pool of its own.
 #[pyfunction]
 fn after_fork() {
     FORKED.store(true, Relaxed);
-    // It fails where this thread has such a pool, as in the child of a child.
-    if let Ok(pool) = rayon::ThreadPoolBuilder::new().use_current_thread().build() {
+    // Of this thread alone, so that nothing is started. It fails where the thread has a pool, as in the child of a child.
+    if let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build() {
         std::mem::forget(pool); // as long as the thread
     }
 }
 
+/// The pool of a forked process, by the number of the process.
+static OWN: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
+
+/// All processors' threads, made once in each forked process.
+fn own_pool() -> PyResult<Arc<rayon::ThreadPool>> {
+    let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some((_, pool)) = own.as_ref().filter(|(of, _)| *of == process) {
+        return Ok(pool.clone());
+    }
+    let built = rayon::ThreadPoolBuilder::new().build();
+    let pool = Arc::new(built.map_err(|e| PyValueError::new_err(format!("threads cannot be started: {e}")))?);
+    // That of a parent has threads no more, for which it would wait.
+    std::mem::forget(own.replace((process, pool.clone())));
+    Ok(pool)
+}
+
 /// The threads of a pool of their own, if a number is given.
-fn pool(threads: Option<usize>) -> PyResult<Option<rayon::ThreadPool>> {
+fn pool(threads: Option<usize>) -> PyResult<Option<Arc<rayon::ThreadPool>>> {
     match threads {
-        None if FORKED.load(Relaxed) => {
-            let built = rayon::ThreadPoolBuilder::new().build();
-            Ok(Some(built.map_err(|e| PyValueError::new_err(format!("threads cannot be started: {e}")))?))
-        }
+        None if FORKED.load(Relaxed) => own_pool().map(Some),
         None => Ok(None),
         Some(n @ 1..=4096) => {
             let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();
-            Ok(Some(built.map_err(|e| PyValueError::new_err(format!("threads: {n} cannot be started: {e}")))?))
+            let pool = built.map_err(|e| PyValueError::new_err(format!("threads: {n} cannot be started: {e}")))?;
+            Ok(Some(Arc::new(pool)))
         }
         Some(n) => Err(PyValueError::new_err(format!("threads is {n}; it must be from 1 to 4096"))),
     }

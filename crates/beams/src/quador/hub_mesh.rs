@@ -25,7 +25,7 @@ const ESTIMATE_HUBS: usize = 16;
 const MIN_ESTIMATE_CHORD: f64 = 0.01;
 
 /// Shares of the chord error that are tried, where a hub cannot be triangulated within it or triangles of beams that nearly touch cross.
-const FINER: [f64; 9] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125, 0.06, 0.03];
+const FINER: [f64; 8] = [1.0, 0.8, 0.6, 0.5, 0.35, 0.25, 0.125, 0.06];
 
 /// Distance of beams within which their triangles may cross, in chord errors: vertices are at most one off the surface, and so are
 /// chords.
@@ -125,11 +125,11 @@ impl Quadors {
         }
         let place = misses.first().map_or(String::new(), |m| {
             let [a, b] = m.beams;
-            format!(", such as beams {a} and {b}, which all but touch at {}", position_text(m.at))
+            format!(" (beams {a} and {b} come near at {})", position_text(m.at))
         });
         let message = format!(
-            "triangles of beams next to each other intersect at this chord error{place}: use a smaller one, give the spacing of a grid \
-             (edge), or move them apart"
+            "triangles of beams that nearly touch intersect at this chord error{place}: use a smaller one, give the spacing of a grid \
+             (edge), or move the beams apart"
         );
         Err(Fault::new("chord", message))
     }

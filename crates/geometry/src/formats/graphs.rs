@@ -28,8 +28,8 @@ pub struct BeamGraph {
     pub beams: Vec<[u32; 2]>,
     /// Radii of each beam at its two ends.
     pub beam_radii: Vec<[f64; 2]>,
-    /// Nodes without a ball at which one or two beams end, all of them flat: joints and ends of chains of frusta.
-    pub flat: Vec<u32>,
+    /// Which ends of each beam are flat or half balls; empty where all are balls.
+    pub flat: Vec<[bool; 2]>,
     /// Whether lengths are in mm once read, because the file names its unit.
     pub in_mm: bool,
     /// What the file has and the graph has not.
@@ -206,7 +206,7 @@ impl BeamGraph {
         self.radii.iter_mut().chain(self.beam_radii.iter_mut().flatten()).for_each(|r| *r *= factor);
     }
 
-    /// Leaves out nodes at which no beam ends, as those of a mesh; flat ones are no longer known.
+    /// Leaves out nodes at which no beam ends, as those of a mesh.
     pub fn drop_unused(&mut self) {
         let mut used = vec![false; self.nodes.len()];
         self.beams.iter().flatten().for_each(|n| used[*n as usize] = true);
@@ -216,7 +216,13 @@ impl BeamGraph {
         self.nodes = kept.iter().map(|i| self.nodes[*i]).collect();
         self.radii = kept.iter().filter_map(|i| self.radii.get(*i).copied()).collect();
         self.beams.iter_mut().flatten().for_each(|n| *n = numbers[*n as usize]);
-        self.flat.clear();
+    }
+
+    /// Number of ends of beams that are no balls, and lie in none.
+    pub fn bare_ends(&self) -> usize {
+        let ends = self.beams.iter().flatten().zip(self.beam_radii.iter().flatten()).zip(self.flat.iter().flatten());
+        let is_bare = |n: u32, r: f64| self.radii.get(n as usize).is_none_or(|ball| ball.is_nan() || *ball < r);
+        ends.filter(|((n, r), is_flat)| **is_flat && is_bare(**n, **r)).count()
     }
 
     /// The radii of a beam at its ends; NaN where there are none.

@@ -134,6 +134,8 @@ impl<'a> Part21<'a> {
 /// A product of a file: a part, or an assembly of parts.
 pub struct Product {
     shared: Shared,
+    /// The context of its shape: parts and assembly are each in a space of their own (ISO 10303-43).
+    context: Id,
     definition: Id,
     shape: Id,
 }
@@ -143,8 +145,10 @@ pub struct Product {
 struct Shared {
     mechanical: Id,
     design: Id,
-    context: Id,
     placement: Id,
+    /// Uncertainty of lengths, and units of length, angle and solid angle.
+    uncertainty: Id,
+    units: [Id; 3],
 }
 
 /// The shape of a product.
@@ -169,12 +173,9 @@ impl Product {
         let uncertainty = file.entity(&format!(
             "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'distance_accuracy_value','')"
         ))?;
-        let context = file.entity(&format!(
-            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({uncertainty}))\
-             GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))"
-        ))?;
         let placement = placement(file, [0.0; 3])?;
-        Shared { mechanical, design, context, placement }.product(file, name)
+        let units = [length, angle, solid_angle];
+        Shared { mechanical, design, placement, uncertainty, units }.product(file, name)
     }
 
     /// Writes what stands before the solids of another product of the file.
@@ -199,8 +200,8 @@ impl Product {
         let each = parts.iter().flat_map(|(part, positions)| positions.iter().map(move |_| part));
         for (number, (part, at)) in (1..).zip(each.zip(&placements)) {
             let of = [self.definition, part.definition];
-            let use_of =
-                file.entity(&format!("NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','','',{},{},$)", of[0], of[1]))?;
+            let use_of = file
+                .entity(&format!("NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','{number}','',{},{},$)", of[0], of[1]))?;
             let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{use_of})"))?;
             let moved = file.entity(&format!("ITEM_DEFINED_TRANSFORMATION('','',{origin},{at})"))?;
             let relation = file.entity(&format!(
@@ -214,7 +215,7 @@ impl Product {
     }
 
     fn shape(&self, file: &mut Part21, kind: &str, items: &str) -> io::Result<Shape> {
-        let representation = file.entity(&format!("{kind}('',{items},{})", self.shared.context))?;
+        let representation = file.entity(&format!("{kind}('',{items},{})", self.context))?;
         file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({},{representation})", self.shape))?;
         Ok(Shape { definition: self.definition, representation })
     }
@@ -228,7 +229,13 @@ impl Shared {
         let formation = file.entity(&format!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
         let definition = file.entity(&format!("PRODUCT_DEFINITION('design','',{formation},{})", self.design))?;
         let shape = file.entity(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
-        Ok(Product { shared: self, definition, shape })
+        let [length, angle, solid_angle] = self.units;
+        let context = file.entity(&format!(
+            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({}))\
+             GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))",
+            self.uncertainty
+        ))?;
+        Ok(Product { shared: self, context, definition, shape })
     }
 }
 

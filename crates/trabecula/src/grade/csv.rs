@@ -21,7 +21,7 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         let words: Vec<&str> = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty()).collect();
         let row: Vec<Option<f64>> = words.iter().map(|w| w.trim_matches('"').parse().ok()).collect();
         if rows.is_empty() && row.iter().all(Option::is_none) {
-            order = places(&words);
+            order = places(&headings(line));
             continue;
         }
         let wide = rows.first().map_or(row.len(), Vec::len);
@@ -32,8 +32,14 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         if row.iter().any(|v| !v.is_finite()) {
             return Err(fault(n, format!("numbers must be finite, found \"{line}\"")));
         }
-        let moved = order.iter().map(|place| row[*place]).collect();
-        rows.push(if order.len() == wide { moved } else { row });
+        if order.is_empty() {
+            rows.push(row);
+            continue;
+        }
+        if order.len() != wide {
+            return Err(fault(n, format!("the first line names {} columns, found \"{line}\"", order.len())));
+        }
+        rows.push(order.iter().map(|place| row[*place]).collect());
     }
     if rows.is_empty() {
         return Err(Fault::new("", format!("the file has no rows of {what}")));
@@ -41,9 +47,16 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
     Ok(rows)
 }
 
+/// The words of a line of headings: they may have spaces, unless these are what separates them.
+fn headings(line: &str) -> Vec<String> {
+    let separator = [',', ';', '\t'].into_iter().find(|s| line.contains(*s)).unwrap_or(' ');
+    let all = line.split(separator).map(|w| w.trim().trim_matches('"').trim().to_string());
+    all.filter(|w| separator != ' ' || !w.is_empty()).collect()
+}
+
 /// The places of x, y, z and of what else there is, in this order, by the first line; none if it does not name these three.
-fn places(names: &[&str]) -> Vec<usize> {
-    let named = |wanted: &&str| names.iter().position(|n| n.trim_matches('"').eq_ignore_ascii_case(wanted));
+fn places(names: &[String]) -> Vec<usize> {
+    let named = |wanted: &&str| names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
     let Some(mut found) = ["x", "y", "z"].iter().map(named).collect::<Option<Vec<usize>>>() else { return Vec::new() };
     let others = (0..names.len()).filter(|i| !found.contains(i));
     found.extend(others.collect::<Vec<usize>>());
@@ -56,13 +69,12 @@ pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines.map(|(n, l)| (n, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
     let Some((_, first)) = lines.next() else { return Err(Fault::new("", "the file is empty")) };
-    // Names may have spaces, unless these are what separates them.
     let separator = [',', ';', '\t'].into_iter().find(|s| first.contains(*s)).unwrap_or(' ');
     let words = |line: &str| -> Vec<String> {
         let all = line.split(separator).map(|w| w.trim().trim_matches('"').trim().to_string());
         all.filter(|w| separator != ' ' || !w.is_empty()).collect()
     };
-    let all = words(first);
+    let all = headings(first);
     let place = |name: &String| {
         all.iter().position(|w| w == name).ok_or_else(|| {
             let there = all.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(", ");

@@ -2,7 +2,8 @@
 //!
 //! The solution knows a target K at nodes alone and takes it to be linear between them. Whether it is does not depend on where the
 //! nodes are: at a point p, for a spacing h along an axis e, what a grid misses is |K(p) − (K(p − e h/2) + K(p + e h/2))/2| / |K|,
-//! h² |K″| / 8 where K is smooth. It is taken at points throughout the region, so that no period of K can hide from it.
+//! h² |K″| / 8 where K is smooth. It is taken at points throughout the region, and for a spacing of 0.618 h as well, so that no period of
+//! K can hide from it: the nodes' own shows at the second.
 
 use super::frame::{Orientation, in_mm};
 use super::phase::Wanted;
@@ -161,8 +162,9 @@ struct Missed {
     /// The share of the points at which it is more than `MISSED`, and more than `FALSE`.
     share: f64,
     lost: f64,
-    /// Where it is most: the place, the target there and half a step from it.
+    /// Where it is most: the place, and the distance from there at which the target differs, mm.
     at: Vec3,
+    within: f64,
     key: &'static str,
     /// The greatest angle (degrees) between the targets there, and the wavelengths whose ratio is greatest.
     turn: f64,
@@ -176,7 +178,7 @@ impl Missed {
 
     /// What varies, how much, how fast and where.
     fn words(&self, step: f64) -> String {
-        let (half, place) = (number((step * 500.0).round() / 1000.0), in_mm(self.at));
+        let (half, place) = (number((self.within * 1000.0).round() / 1000.0), in_mm(self.at));
         let step = number((step * 1000.0).round() / 1000.0);
         let what = if self.key == "wavelength" {
             let [a, b] = self.lengths.map(|v| number((v * 1000.0).round() / 1000.0));
@@ -240,7 +242,8 @@ impl<'a> Probe<'a> {
     fn missed_along(&self, axis: usize, step: f64) -> Result<Missed, Fault> {
         let half = 0.5 * step.min(self.bounds.size()[axis]);
         let [whole, part] = [self.missed_within(axis, half)?, self.missed_within(axis, GOLDEN * half)?];
-        Ok(if part.share > whole.share { part } else { whole })
+        let lost = whole.lost.max(part.lost);
+        Ok(Missed { lost, ..if part.share > whole.share { part } else { whole } })
     }
 
     fn missed_within(&self, axis: usize, half: f64) -> Result<Missed, Fault> {
@@ -256,7 +259,8 @@ impl<'a> Probe<'a> {
         let here = self.target(&middle, &vec![IDENTITY; middle.len()])?;
         let like: Vec<Mat3> = here.iter().map(|h| h.1).collect();
         let [before, after] = [self.target(&of(-half), &like)?, self.target(&of(half), &like)?];
-        let mut found = Missed { share: 0.0, lost: 0.0, at: middle[0], key: "rotate", turn: 0.0, lengths: [1.0; 2] };
+        let mut found =
+            Missed { share: 0.0, lost: 0.0, at: middle[0], within: half, key: "rotate", turn: 0.0, lengths: [1.0; 2] };
         let mut most = 0.0;
         let each = 1.0 / middle.len() as f64;
         for (n, ((h, b), a)) in here.iter().zip(&before).zip(&after).enumerate() {

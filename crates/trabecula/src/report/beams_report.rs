@@ -142,11 +142,11 @@ pub struct StepReport {
     pub solids: usize,
     /// Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none.
     pub parts: Option<usize>,
-    /// Number of faces; of an assembly those of distinct parts, as all that follows but the volume.
+    /// Number of faces; of an assembly, of its distinct parts.
     pub faces: usize,
-    /// Number of edges.
+    /// Number of edges; of an assembly, of its distinct parts.
     pub edges: usize,
-    /// Number of vertices.
+    /// Number of vertices; of an assembly, of its distinct parts.
     pub vertices: usize,
     /// Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches.
     pub volume: f64,

@@ -28,6 +28,13 @@ pub(crate) struct Piece {
     planes: Vec<Plane>,
 }
 
+impl Piece {
+    /// Whether planes may cut it.
+    pub(crate) fn is_cut(&self) -> bool {
+        !self.planes.is_empty()
+    }
+}
+
 impl Quadors {
     /// Typical radius of beams, mm.
     pub(crate) fn typical_radius(&self) -> f64 {

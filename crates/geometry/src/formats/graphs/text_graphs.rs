@@ -25,8 +25,8 @@ pub fn write_table(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
 /// The columns of a table of end points.
 const COLUMNS: [&str; 6] = ["x1", "y1", "z1", "x2", "y2", "z2"];
 
-/// The places of the ends' coordinates and of the radii (r1 and r2, r or radius) by headings; `None` if these name none of the
-/// coordinates, a fault if they lack one.
+/// The places of the ends' coordinates and of the radii (r1 and r2, or one r; r may be radius) by headings; `None` if these name none of
+/// the coordinates, a fault if they lack one.
 fn places(headings: &[&[u8]]) -> Result<Option<Vec<usize>>, String> {
     let named = |wanted: &str| headings.iter().position(|h| h.eq_ignore_ascii_case(wanted.as_bytes()));
     let found: Vec<Option<usize>> = COLUMNS.iter().map(|c| named(c)).collect();
@@ -40,8 +40,10 @@ fn places(headings: &[&[u8]]) -> Result<Option<Vec<usize>>, String> {
             COLUMNS.join(", ")
         ));
     }
-    let radii = match [named("r1"), named("r2")] {
-        [None, None] => [named("r").or_else(|| named("radius")), None],
+    let radius = |end: &str| named(&format!("r{end}")).or_else(|| named(&format!("radius{end}")));
+    let radii = match [radius("1"), radius("2")] {
+        [None, None] => [radius(""), None],
+        [None, Some(_)] => return Err("a column is named r2, and none r1; give both, or one r".into()),
         both => both,
     };
     Ok(Some(found.into_iter().chain(radii).flatten().collect()))
@@ -65,6 +67,10 @@ pub fn read_table(bytes: &[u8]) -> Result<BeamGraph, Fault> {
         let numbers: Vec<Option<f64>> = fields.iter().map(|f| parse(f)).collect();
         if std::mem::take(&mut first) && numbers.iter().all(Option::is_none) {
             order = places(&fields).map_err(|message| at_line(line, message))?;
+            let used = order.as_deref().unwrap_or(&[]);
+            let id = |name: &[u8]| [&b"id"[..], b"name"].iter().any(|i| name.eq_ignore_ascii_case(i));
+            let left = (0..fields.len()).filter(|i| order.is_some() && !used.contains(i) && !id(fields[*i]));
+            graph.remarks.extend(left.map(|i| format!("the column {} left out", shown(fields[i]))));
             continue;
         }
         let (fields, numbers) = match &order {

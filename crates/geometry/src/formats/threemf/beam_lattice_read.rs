@@ -211,7 +211,6 @@ pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
 fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
     let mut graph = BeamGraph { in_mm: true, ..BeamGraph::default() };
     let (mut short, mut clipped, mut triangles) = (0, 0, 0);
-    let mut flat: Vec<[bool; 2]> = Vec::new();
     place_all(bytes, which, &mut |placed: &Placed| {
         let Some(lattice) = &placed.object.lattice else { return Ok(()) };
         let factor = similarity(&placed.matrix).ok_or_else(|| {
@@ -234,7 +233,7 @@ fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
                 short += 1;
                 continue;
             }
-            flat.push(beam.caps.map(|c| c != Cap::Sphere));
+            graph.flat.push(beam.caps.map(|c| c != Cap::Sphere));
             graph.beams.push(beam.ends.map(|n| first + n));
             graph.beam_radii.push(beam.radii.map(|r| r * factor));
         }
@@ -243,11 +242,8 @@ fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
         Ok(())
     })?;
     graph.drop_unused();
-    graph.flat = flat_nodes(&graph, &flat);
-    let flat = bare_ends(&graph, &flat);
     for (count, what, done) in [
         (short, "beam", "shorter than the file's minlength left out"),
-        (flat, "end", "of beams that are no balls read as balls"),
         (clipped, "mesh", "by which beams are clipped left out: the region cuts them"),
         (triangles, "triangle", "that are joined to beams left out"),
     ] {
@@ -256,30 +252,6 @@ fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
         }
     }
     Ok(graph)
-}
-
-/// Nodes without a ball at which one or two beams end, all of them flat.
-fn flat_nodes(graph: &BeamGraph, flat: &[[bool; 2]]) -> Vec<u32> {
-    let mut valence = vec![0; graph.nodes.len()];
-    let mut all_flat = vec![true; graph.nodes.len()];
-    for (n, is_flat) in graph.beams.iter().flatten().zip(flat.iter().flatten()) {
-        valence[*n as usize] += 1;
-        all_flat[*n as usize] &= is_flat;
-    }
-    let is_flat = |n: &usize| matches!(valence[*n], 1 | 2) && all_flat[*n] && graph.radii[*n].is_nan();
-    (0..graph.nodes.len()).filter(is_flat).map(|n| n as u32).collect()
-}
-
-/// Number of flat ends that neither a ball covers nor another flat end meets.
-fn bare_ends(graph: &BeamGraph, flat: &[[bool; 2]]) -> usize {
-    let mut covered = graph.radii.clone();
-    let mut valence = vec![0; graph.nodes.len()];
-    graph.beams.iter().flatten().for_each(|n| valence[*n as usize] += 1);
-    let joints = graph.flat.iter().filter(|n| valence[**n as usize] == 2);
-    joints.for_each(|n| covered[*n as usize] = f64::INFINITY);
-    let ends = graph.beams.iter().flatten().zip(graph.beam_radii.iter().flatten()).zip(flat.iter().flatten());
-    ends.filter(|((n, r), is_flat)| **is_flat && (covered[**n as usize].is_nan() || covered[**n as usize] < **r))
-        .count()
 }
 
 /// By how much lengths grow under a similarity; `None` for another map.

@@ -36,6 +36,10 @@ pub(super) fn read(
         let made = counted(joined.beams.len(), "beam");
         remarks.push(format!("{} frusta in chains that represent quadrics read as {made}", joined.frusta));
     }
+    let bare = graph.bare_ends();
+    if bare > 0 {
+        remarks.push(format!("{} of beams that are no balls read as balls", counted(bare, "end")));
+    }
     let own = radii(&mut graph, &joined, spec, environment, &mut remarks)?;
     let made = remarks.into_iter().map(|r| Warning { path: below("path"), message: format!("{}: {r}", file.path) });
     warnings.extend(made);
