@@ -315,6 +315,9 @@ def test_large_lattices_of_equal_hubs_are_assemblies(tmp_path):
     # Corners, edges, faces and the inside of the block.
     assert (made.parts, made.solids) == (8 + 12 + 6 + 1, n**3)
     assert count(found, "NEXT_ASSEMBLY_USAGE_OCCURRENCE") == n**3 and count(found, "PRODUCT") == 1 + made.parts
+    # Each product is in a space of its own, as ISO 10303-43 asks of transformations between them.
+    assert sum("GEOMETRIC_REPRESENTATION_CONTEXT(3)" in text for text in found.values()) == 1 + made.parts
+    assert len({text for text in found.values() if text.startswith("PRODUCT(")}) == 1 + made.parts
     assert made.volume == pytest.approx(built.quadors().volume(), rel=1e-10)
     assert (tmp_path / "sc.step").stat().st_size < 2200 * made.solids
     graded = lt.Beams(nodes=nodes, struts=struts, radius=lt.grade.linear([1, math.sqrt(2), math.pi], [[-1, 0.2], [140, 0.4]]))
