@@ -243,7 +243,7 @@ impl<'a> Probe<'a> {
         let half = 0.5 * step.min(self.bounds.size()[axis]);
         let [whole, part] = [self.missed_within(axis, half)?, self.missed_within(axis, GOLDEN * half)?];
         let lost = whole.lost.max(part.lost);
-        Ok(Missed { lost, ..if part.share > whole.share { part } else { whole } })
+        Ok(Missed { lost, ..if whole.much() || whole.share >= part.share { whole } else { part } })
     }
 
     fn missed_within(&self, axis: usize, half: f64) -> Result<Missed, Fault> {
