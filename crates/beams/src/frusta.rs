@@ -323,6 +323,16 @@ mod tests {
     use crate::{Beam, Fillet, Graph, Hub, Profile};
     use geometry::math::Vec3;
 
+    /// Beams of all kinds: length, radii of the balls (mm), profile.
+    const CASES: [(f64, [f64; 2], Profile); 6] = [
+        (10.0, [1.0, 1.0], Profile::Mid(0.4)),
+        (10.0, [1.0, 2.0], Profile::Mid(0.7)),
+        (10.0, [2.0, 0.5], Profile::Cone),
+        (6.0, [1.0, 1.0], Profile::Mid(1.4)),
+        (4.0, [1.0, 1.3], Profile::Waist(0.3)),
+        (5.0, [1.5, 0.5], Profile::Lambda(0.9)),
+    ];
+
     fn pair(length: f64, radii: [f64; 2], profile: Profile) -> Quadors {
         let direction: Vec3 = [2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0];
         let hubs = vec![
@@ -372,15 +382,7 @@ mod tests {
         let cylinder = pair(10.0, [1.0; 2], Profile::Cylinder).frusta(0.0);
         assert_eq!((cylinder.lattice.beams.len(), cylinder.split, cylinder.error), (1, 0, 0.0));
         assert!(cylinder.lattice.balls.is_empty());
-        let cases = [
-            (10.0, [1.0, 1.0], Profile::Mid(0.4)),
-            (10.0, [1.0, 2.0], Profile::Mid(0.7)),
-            (10.0, [2.0, 0.5], Profile::Cone),
-            (6.0, [1.0, 1.0], Profile::Mid(1.4)),
-            (4.0, [1.0, 1.3], Profile::Waist(0.3)),
-            (5.0, [1.5, 0.5], Profile::Lambda(0.9)),
-        ];
-        for (length, radii, profile) in cases {
+        for (length, radii, profile) in CASES {
             let beams = pair(length, radii, profile);
             for tolerance in [0.3, 0.03, 0.003] {
                 let made = beams.frusta(tolerance);
@@ -425,15 +427,7 @@ mod tests {
 
     #[test]
     fn chains_become_the_quadrics_that_they_were() {
-        let cases = [
-            (10.0, [1.0, 1.0], Profile::Mid(0.4)),
-            (10.0, [1.0, 2.0], Profile::Mid(0.7)),
-            (10.0, [2.0, 0.5], Profile::Cone),
-            (6.0, [1.0, 1.0], Profile::Mid(1.4)),
-            (4.0, [1.0, 1.3], Profile::Waist(0.3)),
-            (5.0, [1.5, 0.5], Profile::Lambda(0.9)),
-        ];
-        for (length, radii, profile) in cases {
+        for (length, radii, profile) in CASES {
             let beams = pair(length, radii, profile);
             let made = beams.frusta(0.003);
             let mut graph = BeamGraph::from(&made.lattice);

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::wireframe::Wireframe;
 use geometry::fault::Fault;
+use geometry::formats::column;
 use geometry::math::Vec3;
 
 /// Nodes of a table.
@@ -84,8 +85,7 @@ pub fn nodes(text: &str) -> Result<Nodes, Fault> {
 /// Refuses headings that name x, y and z in other places than the table has them.
 fn check_order(text: &str, heading: &dyn Fn(&[&str]) -> bool) -> Result<(), Fault> {
     let Some((line, names)) = rows(text, &|_| false).next().filter(|(_, words)| heading(words)) else { return Ok(()) };
-    let place = |wanted: &str| names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
-    let found = ["x", "y", "z"].map(place);
+    let found = ["x", "y", "z"].map(|n| column(&names, n));
     if found.iter().any(Option::is_none) || found == [Some(1), Some(2), Some(3)] {
         return Ok(());
     }

@@ -43,6 +43,11 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// The place of the column of a table whose heading is a name, letter case not counted.
+pub fn column<T: AsRef<str>>(headings: &[T], name: &str) -> Option<usize> {
+    headings.iter().position(|h| h.as_ref().eq_ignore_ascii_case(name))
+}
+
 /// The words of a line: what lies between spaces (and joining backslashes).
 pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|b| b.is_ascii_whitespace() || *b == b'\\').filter(|w| !w.is_empty())

@@ -1,6 +1,7 @@
 //! Tables of positions and values.
 
 use geometry::fault::Fault;
+use geometry::formats::column;
 
 /// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width. Where a
 /// header line names x, y and z, they are taken from there.
@@ -21,7 +22,7 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         let words: Vec<&str> = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty()).collect();
         let row: Vec<Option<f64>> = words.iter().map(|w| w.trim_matches('"').parse().ok()).collect();
         if rows.is_empty() && row.iter().all(Option::is_none) {
-            order = places(&headings(line));
+            order = places(&split(line, separator(line)));
             continue;
         }
         let wide = rows.first().map_or(row.len(), Vec::len);
@@ -47,17 +48,22 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
     Ok(rows)
 }
 
-/// The words of a line of headings: they may have spaces, unless these are what separates them.
-fn headings(line: &str) -> Vec<String> {
-    let separator = [',', ';', '\t'].into_iter().find(|s| line.contains(*s)).unwrap_or(' ');
+/// What separates the words of a table by its line of headings: these may have spaces, unless these are it.
+fn separator(headings: &str) -> char {
+    [',', ';', '\t'].into_iter().find(|s| headings.contains(*s)).unwrap_or(' ')
+}
+
+/// The words of a line.
+fn split(line: &str, separator: char) -> Vec<String> {
     let all = line.split(separator).map(|w| w.trim().trim_matches('"').trim().to_string());
     all.filter(|w| separator != ' ' || !w.is_empty()).collect()
 }
 
 /// The places of x, y, z and of what else there is, in this order, by the first line; none if it does not name these three.
 fn places(names: &[String]) -> Vec<usize> {
-    let named = |wanted: &&str| names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
-    let Some(mut found) = ["x", "y", "z"].iter().map(named).collect::<Option<Vec<usize>>>() else { return Vec::new() };
+    let Some(mut found) = ["x", "y", "z"].iter().map(|n| column(names, n)).collect::<Option<Vec<usize>>>() else {
+        return Vec::new();
+    };
     let others = (0..names.len()).filter(|i| !found.contains(i));
     found.extend(others.collect::<Vec<usize>>());
     found
@@ -69,12 +75,8 @@ pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines.map(|(n, l)| (n, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
     let Some((_, first)) = lines.next() else { return Err(Fault::new("", "the file is empty")) };
-    let separator = [',', ';', '\t'].into_iter().find(|s| first.contains(*s)).unwrap_or(' ');
-    let words = |line: &str| -> Vec<String> {
-        let all = line.split(separator).map(|w| w.trim().trim_matches('"').trim().to_string());
-        all.filter(|w| separator != ' ' || !w.is_empty()).collect()
-    };
-    let all = headings(first);
+    let separator = separator(first);
+    let all = split(first, separator);
     let place = |name: &String| {
         all.iter().position(|w| w == name).ok_or_else(|| {
             let there = all.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(", ");
@@ -83,7 +85,7 @@ pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault
     };
     let places = names.iter().map(place).collect::<Result<Vec<usize>, Fault>>()?;
     let rows = lines.map(|(n, line)| {
-        let row = words(line);
+        let row = split(line, separator);
         let read = |(place, name): (&usize, &String)| {
             let found = row.get(*place).map_or("", String::as_str);
             let value = found.parse().ok().filter(|v: &f64| v.is_finite());

@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 
 use super::{BeamGraph, Ids, on_line, positive};
 use crate::fault::Fault;
-use crate::formats::text::{Lines, at_line, parse, shown, words};
+use crate::formats::text::{Lines, at_line, column, parse, shown, words};
 
 /// Writes a row for each beam: both ends and the radii there, mm.
 pub fn write_table(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
@@ -28,7 +28,8 @@ const COLUMNS: [&str; 6] = ["x1", "y1", "z1", "x2", "y2", "z2"];
 /// The places of the ends' coordinates and of the radii (r1 and r2, or one r; r may be radius) by headings; `None` if these name none of
 /// the coordinates, a fault if they lack one.
 fn places(headings: &[&[u8]]) -> Result<Option<Vec<usize>>, String> {
-    let named = |wanted: &str| headings.iter().position(|h| h.eq_ignore_ascii_case(wanted.as_bytes()));
+    let headings: Vec<_> = headings.iter().map(|h| String::from_utf8_lossy(h)).collect();
+    let named = |wanted: &str| column(&headings, wanted);
     let found: Vec<Option<usize>> = COLUMNS.iter().map(|c| named(c)).collect();
     if found.iter().all(Option::is_none) {
         return Ok(None);

@@ -1,0 +1,113 @@
+"""Whether a grid carries a solid, and what is warned of where it does not."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+from .errors import DesignWarning
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from . import _core
+    from .reports import DesignReport
+
+__all__ = ["Resolution"]
+
+#: Share of the volume by which voxels may reach beyond plane faces of the region unwarned.
+BEYOND = 0.01
+
+
+class Resolution:
+    """Solids that say which grids are too coarse for them."""
+
+    _core: _core.Solid
+    _coarser: tuple[float, float, float] | None
+    _thinnest: dict[str, float]
+    skin: float | None
+    wavelength: float
+    bounds: list[list[float]]
+
+    def report(self) -> DesignReport:
+        raise NotImplementedError
+
+    def _warn_coarser(self, edge: float | None, per_cell: float | None) -> None:
+        """Tells of a spacing that nobody asked for and that is coarser than the walls need."""
+        if edge is None and per_cell is None and self._coarser:
+            used, wanted, triangles = self._coarser
+            warnings.warn(
+                f"a grid spacing of {wanted:.3g} mm, which the walls need, makes about {triangles:.2g} triangles; {used:g} mm "
+                "is used, which carries the thinnest wall; give an edge for another",
+                DesignWarning,
+                stacklevel=3,
+            )
+
+    def _warn_thin(self, spacing: float, word: str = "edge") -> None:
+        """Warns of walls and necks that the grid cannot carry."""
+        if self.skin is not None and self.skin < spacing:
+            warnings.warn(
+                DesignWarning(
+                    f"at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
+                    f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
+                    "skin",
+                ),
+                stacklevel=3,
+            )
+        for name, thin in self._thinnest.items():
+            if thin < 1.5 * spacing:
+                warnings.warn(
+                    DesignWarning(
+                        f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
+                        f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
+                        name,
+                    ),
+                    stacklevel=3,
+                )
+
+    def _warn_beyond(self, step: float) -> None:
+        """Warns of voxels that reach beyond plane faces of the region: their centres are inside, and so they count."""
+        low, high = self.bounds
+        sizes = [b - a for a, b, flat in zip(low, high, self._core.flat_axes, strict=True) if flat]
+
+        def beyond(step: float) -> list[float]:
+            return [step * math.ceil(size / step - 1e-9) / size for size in sizes]
+
+        more = math.prod(beyond(step)) - 1
+        if more > BEYOND:
+            # Of the axis along which they reach farthest.
+            ratio, size = max(zip(beyond(step), sizes, strict=True))
+            better = size / math.ceil(size / step - 1e-9)
+            hint = f"use a step that divides its sizes, such as {better:.6g} mm"
+            if math.prod(beyond(float(f"{better:.6g}"))) - 1 > BEYOND:
+                hint = "use a smaller step, or one that divides its sizes"
+            warnings.warn(
+                f"voxels of {step:g} mm reach beyond the region's plane faces, {ratio * size:.4g} mm along one of {size:.4g} "
+                f"mm: their volume and fraction are up to {100 * more:.1f} % too large; {hint}",
+                DesignWarning,
+                stacklevel=3,
+            )
+
+    def _warn_coarse(self, volume: float, spacing: float, word: str = "edge", pieces: int | None = None) -> None:
+        """Warns of a result whose solid fraction has little to do with the design's, for want of grid steps; over tetrahedra
+        also of one that falls into more ``pieces`` than the lattice has.
+        """
+        if pieces is not None and (message := self._core.coarse_steps(spacing, volume, pieces)):
+            warnings.warn(message, DesignWarning, stacklevel=3)
+            return
+        share, region = self._core.expected()
+        found = volume / region
+        # A share of the fraction, and three standard deviations of the sample that the expected one is from. Over tetrahedra
+        # the sample may lie where none is.
+        tets = any(it.tets for it in self.report().lattices.values())
+        if abs(found - share) > min(0.05, share / 3, math.inf if tets else 0.05 * share + 0.005):
+            better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
+            warnings.warn(
+                f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design {share:.3g}; use "
+                f"{_a(word)} of {better:.2g} mm or less",
+                DesignWarning,
+                stacklevel=3,
+            )
+
+
+def _a(word: str) -> str:
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
