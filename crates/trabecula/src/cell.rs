@@ -28,6 +28,7 @@ pub use series::{Series, Term};
 use std::sync::OnceLock;
 
 use geometry::math::{Interval, Mat3, Vec3, add, apply, norm, scale, spectral_norm, transpose};
+use geometry::once::computed;
 use geometry::progress::Cancellation;
 
 /// Which part of space about the level is solid.
@@ -101,7 +102,7 @@ impl Cell {
 
     /// Least and greatest value of f on the torus: the extremes of a grid, improved by climbing from each.
     pub fn range(&self) -> Interval {
-        *self.range.get_or_init(|| {
+        *computed(&self.range, || {
             let (u, v, g) = torus(&self.plain, 48);
             let climb = |sign: f64| {
                 let best = (0..v.len()).max_by(|&a, &b| (sign * v[a]).total_cmp(&(sign * v[b]))).unwrap_or(0);
@@ -150,7 +151,7 @@ impl Cell {
     }
 
     fn table(&self) -> &quantile::Quantile {
-        self.table.get_or_init(|| quantile::Quantile::new(&self.plain))
+        computed(&self.table, || quantile::Quantile::new(&self.plain))
     }
 
     /// The level at which the part has this solid fraction (0 < fraction < 1), as exactly as a single level can be
@@ -178,7 +179,7 @@ impl Cell {
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
         let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.plain.gradients(u, v, g);
         let request = Cancellation::current();
-        let found = || request.enter(|| self.connected[part as usize].get_or_init(|| connected(&f, part)));
+        let found = || request.enter(|| computed(&self.connected[part as usize], || connected(&f, part)));
         // The table is needed next: both are computed in parallel.
         let (intervals, _) = rayon::join(found, || (self.range(), self.table()));
         intervals.iter().map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0))).collect()
@@ -186,7 +187,7 @@ impl Cell {
 
     /// [`necks`] of the part: phases (turns) and levels.
     fn necks(&self, part: Part) -> &[(Vec3, f64)] {
-        self.necks[part as usize].get_or_init(|| {
+        computed::<Vec<_>>(&self.necks[part as usize], || {
             let mut found = necks(&|u, v, g| self.plain.gradients(u, v, g), part);
             for (at, _) in &mut found {
                 *at = [0, 1, 2].map(|a| at[a] / f64::from(self.repeats[a]));
@@ -207,7 +208,7 @@ impl Cell {
     /// The levels at which the void on a side, f ≤ t (`Lower`) or f ≥ t (`Upper`), is connected with its translates in one, two
     /// and three independent directions, and phases (of the plain series) of the saddles that make it so.
     fn openings(&self, side: Part) -> &Openings {
-        self.openings[side as usize].get_or_init(|| openings(&|u, v, g| self.plain.gradients(u, v, g), side))
+        computed(&self.openings[side as usize], || openings(&|u, v, g| self.plain.gradients(u, v, g), side))
     }
 
     /// Values and gradients (per turn) at phases `u`.

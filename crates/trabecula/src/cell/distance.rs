@@ -16,6 +16,7 @@ use super::quantile::Quantile;
 use super::series::Series;
 use super::thickness::least;
 use geometry::math::{Interval, Mat3, Vec3, add, apply, determinant, inverse, norm, scale, transpose};
+use geometry::once::computed;
 
 /// On creases the gradient may vanish and has no direction: with this the ratio of distances goes to one there, so that it is
 /// continuous.
@@ -140,7 +141,7 @@ impl Distance {
 
     /// Unit normals of the mid-surface and of what is near it, per turn.
     fn normals(&self) -> &[Vec3] {
-        self.normals.get_or_init(|| {
+        computed::<Vec<_>>(&self.normals, || {
             let at = |i: usize| (i as f64 + 0.5) / SIDE as f64;
             let u: Vec<Vec3> =
                 (0..SIDE * SIDE * SIDE).map(|i| [at(i % SIDE), at(i / SIDE % SIDE), at(i / (SIDE * SIDE))]).collect();
@@ -186,7 +187,7 @@ impl Distance {
     }
 
     fn table(&self) -> &Quantile {
-        self.table.get_or_init(|| {
+        computed(&self.table, || {
             let n = self.spline.shape().into_iter().fold(0, usize::max).max(96);
             let mean = self.spline.averaged(1.0 / n as f64);
             let range = self.spline.range().abs().hi;
@@ -200,7 +201,7 @@ impl Distance {
 
     /// The intervals of solid fraction in which the periodic solid of this part is connected in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
-        let found = self.connected[part as usize].get_or_init(|| connected(&|u, v, g| self.gradients(u, v, g), part));
+        let found = computed(&self.connected[part as usize], || connected(&|u, v, g| self.gradients(u, v, g), part));
         let share = |t: f64| self.fraction(part, t).clamp(0.0, 1.0);
         found.iter().map(|i| i.map(share)).collect()
     }

@@ -19,6 +19,7 @@ use std::sync::OnceLock;
 use super::{Part, Series};
 use geometry::fault::{Fault, number};
 use geometry::math::{Interval, Vec3, add, dot, scale, sub};
+use geometry::once::computed;
 
 /// Barycentric coordinates; their sum is one.
 pub type Bary = [f64; 4];
@@ -149,7 +150,7 @@ impl TetCell {
     }
 
     fn table(&self) -> &fraction::Table {
-        self.volume.get_or_init(|| fraction::Table::new(self))
+        computed(&self.volume, || fraction::Table::new(self))
     }
 
     /// Range of f in the tetrahedron, to fourth order in 1/96 of its edge.
@@ -173,7 +174,7 @@ impl TetCell {
     }
 
     fn component_counts(&self, part: Part) -> &component_counts::ComponentCounts {
-        self.connect[part as usize].get_or_init(|| component_counts::ComponentCounts::new(self, part))
+        computed(&self.connect[part as usize], || component_counts::ComponentCounts::new(self, part))
     }
 
     /// The intervals of the level in which the solid is connected and reaches all four faces: there the lattice is
