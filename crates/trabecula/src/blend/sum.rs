@@ -9,7 +9,7 @@ use super::summand::Summand;
 use super::weights::Weights;
 use super::windows::{Phases, Windows};
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Vec3};
+use geometry::math::{Aabb, Vec3, apply, inverse, norm, sub};
 
 /// Largest number of lattices: one bit of a word for each.
 const MOST: usize = 64;
@@ -49,7 +49,13 @@ pub struct Blend {
     /// A Lipschitz bound, per mm.
     pub(super) lipschitz: f64,
     /// The covariance of each pair of summands, where one distribution serves everywhere.
-    pub(super) covariance: Option<Arc<[f64]>>,
+    pub(super) covariance: Option<Arc<Covariance>>,
+}
+
+/// The covariance of each pair of summands, row by row, and the positions (mm) at which it was sampled.
+pub(super) struct Covariance {
+    of: Vec<f64>,
+    positions: Vec<Vec3>,
 }
 
 impl Blend {
@@ -81,7 +87,7 @@ impl Blend {
             levels,
             side: None,
             lipschitz,
-            covariance: covariance.map(Arc::from),
+            covariance: covariance.map(Arc::new),
         })
     }
 
@@ -99,13 +105,48 @@ impl Blend {
     /// `None` where phases drift, and between two sheets: the negative of a sheet is the same sheet.
     pub fn kept(&self, w: &[f64]) -> Option<f64> {
         let n = self.summands.len();
-        let c = self.covariance.as_ref()?;
+        let c = &self.covariance.as_ref()?.of;
         let (all, alone) = (0..n).fold((0.0, 0.0), |(all, alone), i| {
             let row: f64 = (0..n).map(|j| w[j] * c[n * i + j]).sum();
             (all + w[i] * row, alone + w[i] * w[i] * c[n * i + i])
         });
         let sheets = (0..n).filter(|i| w[*i] > 0.0).all(|i| self.summands[i].is_sheet());
         (alone > 0.0 && !sheets).then(|| (all.max(0.0) / alone).sqrt())
+    }
+
+    /// The `offset` (mm) of lattice `b`, in eighths of its cell, at which its core correlates best with that of `a`; the nearest to
+    /// none of several. `None` where no one distribution serves everywhere, and where they correlate at no offset.
+    pub fn offset_in_step(&self, a: usize, b: usize) -> Option<Vec3> {
+        /// Positions that are used, steps on a cell, the least correlation, and differences of it that count as none.
+        const POSITIONS: usize = 1024;
+        const STEPS: i32 = 8;
+        const LEAST: f64 = 0.1;
+        const EQUAL: f64 = 1e-3;
+        let covariance = self.covariance.as_ref()?;
+        let positions = &covariance.positions[..covariance.positions.len().min(POSITIONS)];
+        let map = self.summands[b].lattice()?.map.affine()?;
+        let back = inverse(&map.matrix);
+        let centred = |summand: &Summand, moved: Vec3| -> Vec<f64> {
+            let at: Vec<Vec3> = positions.iter().map(|p| sub(*p, moved)).collect();
+            let mut values = vec![0.0; at.len()];
+            summand.values(&at, &mut values);
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|v| v - mean).collect()
+        };
+        let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(u, v)| u * v).sum::<f64>();
+        let fixed = centred(&self.summands[a], [0.0; 3]);
+        let each = (0..STEPS.pow(3)).map(|n| {
+            let turns = [n % STEPS, n / STEPS % STEPS, n / STEPS / STEPS].map(|n| f64::from(n) / f64::from(STEPS));
+            let moved = centred(&self.summands[b], apply(&back, turns));
+            let size = (dot(&fixed, &fixed) * dot(&moved, &moved)).sqrt();
+            // From −1/2, exclusive, to 1/2.
+            let whole = sub(turns, map.shift).map(|u| u - (u - 0.5).ceil());
+            (dot(&fixed, &moved) / size, apply(&back, whole))
+        });
+        let each: Vec<(f64, Vec3)> = each.collect();
+        let most = each.iter().map(|e| e.0).fold(LEAST, f64::max);
+        let best = each.iter().filter(|e| e.0 > most - EQUAL).map(|e| e.1);
+        best.min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
     }
 
     /// Which phases meet, where the fraction is kept.
@@ -203,7 +244,7 @@ fn summands(
     normalise: bool,
     windows: &Windows,
     bounds: &Aabb,
-) -> (Vec<Summand>, Option<Vec<f64>>) {
+) -> (Vec<Summand>, Option<Covariance>) {
     let mut points = match windows.phases {
         Phases::Drifting => Vec::new(),
         Phases::Locked | Phases::Independent => windows.samples(0),
@@ -232,7 +273,7 @@ fn summands(
     });
     let made: Vec<Summand> = each.collect();
     let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
-    let covariance = || centred.iter().flat_map(|a| centred.iter().map(|b| product(a, b))).collect();
-    let covariance = (windows.phases != Phases::Drifting).then(covariance);
-    (made, covariance)
+    let of = || centred.iter().flat_map(|a| centred.iter().map(|b| product(a, b))).collect();
+    let covariance = (windows.phases != Phases::Drifting).then(of);
+    (made, covariance.map(|of| Covariance { of, positions: points }))
 }

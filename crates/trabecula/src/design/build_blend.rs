@@ -245,10 +245,19 @@ fn cancelling(
     };
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| w[*b].total_cmp(&w[*a]));
-    let [a, b] = [order[0], order[1]];
+    let [a, b] = [order[0].min(order[1]), order[0].max(order[1])];
+    let remedy = match blend.offset_in_step(a, b) {
+        None => "give one of them another `offset` in its map".to_string(),
+        Some(offset) => format!(
+            "give \"{}\" `offset = [{}]` in its map, with which it is in step with \"{}\"",
+            names[b],
+            offset.map(figure).join(", "),
+            names[a]
+        ),
+    };
     let message = format!(
         "the functions of \"{}\" and \"{}\" cancel at ({}) mm, where the shares are {:.2} and {:.2}: only {left:.3} is left of \
-         their root mean square, so that the solid is torn there; give one of them another `offset` in its map",
+         their root mean square, so that the solid is torn there, by a gap that a mesh may be too coarse to show; {remedy}",
         names[a],
         names[b],
         p.map(figure).join(", "),

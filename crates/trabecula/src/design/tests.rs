@@ -307,6 +307,14 @@ fn lattices_that_cancel_are_warned_of_with_the_place() {
         assert!(warned[0].contains(" at (0, "), "{}", warned[0]);
         let [one] = &built.transitions()[..] else { panic!("one transition") };
         assert!(one.neck.is_none() && one.gap.is_some_and(|p| p[0].abs() < 4.0), "{by}: {:?}", one.gap);
+        // The offset that the warning names is the cure.
+        let start = warned[0].find("`offset = ").expect("an offset") + 1;
+        let offset = warned[0][start..].split('`').next().expect("an end");
+        let lattice = second.split("\nmap").next().expect("a lattice");
+        let mended = blended(&format!("{lattice}\nmap.affine = {{ wavelength = 4, {offset} }}"), RAMP, by);
+        assert!(said(&mended, "cancel").is_empty(), "{offset}: {:?}", mended.warnings);
+        let [one] = &mended.transitions()[..] else { panic!("one transition") };
+        assert!(one.neck.is_some() && one.gap.is_none(), "{offset}");
     }
 }
 

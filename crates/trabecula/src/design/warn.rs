@@ -17,6 +17,8 @@ const TURN: f64 = 45.0;
 const OUTSIDE: f64 = 0.05;
 /// The density of cells over the one asked for below which there is a warning: they are drawn out twenty times.
 const PRESSED: f64 = 0.05;
+/// The relative deviation of the fraction from the one asked for, beside a thickness, above which it is warned of.
+const DRIFT: f64 = 0.05;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
 
@@ -212,6 +214,39 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
         let kind = spec.map.key();
         warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", environment.path), message });
     }
+}
+
+/// Warns of a fraction that a wall of given thickness does not keep, where the map's cells have another size or shape than follows
+/// from both.
+pub(super) fn fraction_beside_thickness(
+    lattice: &Lattice,
+    spec: &LatticeSpec,
+    at_level: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<(), DesignError> {
+    let amount = &spec.level.amount;
+    let (Some(_), true, None) = (amount.length(), lattice.distance().is_some(), lattice.map.affine()) else {
+        return Ok(());
+    };
+    let asked = amount.grade().build(&amount.quantity(format!("{}.{}", at_level.path, amount.key()), at_level))?;
+    let points = at_level.points;
+    let asked = sample::values(points, |points, out| asked.values(points, out));
+    let found = sample::values(points, |points, out| lattice.fractions(points, out));
+    let off = |i: &usize| (found[*i] / asked[*i] - 1.0).abs();
+    let Some(worst) = (0..points.len()).max_by(|i, j| off(i).total_cmp(&off(j)).then(j.cmp(i))) else { return Ok(()) };
+    if off(&worst) <= DRIFT {
+        return Ok(());
+    }
+    let message = format!(
+        "walls have the thickness that is asked for, but the solid fraction is {} at ({}) mm, where {} is asked for: no map has \
+         cells of the size that both need everywhere; let the thickness vary more slowly, or give the fraction and a \
+         wavelength, which hold the fraction",
+        figure(found[worst]),
+        points[worst].map(figure).join(", "),
+        figure(asked[worst])
+    );
+    warnings.push(Warning { path: format!("{}.fraction", at_level.path), message });
+    Ok(())
 }
 
 /// Warns of a map that deviates far from its target.

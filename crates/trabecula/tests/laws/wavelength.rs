@@ -156,3 +156,23 @@ fn what_contradicts_is_refused() {
     assert!(refused("map.phase.wavelength = 4", both).contains("leave it out"));
     assert!(refused("map.phase = {}", "fraction = 0.3").contains("\"wavelength\" is missing"));
 }
+
+/// A thickness that varies asks for cells that no map has everywhere; walls keep it, and the fraction that then deviates is warned of,
+/// with the place. A gentle one is not.
+#[test]
+fn a_fraction_that_a_graded_thickness_does_not_keep_is_warned_of() {
+    for (steep, warned) in [(0.1, false), (0.6, true)] {
+        let stops = format!("[[-4.5, 0.3], [4.5, {}]]", 0.3 * (1.0 + steep));
+        let level = format!("fraction = 0.3, thickness = {{ linear = {{ along = [1, 0, 0], stops = {stops} }} }}");
+        let made = built("gyroid", "sheet", "map.phase = {}", &level).expect("built");
+        let found = made.report().lattices["core"].fraction;
+        let off = match found {
+            Varying::Number(v) => (v / 0.3 - 1.0).abs(),
+            Varying::Range([a, b]) => (a / 0.3 - 1.0).abs().max((b / 0.3 - 1.0).abs()),
+        };
+        assert_eq!(off > 0.05, warned, "{found:?}");
+        let said: Vec<_> = made.warnings.iter().filter(|w| w.path == "lattice.core.level.fraction").collect();
+        assert_eq!(said.len(), usize::from(warned), "{:?}", made.warnings);
+        assert!(said.iter().all(|w| w.message.contains("mm, where 0.3000 is asked for")), "{said:?}");
+    }
+}
