@@ -76,16 +76,20 @@ pub fn fit(
     }
 }
 
-/// Samples of a surface that is near the region's, moved onto it; those that do not come nearer to it, or are `reach` (mm) off, stay.
+/// Samples of a surface that is near the region's, moved onto it; those that do not come nearer to it stay. Those that are farther off
+/// than `reach` (mm) are left out: triangles within the solid, as of bodies that overlap, are no part of the region's surface.
 fn on_surface(region: &dyn Field, mut samples: Vec<SurfaceSample>, reach: f64) -> Vec<SurfaceSample> {
     let start: Vec<Vec3> = samples.iter().map(|s| s.at).collect();
     let moved = feet(region, &start);
     let [before, after] = [&start, &moved].map(|points| values(region, points));
+    let near = |i: usize| norm(sub(moved[i], start[i])) < reach;
     for (i, s) in samples.iter_mut().enumerate() {
-        if after[i].abs() < before[i].abs() && norm(sub(moved[i], s.at)) < reach {
+        if after[i].abs() < before[i].abs() && near(i) {
             s.at = moved[i];
         }
     }
+    let mut kept = (0..start.len()).map(|i| before[i].abs() <= reach || near(i));
+    samples.retain(|_| kept.next().unwrap_or(true));
     samples
 }
 
