@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Writes docs/generated/properties.json, what all cells do by their fraction, and catalogue.md with plots of it.
 
-Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--parts PART ...] [--again] [--page]
+Usage: python scripts/catalogue_of_properties.py [--n 64] [--cells NAME ...] [--parts PART ...] [--again] [--flow] [--page]
 
-Cells that stand in the data at this n or a finer one are kept, unless --again; --page makes the page of what is there.
+Cells that stand in the data at this n or a finer one are kept, unless --again; --flow adds the permeability, which takes most
+of the time: without it that of the data stays, at the n it was found with. --page makes the page of what is there.
 """
 
 import argparse
@@ -25,8 +26,9 @@ PICTURES = ROOT / "docs" / "images"
 FRACTIONS = (0.05, 0.6, 12)
 #: The kinds of cells: parts of named ones, cells of beams, tetrahedral ones, each with the part that it is meant for.
 PARTS = ("sheet", "lower", "upper", "beams", "tetrahedra")
-#: What is found of tetrahedral cells: flow through them takes hours.
-OF_TETS = ("stiffness", "conductivity", "area")
+#: What is found without --flow, and of tetrahedral cells in any case: flow through them takes hours.
+SOLID = ("stiffness", "conductivity", "area")
+FLOW = tuple(lt.laws.PROPERTIES["permeability"])
 #: Plots: column, title, and whether it is logarithmic.
 SHOWN = (
     ("E", "Young's modulus along the axes, over the solid's", True),
@@ -54,7 +56,21 @@ def order(law):
     return PARTS.index(part) - 2 if part in PARTS[3:] else 0, NAMES[part].index(law["cell"]), PARTS.index(part)
 
 
-def compute(n, cells, parts, again):
+def with_flow_of(old, law):
+    """A law without flow, with that of the data at the same fractions."""
+    if old is None or "K" not in old["columns"] or old["columns"]["fraction"] != law["columns"]["fraction"]:
+        return law
+    columns = law["columns"] | {name: old["columns"][name] for name in FLOW}
+    about_flow = [(note, [m for m in note["messages"] if m.startswith("permeability:")]) for note in old["notes"]]
+    notes = {note["fraction"]: list(note["messages"]) for note in law["notes"]}
+    for note, messages in about_flow:
+        if messages:
+            notes.setdefault(note["fraction"], []).extend(messages)
+    notes = [{"fraction": f, "messages": messages} for f, messages in sorted(notes.items())]
+    return law | {"columns": columns, "notes": notes, "n_flow": old.get("n_flow", old["n"])}
+
+
+def compute(n, cells, parts, again, flow):
     """Adds laws to the data."""
     kept = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {"laws": []}
     laws = {(law["cell"], kind(law)): law for law in kept["laws"]}
@@ -63,12 +79,14 @@ def compute(n, cells, parts, again):
             if not again and laws.get((cell, part), {"n": 0})["n"] >= n:
                 continue
             tet = part == "tetrahedra"
-            more = {"tet": True, "properties": OF_TETS} if tet else {}
+            more = {"tet": True} if tet else {}
+            if tet or not flow:
+                more["properties"] = SOLID
             law = lt.law(cell, None if tet else part, *FRACTIONS, n=n, **more).to_dict()
             law["columns"] = {k: [v and float(f"{v:.6g}") for v in column] for k, column in law["columns"].items()}
-            laws[cell, part] = law
             law["fits"] = {k: {name: float(f"{v:.6g}") for name, v in fit.items()} for k, fit in law["fits"].items()}
             law["notes"] = [{**note, "fraction": float(f"{note['fraction']:.6g}")} for note in law["notes"]]
+            laws[cell, part] = law if tet or flow else with_flow_of(laws.get((cell, part)), law)
             rows = ",\n".join(json.dumps(it) for it in sorted(laws.values(), key=order))
             DATA.write_text(f'{{"laws": [\n{rows}\n]}}\n', encoding="utf-8")
             print(f"{cell} {part}: done", flush=True)
@@ -100,6 +118,11 @@ def percent(share):
     return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
+def steps(law):
+    """The voxels along the cell, and the nodes for flow if these are others."""
+    return f"{law['n']}, K {law['n_flow']}" if law.get("n_flow", law["n"]) != law["n"] else str(law["n"])
+
+
 def lines(laws):
     """The page's text."""
     yield "<!-- Made by scripts/catalogue_of_properties.py; do not edit. -->"
@@ -114,21 +137,21 @@ def lines(laws):
     )
     for part in (part for part in PARTS if any(kind(law) == part for law in laws)):
         yield from ("", f"## {part}", "", f"![Properties by fraction](../images/properties_{part}.svg)", "")
-        yield "| cell | n | fraction | E | error of C | Zener | k | error of k | K / λ² | error of K | area λ / V |"
+        yield "| cell | n | fraction | E | error of E | Zener | k | error of k | K / λ² | error of K | area λ / V |"
         yield "|" + "---|" * 11
         for law in (law for law in laws if kind(law) == part):
             columns = law["columns"]
             for i in range(0, len(columns["fraction"]), 2):
                 cells = [
                     columns[name][i] if name in columns else None
-                    for name in ("E", "C_error", "zener", "k", "k_error", "K", "K_error", "area")
+                    for name in ("E", "E_error", "zener", "k", "k_error", "K", "K_error", "area")
                 ]
                 shares = {1, 4, 6}
                 texts = [
                     "–" if v is None or (v == 0 and j == 5) else percent(v) if j in shares else f"{v:.4g}"
                     for j, v in enumerate(cells)
                 ]
-                yield "| " + " | ".join([f"`{law['cell']}`", str(law["n"]), f"{columns['fraction'][i]:.2f}", *texts]) + " |"
+                yield "| " + " | ".join([f"`{law['cell']}`", steps(law), f"{columns['fraction'][i]:.2f}", *texts]) + " |"
 
 
 def main():
@@ -138,10 +161,11 @@ def main():
     parser.add_argument("--cells", nargs="+", default=list(dict.fromkeys(itertools.chain(*NAMES.values()))))
     parser.add_argument("--parts", nargs="+", default=PARTS, choices=PARTS)
     parser.add_argument("--again", action="store_true")
+    parser.add_argument("--flow", action="store_true")
     parser.add_argument("--page", action="store_true")
     args = parser.parse_args()
     if not args.page:
-        compute(args.n, args.cells, args.parts, args.again)
+        compute(args.n, args.cells, args.parts, args.again, args.flow)
     page()
 
 

@@ -33,7 +33,7 @@ def test_cells_are_as_stiff_as_an_independent_program_found(cell: str, part: str
     values = found.C[0][0], found.C[0][1], found.C[3][3]
     # The table has four digits of a computation of its own, good to about a hundredth.
     assert values == pytest.approx(wanted, rel=0.02)
-    assert found.error < 0.01 and found.fraction == pytest.approx(fraction, abs=2e-5)  # tables of levels
+    assert found.error < 0.02 and found.fraction == pytest.approx(fraction, abs=2e-5)  # tables of levels
     assert found.zener == pytest.approx(2 * values[2] / (values[0] - values[1]), rel=1e-6)
     assert found.bulk_bounds[0] <= found.bulk <= found.bulk_bounds[1]
 
@@ -157,6 +157,34 @@ def test_the_modulus_along_an_axis_is_that_of_the_compliance():
     mesh, along = surface(found.C)
     assert mesh.closed and mesh.volume > 0 and np.allclose(np.linalg.norm(mesh.vertices, axis=1), along)
     assert along.max() == pytest.approx(modulus(found.C, np.full((1, 3), 3**-0.5))[0], rel=1e-3)  # along the diagonal
+
+
+@pytest.mark.parametrize(("cell", "radius"), [("kelvin", 0.16), ("bcc", 0.16)])
+def test_soft_moduli_are_within_their_errors(cell: str, radius: float):
+    """Beams that bend: twice as fine voxels stay within about the error stated, many times that of the whole tensor. It is an
+    estimate from three grids: the order that these show may be off by a half, and the error then by a factor of two."""
+    beams = lt.Beams(cell=cell, radius=radius, map=map.affine(wavelength=4))
+    thin = lt.Design(region.box(size=[4, 4, 4]), beams=beams).build()
+    coarse, fine = thin.stiffness(n=48), thin.stiffness(n=96)
+    for found, error, true in zip(coarse.E + coarse.G, coarse.E_error + coarse.G_error, fine.E + fine.G, strict=True):
+        assert abs(found - true) < 2 * error * found
+    assert max(coarse.E_error) > 3 * coarse.error
+
+
+def test_each_direction_of_a_laminate_has_its_error():
+    """Across slabs that cut voxels, 1 / (f + (1 - f) / pore), along them the mean: both within their own errors."""
+    slabs = lt.Lattice(lt.cell.series(terms=[{"hkl": [0, 0, 1]}]), "lower", map.affine(wavelength=4), level.fraction(0.41))
+    found = lt.Design(region.box(size=[4, 4, 4]), slabs).build().conductivity(n=32, pore=0.01)
+    for axis, true in ((0, 0.41 + 0.59 * 0.01), (2, 1 / (0.41 + 0.59 / 0.01))):
+        assert abs(found.k[axis][axis] - true) <= max(found.axis_errors[axis], 1e-4) * found.k[axis][axis]
+    assert found.axis_errors[2] > 10 * found.error
+
+
+def test_engineering_constants_are_of_orthotropic_cells_alone():
+    skewed = lt.Lattice("primitive", "sheet", map.affine(wavelength=4, skew={"xz": 20}), level.fraction(0.3))
+    leaning = lt.Design(region.box(size=[4, 4, 4]), skewed).build().stiffness(n=16)
+    assert abs(leaning.C[0][4]) > 0.05 * leaning.C[0][0]
+    assert "ENGINEERING" not in abaqus(leaning, "x") and "ENGINEERING" in abaqus(solid().stiffness(n=16), "x")
 
 
 def test_cards_give_the_stiffness_back_in_each_programs_order():

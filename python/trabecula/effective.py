@@ -130,9 +130,14 @@ def accuracy(found: Found, size: str) -> list[str]:
         walls = "" if found.pore_nodes is None else f"; {found.pore_nodes:.3g} steps across the hydraulic diameter"
     else:
         walls = "" if found.wall_voxels is None else f"; {found.wall_voxels:.3g} voxels across the thinnest wall"
+    single = ""
+    if isinstance(found, StiffnessReport) and found.E_error and found.G_error:
+        single = f", E up to {100 * max(found.E_error):.2g} %, G up to {100 * max(found.G_error):.2g} %"
+    elif isinstance(found, ConductivityReport):
+        single = f", along an axis up to {100 * max(found.axis_errors):.2g} %"
     return [
         f"fraction   {found.fraction:.6f}",
-        f"accuracy   at n = {found.n} {size} is {100 * found.error:.2g} % off the limit given; grids of {grids}",
+        f"accuracy   at n = {found.n} {size} is {100 * found.error:.2g} % off the limit given{single}; grids of {grids}",
         f"solved     to a relative residual of {found.residual:.1e} in at most {found.iterations} iterations{walls}",
     ]
 

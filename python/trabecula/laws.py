@@ -42,8 +42,13 @@ PROPERTIES: dict[str, dict[str, str]] = {
         "bulk": "bulk modulus",
         "zener": "2 C44 / (C11 - C12)",
         "C_error": "estimated relative error of C",
+        "E_error": "estimated relative error of E, the greatest of the axes",
+        "G_error": "that of G",
     },
-    "conductivity": {"k": "conductivity over that of the solid, mean of the axes", "k_error": "its estimated relative error"},
+    "conductivity": {
+        "k": "conductivity over that of the solid, mean of the axes",
+        "k_error": "its estimated relative error, the greatest of the axes",
+    },
     "permeability": {
         "K": "permeability of the pore over the wavelength squared, mean of the axes",
         "K_error": "its estimated relative error",
@@ -291,12 +296,14 @@ def _stiffness(solid, n: int, nu: float, work: tuple) -> tuple[dict[str, float |
     }
     if found.E is not None:
         made |= {"E": _mean(found.E), "G": _mean(found.G), "nu": _mean(found.nu)}
+        made |= {"E_error": max(found.E_error), "G_error": max(found.G_error)}
     return made, [f"stiffness: {w['message']}" for w in found.warnings]
 
 
 def _conductivity(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
     found = solid.conductivity(n, 0.0, False, *work)
-    return {"k": _mean(np.diag(found.k)), "k_error": found.error}, [f"conductivity: {w['message']}" for w in found.warnings]
+    made: dict[str, float | None] = {"k": _mean(np.diag(found.k)), "k_error": max(found.axis_errors)}
+    return made, [f"conductivity: {w['message']}" for w in found.warnings]
 
 
 def _permeability(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:

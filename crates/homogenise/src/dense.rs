@@ -1,8 +1,15 @@
 //! Small dense symmetric matrices.
 
 /// The eigenvalues of a symmetric matrix, by Jacobi's rotations.
-pub fn eigenvalues(mut a: Vec<Vec<f64>>) -> Vec<f64> {
+pub fn eigenvalues(a: Vec<Vec<f64>>) -> Vec<f64> {
+    eigen(a).0
+}
+
+/// The eigenvalues of a symmetric matrix and, row by row, its orthonormal eigenvectors, by Jacobi's rotations.
+pub fn eigen(mut a: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = a.len();
+    let unit = |i: usize| (0..n).map(|j| f64::from(u8::from(i == j))).collect();
+    let mut vectors: Vec<Vec<f64>> = (0..n).map(unit).collect();
     for _ in 0..60 {
         let off: f64 = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| a[i][j] * a[i][j]).sum();
         let all: f64 = a.iter().flatten().map(|v| v * v).sum();
@@ -11,30 +18,37 @@ pub fn eigenvalues(mut a: Vec<Vec<f64>>) -> Vec<f64> {
         }
         for p in 0..n {
             for q in p + 1..n {
-                rotate(&mut a, p, q);
+                if let Some(turn) = rotation(&a, p, q) {
+                    a.iter_mut().for_each(|row| (row[p], row[q]) = turned(turn, row[p], row[q]));
+                    turn_rows(&mut a, turn, p, q);
+                    turn_rows(&mut vectors, turn, p, q);
+                }
             }
         }
     }
-    (0..n).map(|i| a[i][i]).collect()
+    ((0..n).map(|i| a[i][i]).collect(), vectors)
 }
 
-/// One rotation, which makes the entry (p, q) zero.
-fn rotate(a: &mut [Vec<f64>], p: usize, q: usize) {
+/// Cosine and sine of the rotation that makes the entry (p, q) zero; `None` if it is.
+fn rotation(a: &[Vec<f64>], p: usize, q: usize) -> Option<(f64, f64)> {
     if a[p][q] == 0.0 {
-        return;
+        return None;
     }
     let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
     let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     let t = if theta == 0.0 { 1.0 } else { t };
     let c = 1.0 / (t * t + 1.0).sqrt();
-    let s = t * c;
-    for row in a.iter_mut() {
-        let (x, y) = (row[p], row[q]);
-        (row[p], row[q]) = (c * x - s * y, s * x + c * y);
-    }
+    Some((c, t * c))
+}
+
+fn turned((c, s): (f64, f64), x: f64, y: f64) -> (f64, f64) {
+    (c * x - s * y, s * x + c * y)
+}
+
+fn turn_rows(a: &mut [Vec<f64>], turn: (f64, f64), p: usize, q: usize) {
     let (upper, lower) = a.split_at_mut(q);
     for (x, y) in upper[p].iter_mut().zip(&mut lower[0]) {
-        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
+        (*x, *y) = turned(turn, *x, *y);
     }
 }
 
@@ -100,6 +114,25 @@ mod tests {
         let r = 2f64.sqrt();
         for (f, e) in found.iter().zip([2.0 - r, 2.0, 2.0 + r]) {
             assert!((f - e).abs() < 1e-14);
+        }
+    }
+
+    /// A = Σ λ v vᵀ, with orthonormal v.
+    #[test]
+    fn eigenvectors_make_their_matrix() {
+        let a = vec![
+            vec![4.0, 1.0, -2.0, 0.5],
+            vec![1.0, 3.0, 0.0, 1.0],
+            vec![-2.0, 0.0, 5.0, 0.2],
+            vec![0.5, 1.0, 0.2, 3.0],
+        ];
+        let (values, vectors) = eigen(a.clone());
+        for i in 0..4 {
+            for j in 0..4 {
+                let made: f64 = (0..4).map(|k| values[k] * vectors[k][i] * vectors[k][j]).sum();
+                let product: f64 = (0..4).map(|k| vectors[i][k] * vectors[j][k]).sum();
+                assert!((made - a[i][j]).abs() < 1e-13 && (product - f64::from(u8::from(i == j))).abs() < 1e-14);
+            }
         }
     }
 

@@ -39,6 +39,7 @@ mod slab;
 mod solve;
 
 pub use cell::{Homogenised, VoxelCell, upper_edges};
+pub use dense::eigen;
 pub use material::{AXES, Material, Voigt, turned, voigt};
 pub use moduli::{Moduli, bounds, conductivity_bounds};
 pub use pore::{PoreGrid, VELOCITIES, WallLink, opposite};

@@ -16,7 +16,7 @@ use crate::field::Field;
 use crate::kind::Warning;
 use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
 use fractions::fractions;
-use limit::{Limit, limit};
+use limit::{Limit, modal_limit};
 pub use permeability::Side;
 
 /// A periodic cell.
@@ -193,11 +193,12 @@ impl UnitCell {
             voxels.stiffness(material, TOLERANCE, progress)
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
-            made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
-        let limited = limit(&grids);
+            made.iter().map(|(v, m)| (v.shape, orthonormal(&m.tensor).into_iter().flatten().collect())).collect();
+        let limited = modal_limit(&grids);
         let mut warnings: Vec<Warning> = limited.doubt(&self.path, resolution.n).into_iter().collect();
+        let moduli_errors: [f64; 6] = std::array::from_fn(|i| limited.error_of_inverse(&axis::<6>(i)));
         let Limit { tensor, error, order, .. } = limited;
-        let c: Voigt = std::array::from_fn(|i| std::array::from_fn(|j| tensor[6 * i + j]));
+        let c: Voigt = std::array::from_fn(|i| std::array::from_fn(|j| tensor[6 * i + j] / (mandel(i) * mandel(j))));
         let (finest, found) = &made[0];
         let fraction = self.fraction.unwrap_or_else(|| finest.fraction());
         let wall_voxels = self.across(finest.shape, resolution.n, &mut warnings);
@@ -216,7 +217,9 @@ impl UnitCell {
             residual: made.iter().map(|m| m.1.residual).fold(0.0, f64::max),
             iterations: found.iterations,
             E: moduli.map(|m| m.young),
+            E_error: moduli.map(|_| [0, 1, 2].map(|i| moduli_errors[i])),
             G: moduli.map(|m| m.shear),
+            G_error: moduli.map(|_| [3, 4, 5].map(|i| moduli_errors[i])),
             nu: moduli.map(|m| m.poisson),
             zener: moduli.map(|m| m.zener),
             anisotropy: moduli.map(|m| m.universal),
@@ -259,8 +262,9 @@ impl UnitCell {
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();
-        let limited = limit(&grids);
+        let limited = modal_limit(&grids);
         let mut warnings: Vec<Warning> = limited.doubt(&self.path, resolution.n).into_iter().collect();
+        let axis_errors = std::array::from_fn(|i| limited.error_along(&axis::<3>(i)));
         let Limit { tensor, error, order, .. } = limited;
         let (finest, found) = &made[0];
         if pore == 0.0 && (known.is_some() || tensor.iter().all(|v| *v == 0.0)) {
@@ -276,6 +280,7 @@ impl UnitCell {
             k_n: found.tensor,
             n: resolution.n,
             error,
+            axis_errors,
             order,
             residual: made.iter().map(|m| m.1.residual).fold(0.0, f64::max),
             iterations: found.iterations,
@@ -300,6 +305,21 @@ impl UnitCell {
             |i: usize| (0..3).filter(|a| i >> a & 1 == 1).fold([0.0; 3], |p, a| geometry::math::add(p, self.edges[a]));
         (0..8).fold(Aabb::EMPTY, |b, i| b.with(corner(i)))
     }
+}
+
+/// A unit vector.
+fn axis<const N: usize>(i: usize) -> [f64; N] {
+    std::array::from_fn(|j| f64::from(u8::from(i == j)))
+}
+
+/// Factor of an index of Voigt's order that makes an orthonormal basis of it (Mandel's).
+fn mandel(i: usize) -> f64 {
+    if i < 3 { 1.0 } else { std::f64::consts::SQRT_2 }
+}
+
+/// A stiffness in Mandel's basis, where eigenvectors are those of the tensor.
+fn orthonormal(c: &Voigt) -> Voigt {
+    std::array::from_fn(|i| std::array::from_fn(|j| c[i][j] * mandel(i) * mandel(j)))
 }
 
 /// The multiple of eight from `n` times `more` on; `None` beyond what any machine holds.

@@ -27,9 +27,10 @@ pub struct StiffnessReport {
     /// Voxels along the edge of the cell, or of a cube of its volume.
     pub n: usize,
     /// Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much for
-    /// an extrapolation C is C_n, and this the distance of the extrapolated one.
+    /// an extrapolation C is C_n, and this the distance of the extrapolated one. Each eigenvalue of C is extrapolated by an order of its own;
+    /// soft ones are less sure than C is as a whole: see E_error and G_error.
     pub error: f64,
-    /// Exponent of the voxel's edge with which the error was taken to fall.
+    /// Exponent of the voxel's edge with which the error was taken to fall, of the eigenvalue that changes most.
     pub order: f64,
     /// Greatest relative residual of the load cases.
     pub residual: f64,
@@ -37,8 +38,12 @@ pub struct StiffnessReport {
     pub iterations: usize,
     /// Young's moduli along the axes; None where the cell resists some strain not at all.
     pub E: Option<[f64; 3]>,
+    /// Estimated relative errors of E.
+    pub E_error: Option<[f64; 3]>,
     /// Shear moduli of the planes 23, 13, 12.
     pub G: Option<[f64; 3]>,
+    /// Estimated relative errors of G.
+    pub G_error: Option<[f64; 3]>,
     /// Poisson's ratios 23, 13, 12: contraction along the second axis under tension along the first.
     pub nu: Option<[f64; 3]>,
     /// Zener's ratio 2 C44 / (C11 - C12) of means over the axes; 1 is isotropic.
@@ -77,7 +82,9 @@ pub struct ConductivityReport {
     /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm); where the grids differ too much for
     /// an extrapolation k is k_n, and this the distance of the extrapolated one.
     pub error: f64,
-    /// Exponent of the voxel's edge with which the error was taken to fall.
+    /// Estimated relative errors of k along the axes.
+    pub axis_errors: [f64; 3],
+    /// Exponent of the voxel's edge with which the error was taken to fall, of the eigenvalue that changes most.
     pub order: f64,
     /// Greatest relative residual of the load cases.
     pub residual: f64,
