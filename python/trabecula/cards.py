@@ -20,14 +20,21 @@ def upper(c: Sequence[Sequence[float]], order: Sequence[int], by_column: bool) -
     return [c[order[i]][order[j]] for i in range(6) for j in range(i, 6)]
 
 
+#: Entries that couple stretches and shears, over the greatest of the diagonal, up to which they are those of voxels alone.
+COUPLED = 1e-3
+
+
 def abaqus(found: StiffnessReport, title: str) -> str:
     """``*ELASTIC, TYPE=ANISOTROPIC`` for Abaqus (CalculiX reads it too), eight constants a line; and as a comment the
-    engineering constants E1 E2 E3 nu12 nu13 nu23 G12 G13 G23, for cells whose axes are those of symmetry.
+    engineering constants E1 E2 E3 nu12 nu13 nu23 G12 G13 G23, if the axes are those of symmetry: if nothing couples stretches
+    and shears.
     """
     constants = upper(found.C, ABAQUS, True)
     lines = ["*MATERIAL, NAME=LATTICE", "*ELASTIC, TYPE=ANISOTROPIC"]
     lines += [", ".join(f"{v:.9g}" for v in constants[i : i + 8]) for i in range(0, 21, 8)]
-    if found.E and found.G and found.nu:
+    coupled = [found.C[i][j] for i in range(6) for j in range(3, 6) if i != j]
+    orthotropic = max(map(abs, coupled)) <= COUPLED * max(found.C[i][i] for i in range(6))
+    if orthotropic and found.E and found.G and found.nu:
         (g23, g13, g12), (n23, n13, n12) = found.G, found.nu
         lines += ["** Along axes of symmetry instead:", "** *ELASTIC, TYPE=ENGINEERING CONSTANTS"]
         lines += ["** " + ", ".join(f"{v:.9g}" for v in (*found.E, n12, n13, n23, g12, g13)), f"** {g23:.9g}"]
