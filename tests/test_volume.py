@@ -246,3 +246,42 @@ def test_periodic_is_refused_where_the_solid_is_not():
 
 
 # --- sets of the design, loads ----------------------------------------------------------------------------------------
+
+
+def test_domains_of_order_2_have_the_volume_of_their_curved_elements():
+    mesh = solid().volume_mesh(per_cell=12, order=2, periodic=True, of="all")
+    figures = mesh.report()
+    assert sum(d.volume for d in figures.domains.values()) == pytest.approx(figures.volume, rel=1e-12)
+    wall = figures.domains["WALL"].volume
+    straight = volumes(mesh.nodes, mesh.elements[mesh.domain == list(figures.domains).index("WALL"), :4]).sum()
+    assert abs(wall / (0.3 * 64) - 1) < 0.1 * abs(straight / (0.3 * 64) - 1)  # curved edges: of higher order
+
+
+def test_loose_components_are_dropped_or_refused():
+    growing = lt.level.fraction(lt.grade.linear(along=[1, 0, 0], stops=[[-6, 0.15], [6, 0.55]]))
+    cut = lt.Design(lt.region.box(size=[12, 8, 8]), lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4), growing)).build()
+    with pytest.warns(lt.DesignWarning, match="do not touch.*--islands drop"):
+        all_of_it = cut.volume_mesh(per_cell=16)
+    whole = cut.volume_mesh(per_cell=16, islands="drop")
+    figures = whole.report()
+    assert figures.pieces == 1 and figures.loose > 0
+    assert whole.volume + figures.loose == pytest.approx(all_of_it.volume, abs=0.1 * figures.loose)  # chords, balanced or not
+    with pytest.raises(ValueError, match="components that do not touch"):
+        cut.volume_mesh(per_cell=16, islands="error")
+    with pytest.raises(ValueError, match='islands is "drop"; of a periodic cell'):
+        solid().volume_mesh(per_cell=12, periodic=True, islands="drop")
+
+
+def test_keep_zones_are_walls_of_a_flow(tmp_path):
+    design = lt.Design(
+        lt.region.box(size=[8, 8, 8]),
+        lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4), lt.level.fraction(0.3)),
+        keep={"bolt": lt.region.cylinder(base=[0, 0, -4], radius=1.5, height=8)},
+    )
+    design.build().volume_mesh(per_cell=12, of="pore").write(tmp_path / "case.foam")
+    patches = (tmp_path / "constant" / "polyMesh" / "boundary").read_text()
+    kinds = {
+        name: patches.split(f"    {name}\n")[1].split("type")[1].split(";")[0].strip()
+        for name in ("KEEP_bolt", "LATTICE", "X0")
+    }
+    assert kinds == {"KEEP_bolt": "wall", "LATTICE": "wall", "X0": "patch"}

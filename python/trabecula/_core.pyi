@@ -152,6 +152,7 @@ class VolumeMesh:
         of: str = "solid",
         order: int = 1,
         periodic: bool = False,
+        largest: bool = False,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> VolumeMesh: ...

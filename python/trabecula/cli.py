@@ -412,6 +412,13 @@ COMMANDS = {
             "shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu); or carrier: the "
             "tetrahedra of a lattice over tetrahedra, each a material by its solid fraction",
         ),
+        option(
+            "--islands",
+            choices=("keep", "drop", "error"),
+            default="keep",
+            help="components other than the largest, which no support on that one holds: keep with a warning (default), drop, "
+            "or refuse",
+        ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
         option("--sets", type=names, metavar="NAMES", help="sets that must not be empty, by commas"),

@@ -154,7 +154,7 @@ def volume(args) -> None:
             made = solid.shell_mesh(args.edge, args.per_cell, args.order, args.threads, progress)
         else:
             size = args.edge, args.per_cell, args.wall
-            made = solid.volume_mesh(*size, args.order, args.of, args.periodic, args.threads, progress)
+            made = solid.volume_mesh(*size, args.order, args.of, args.periodic, args.threads, progress, args.islands)
     missing = [name for name in args.sets or () if name not in made.report().sets]
     if missing:
         raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
@@ -189,6 +189,9 @@ def check_elements(args) -> None:
         raise WrongUsage("a periodic mesh has steps of its own; leave out --hold and --load")
     if args.hold and args.of not in ("solid", "shell", "carrier"):
         raise WrongUsage(f"--hold and --load are for --of solid, shell or carrier, not {args.of}")
+    tets = args.voxels is None and args.of not in ("shell", "carrier")
+    if args.islands != "keep" and (not tets or args.periodic or args.of == "all"):
+        raise WrongUsage("--islands is for tetrahedra of one domain that is not periodic; leave it out")
     if args.voxels is None:
         if args.least is not None:
             raise WrongUsage("--least belongs to --voxels; add it")

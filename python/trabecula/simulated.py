@@ -65,6 +65,7 @@ class Simulated:
         periodic: bool = False,
         threads: int | None = None,
         progress: Progress | None = None,
+        islands: Literal["keep", "drop", "error"] = "keep",
     ) -> VolumeMesh:
         """Tetrahedra that conform to all surfaces, edges and corners of the solid, for finite elements.
 
@@ -80,14 +81,23 @@ class Simulated:
 
         ``periodic`` is for a box with whole cells: nodes and faces on opposite sides match in all bits.
 
-        Small loose components, flat tetrahedra at the boundary, and places where it touches itself are left out,
-        ``report().dropped`` is their volume. Warns of several components, of boundary triangles that cross, and of dihedral
-        angles below 12 or above 160 degrees. The same for any number of ``threads``. Raises ValueError for an edge greater than
-        the thinnest wall, a mesh beyond the memory there is, a side of what is no sheet, ``periodic`` where the solid is not.
+        Crumbs, flat tetrahedra at the boundary, and places where it touches itself are left out, ``report().dropped`` is their
+        volume. ``islands`` says what becomes of components other than the largest, which no support on that one holds:
+        ``"keep"``, with a warning; ``"drop"``; or ``"error"``; the last two of one domain that is not periodic.
+
+        Warns of boundary triangles that cross, and of dihedral angles below 12 or above 160 degrees. The same for any number of
+        ``threads``. Raises ValueError for an edge greater than the thinnest wall, a mesh beyond the memory there is, a side of
+        what is no sheet, ``periodic`` where the solid is not.
         """
         if of not in OF:
             raise ValueError(f'of is "{of}"; it must be {", ".join(OF[:-1])} or {OF[-1]}')
         order, periodic = _order(order), flag("periodic", periodic)
+        if islands not in ("keep", "drop", "error"):
+            raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+        one = of in ("solid", "lower", "upper") and not periodic
+        if islands != "keep" and (periodic or of == "all"):
+            what = "a periodic cell, whose components hold together across its faces" if periodic else "all domains together"
+            raise ValueError(f'islands is "{islands}"; of {what} it must be "keep"')
         size = self._volume_edge(edge, per_cell, wall)
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
@@ -106,9 +116,12 @@ class Simulated:
         if count > 3e8:
             raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
         fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
-        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, thread_count(threads), progress)
+        largest = islands == "drop"
+        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, largest, thread_count(threads), progress)
         made = VolumeMesh(core, self._core.design)
-        warn_flaws(made, one=of in ("solid", "lower", "upper") and not periodic)
+        if islands == "error" and (pieces := made.report().pieces) > 1:
+            raise ValueError(f"the mesh has {pieces} components that do not touch; drop or keep those other than the largest")
+        warn_flaws(made, one=one)
         return made
 
     def carrier(self, order: int = 1, threads: int | None = None) -> Carrier:

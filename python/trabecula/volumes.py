@@ -490,6 +490,7 @@ def warn_flaws(made: VolumeMesh, one: bool) -> None:
         found += [f"{off}: the edge is too long for it; use a smaller one"]
     if one and figures.pieces > 1:
         found += [f"the mesh has {figures.pieces} components that do not touch: loose ones are not held by supports on another"]
+        found[-1] += '; islands = "drop" (--islands drop) leaves all but the largest out'
     crossing = made.boundary().self_intersections
     if crossing:
         found += [f"{counted(crossing, 'pair')} of boundary triangles cross, where the void is narrow; use a smaller edge"]

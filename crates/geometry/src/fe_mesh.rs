@@ -74,19 +74,19 @@ impl FeMesh {
 
     /// Volume (mm³): ∫ det J over the elements, exact.
     pub fn volume(&self) -> f64 {
+        (0..self.tets.len()).map(|i| self.element_volume(i)).sum()
+    }
+
+    /// Volume of an element (mm³): ∫ det J, exact.
+    pub fn element_volume(&self, i: usize) -> f64 {
         if self.middles.is_empty() {
-            let of = |t: &[u32; 4]| crate::tetmesh::volume(t.map(|n| self.nodes[n as usize]));
-            return self.tets.iter().map(of).sum();
+            return crate::tetmesh::volume(self.tets[i].map(|n| self.nodes[n as usize]));
         }
         // Degree three: Keast 1986, in barycentric coordinates.
         const INNER: f64 = 1.0 / 6.0;
-        (0..self.tets.len())
-            .map(|i| {
-                let at = |c: usize| core::array::from_fn(|k| if k == c { 0.5 } else { INNER });
-                let four: f64 = (0..4).map(|c| self.jacobian(i, at(c))).sum();
-                (-0.8 * self.jacobian(i, [0.25; 4]) + 0.45 * four) / 6.0
-            })
-            .sum()
+        let at = |c: usize| core::array::from_fn(|k| if k == c { 0.5 } else { INNER });
+        let four: f64 = (0..4).map(|c| self.jacobian(i, at(c))).sum();
+        (-0.8 * self.jacobian(i, [0.25; 4]) + 0.45 * four) / 6.0
     }
 
     /// The least and greatest dihedral angle (degrees) between the planes of corners.

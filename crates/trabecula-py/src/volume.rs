@@ -34,10 +34,11 @@ impl VolumeMesh {
 
 #[pymethods]
 impl VolumeMesh {
-    /// Of a solid: edge of the background's cubes (mm), what is meshed, order of the tetrahedra, whether it is periodic.
+    /// Of a solid: edge of the background's cubes (mm), what is meshed, order of the tetrahedra, whether it is periodic, whether the
+    /// largest component alone is kept.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
-    #[pyo3(signature = (solid, edge, of="solid", order=1, periodic=false, threads=None, progress=None))]
+    #[pyo3(signature = (solid, edge, of="solid", order=1, periodic=false, largest=false, threads=None, progress=None))]
     fn make(
         py: Python<'_>,
         solid: &Solid,
@@ -45,13 +46,14 @@ impl VolumeMesh {
         of: &str,
         order: u8,
         periodic: bool,
+        largest: bool,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<VolumeMesh> {
         let Some((_, of)) = Of::NAMES.into_iter().find(|(name, _)| *name == of) else {
             return Err(PyValueError::new_err(format!("of is \"{of}\"; it must be solid, pore, lower, upper or all")));
         };
-        let options = Options { edge, of, order, periodic };
+        let options = Options { edge, of, order, periodic, largest };
         let made = run(py, threads, progress, |p| solid.built().volume_mesh(&options, p))?;
         Ok(VolumeMesh { made: made.map_err(error::stopped)? })
     }

@@ -7,7 +7,8 @@ use geometry::fault::{Fault, number};
 use geometry::fe_mesh::FeMesh;
 use geometry::math::{Aabb, Vec3};
 use geometry::progress::{Progress, Stopped};
-use geometry::tetmesh::FACES;
+use geometry::tetmesh::{self, FACES};
+use geometry::union_find::{find, singles, unite};
 use rayon::prelude::*;
 
 use crate::conforming_tets::{
@@ -45,6 +46,8 @@ pub struct Options {
     pub order: u8,
     /// Whether nodes and faces on opposite bounding planes match.
     pub periodic: bool,
+    /// Whether components other than the largest are left out: loose ones are held by no support. Of one domain that is not periodic.
+    pub largest: bool,
 }
 
 /// A volume mesh and how good it is.
@@ -60,6 +63,8 @@ pub struct Made {
     pub pieces: usize,
     /// Volume that was left out: small components, flat tetrahedra, and where the boundary would touch itself (mm³).
     pub dropped: f64,
+    /// Volume of the components other than the largest that were left out because that was asked for (mm³).
+    pub loose: f64,
     /// Edges of the background's cubes, stretched so that a whole number fits (mm).
     pub step: Vec3,
 }
@@ -138,12 +143,35 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     if options.of != Of::All {
         dropped += shaping.shell(false);
     }
+    let loose = if options.largest && one { keep_largest(&mut shaping) } else { 0.0 };
     if options.order == 1 {
         shaping.balance();
     }
     let mut made = assembled(shaping, &domains, (&planes, &bounds), named, options).map_err(Stopped::Refused)?;
-    (made.dropped, made.step) = (dropped, cubes.step());
+    (made.dropped, made.loose, made.step) = (dropped, loose, cubes.step());
     Ok(made)
+}
+
+/// Leaves out all components but that of the greatest volume, of equal ones the first; the volume of the others.
+fn keep_largest(shaping: &mut Shaping) -> f64 {
+    let mut root = singles(shaping.nodes.len());
+    let kept = |t: &&[u32; 4]| **t != GONE;
+    for t in shaping.tets.iter().filter(kept) {
+        t[1..].iter().for_each(|n| {
+            unite(&mut root, t[0], *n);
+        });
+    }
+    let mut volumes = vec![0.0; shaping.nodes.len()];
+    for (i, t) in (0..).zip(&shaping.tets).filter(|(_, t)| **t != GONE) {
+        volumes[find(&mut root, t[0]) as usize] += tetmesh::volume(shaping.corners(i));
+    }
+    let largest = (0..volumes.len()).fold(0, |m, i| if volumes[i] > volumes[m] { i } else { m }) as u32;
+    for t in shaping.tets.iter_mut().filter(|t| **t != GONE) {
+        if find(&mut root, t[0]) != largest {
+            *t = GONE;
+        }
+    }
+    volumes.iter().sum::<f64>() - volumes.get(largest as usize).copied().unwrap_or(0.0)
 }
 
 /// The planes at the region's bounds that all domains lie behind.
@@ -238,7 +266,7 @@ fn assembled(
     }
     let deviation = deviation::deviation(&mesh, &faces, domains);
     let pieces = components(&mesh.tets, mesh.nodes.len());
-    Ok(Made { mesh, deviation, straight, pieces, dropped: 0.0, step: [0.0; 3] })
+    Ok(Made { mesh, deviation, straight, pieces, dropped: 0.0, loose: 0.0, step: [0.0; 3] })
 }
 
 /// Removes nodes that no tetrahedron has; gives the cycles of images among the others.

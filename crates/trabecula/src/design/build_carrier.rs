@@ -29,7 +29,8 @@ pub(super) fn carrier(built: &Built, order: u8) -> Result<(Made, Vec<usize>), Fa
     let off = tiled.mesh.fit.as_ref().map_or(0.0, |fit| fit.to_part.max);
     let bent = tiled.tiling.map.off_region().filter(|_| order == 2).map(|off| off * edge);
     let pieces = tiled.mesh.quality.pieces;
-    let made = Made { mesh, deviation: bent.unwrap_or(off), straight: 0, pieces, dropped: 0.0, step: [edge; 3] };
+    let made =
+        Made { mesh, deviation: bent.unwrap_or(off), straight: 0, pieces, dropped: 0.0, loose: 0.0, step: [edge; 3] };
     Ok((made, zone_of))
 }
 

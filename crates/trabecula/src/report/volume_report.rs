@@ -36,6 +36,8 @@ pub struct VolumeReport {
     pub straight: usize,
     /// Volume left out, mm³: small loose components, flat tetrahedra, and those where the boundary would touch itself.
     pub dropped: f64,
+    /// Volume of the components other than the largest that were left out on request, mm³.
+    pub loose: f64,
     /// Number of nodes on upper bounding planes that are tied to their periodic images.
     pub pairs: usize,
     /// The domains by name.
@@ -162,7 +164,7 @@ impl From<&Made> for VolumeReport {
         let domains = mesh.domains.iter().enumerate().map(|(d, name)| {
             let of: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| mesh.domain[*t as usize] as usize == d).collect();
             let corners = |t: u32| mesh.tets[t as usize].map(|n| mesh.nodes[n as usize]);
-            let volume = |t: u32| geometry::tetmesh::volume(corners(t));
+            let volume = |t: u32| mesh.element_volume(t as usize);
             let largest = of.iter().copied().max_by(|a, b| volume(*a).total_cmp(&volume(*b)));
             let inside = largest.map_or([f64::NAN; 3], |t| {
                 let p = corners(t);
@@ -184,6 +186,7 @@ impl From<&Made> for VolumeReport {
             deviation: made.deviation,
             straight: made.straight,
             dropped: made.dropped,
+            loose: made.loose,
             pairs: mesh.pairs.len(),
             domains: domains.collect(),
             sets: sets.collect(),

@@ -19,7 +19,7 @@ fn made(region: &str, options: &Options) -> Made {
 const BOX: &str = "box = { min = [0, 0, 0], max = [4, 4, 4] }";
 
 fn options(edge: f64) -> Options {
-    Options { edge, of: Of::Solid, order: 1, periodic: false }
+    Options { edge, of: Of::Solid, order: 1, periodic: false, largest: false }
 }
 
 #[test]
@@ -76,4 +76,19 @@ fn nodes_of_a_lattice_over_tetrahedra_stay_in_the_region() {
     let bounds = Aabb { min: [-8.0, -8.0, 0.0], max: [8.0, 8.0, 4.0] }.grown(0.04);
     assert!(made.mesh.nodes.iter().all(|p| bounds.distance(*p) == 0.0));
     assert!(made.deviation < 1.0, "{}", made.deviation);
+}
+
+/// A graded sheet of which the box cuts off a chip at a corner: a component of its own, left out on request, to the volume.
+#[test]
+fn the_largest_component_alone_is_kept_on_request() {
+    let text = "schema = 1\nunits = \"mm\"\nregion.box.size = [12, 8, 8]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\n\
+                map.affine.wavelength = 4\nlevel.fraction = { linear = { along = [1, 0, 0], stops = [[-6, 0.15], [6, 0.55]] } }\n";
+    let design = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design");
+    let all = design.volume_mesh(&options(0.25), &Silent).expect("a mesh");
+    let one = design.volume_mesh(&Options { largest: true, ..options(0.25) }, &Silent).expect("a mesh");
+    assert!(all.pieces > 1 && one.pieces == 1, "{} {}", all.pieces, one.pieces);
+    assert!(one.loose > 0.0 && all.loose == 0.0);
+    // Faces apart are balanced each by itself: the chip's volume is that of its unbalanced chords.
+    let left = all.mesh.volume() - one.mesh.volume();
+    assert!((one.loose / left - 1.0).abs() < 0.1, "{} {left}", one.loose);
 }

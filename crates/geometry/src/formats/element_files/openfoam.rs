@@ -84,10 +84,14 @@ fn boundary(mesh: &FeMesh, of: &PolyFaces, out: &mut dyn Write) -> io::Result<()
     header(out, "polyBoundaryMesh", "boundary", "")?;
     writeln!(out, "{}\n(", of.patches.len())?;
     for patch in &of.patches {
-        let kind = match (&patch.cyclic, patch.name.as_str()) {
+        let name = patch.name.as_str();
+        let solid = matches!(name, "LATTICE" | "CUT" | "SKIN" | "NET" | "REST")
+            || name.starts_with("KEEP_")
+            || name.starts_with("CORE_");
+        let kind = match (&patch.cyclic, solid) {
             (Some(_), _) => "cyclic",
-            (None, "LATTICE" | "CUT" | "SKIN" | "REST") => "wall",
-            _ => "patch",
+            (None, true) => "wall",
+            (None, false) => "patch",
         };
         writeln!(out, "    {}\n    {{\n        type            {kind};", patch.name)?;
         writeln!(out, "        nFaces          {};\n        startFace       {};", patch.count, patch.start)?;
