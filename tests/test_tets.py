@@ -482,3 +482,39 @@ def test_coarse_steps_are_warned_of_with_the_step_that_suffices():
         warnings.simplefilter("error")
         fine = solid.mesh(edge=enough)
     assert fine.islands.found == 0 and abs(fine.volume / whole / 0.25 - 1) < 0.01
+
+
+def test_layers_lie_along_the_face_that_they_are_asked_for_on(tmp_path):
+    top = lt.region.box(min=[-9, -9, 3.9], max=[9, 9, 4.1])
+    layers = {"count": 2, "height": 1.2, "growth": 1.25, "on": top}
+    made = {"region": lt.region.box(size=[12, 12, 8]), "lattice": {"core": {"map": lt.map.tets(size=4, layers=layers)}}}
+    mesh = lt.TetMesh.of(made)
+    found = mesh.report()["layers"]
+    assert found["least"] == found["mean"] == 1.0 and found["prisms"] > 0
+    z = mesh.nodes[:, 2]
+    for depth in (0, 1.2, 2.7):  # as many nodes at the end of each layer as on the face
+        assert (abs(z - (4 - depth)) < 1e-9).sum() == (z == 4).sum()
+    thin = lt.TetMesh.of(
+        made
+        | {"region": lt.region.box(size=[12, 12, 3])}
+        | {"lattice": {"core": {"map": lt.map.tets(size=4, layers={"count": 2, "height": 1.2})}}}
+    )
+    assert any("leave no more room" in w["message"] for w in thin.report()["warnings"])
+    design = tmp_path / "design.toml"
+    design.write_text(DESIGN + 'mesher = "ftetwild"\nlayers = { count = 1, height = 0.3 }\n')
+    assert 'layers go with mesher = "background"' in command("tets", design, expected=1)[1]
+    design.write_text(DESIGN + "layers = { count = 1, height = 0.3, on = { box = { min = [8, 8, 8], max = [9, 9, 9] } } }\n")
+    assert "no triangle of the boundary has its middle in this region" in command("tets", design, expected=1)[1]
+
+
+def test_triangles_within_a_part_are_no_surface_to_be_near(tmp_path):
+    """Two boxes that overlap, in one file: the fit is that of their union."""
+    trimesh = pytest.importorskip("trimesh")
+    boxes = [trimesh.creation.box([10, 10, 10]), trimesh.creation.box([10, 10, 10])]
+    boxes[1].apply_translation([5, 4, 3])
+    trimesh.util.concatenate(boxes).export(tmp_path / "two.stl")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lt.DesignWarning)
+        part = lt.region.mesh(str(tmp_path / "two.stl"))
+        found = lt.TetMesh.of({"region": part, "lattice": {"core": {"map": lt.map.tets(size=4)}}}).report()
+    assert found["fit"]["from_part"]["max"] < 0.1 and found["fit"]["lost"] == []

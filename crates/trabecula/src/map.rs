@@ -63,7 +63,7 @@ pub use stretch::Stretch;
 pub use surface_frames::Aligned;
 pub use sweep::{Path, Sweep};
 pub use tet_map::Tets;
-pub use tets_kind::{Ends, Joined, MadeTetsKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind};
+pub use tets_kind::{Ends, Joined, LayersSpec, MadeTetsKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind};
 
 use std::sync::Arc;
 

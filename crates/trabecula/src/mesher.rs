@@ -18,7 +18,7 @@ mod bcc_grid;
 mod needs;
 mod region_fit;
 
-pub use crate::conforming_tets::ANGLES;
+pub use crate::conforming_tets::{ANGLES, MadeLayers, PrismLayers};
 pub use region_fit::{Fit, Uncovered, fit};
 
 /// Maximum number of tetrahedra.
@@ -33,16 +33,32 @@ const WIDE: f64 = 0.5;
 /// Least and greatest stretch of the lattice along an axis, so that both bounding planes are planes of it.
 const STRETCH: [f64; 2] = [0.67, 1.5];
 
+/// A mesh that was made.
+#[derive(Clone, Debug, Default)]
+pub struct Background {
+    /// The tetrahedra.
+    pub mesh: TetMesh,
+    /// The volume (mm³) left out where the boundary would be non-manifold, of flat tetrahedra at it, and of small detached fragments.
+    pub left_out: f64,
+    /// The layers of prisms, if any.
+    pub layers: Option<MadeLayers>,
+}
+
 /// The tetrahedral mesh of a region in `bounds`: tetrahedra of at most the volume of a regular one of edge `size` (mm), smaller where
 /// the surface is curved, whose faces, edges and corners are on those of the region. `inside` are uniformly spread points in the region,
-/// used to sample the size. Also the volume (mm³) left out where the boundary would be non-manifold, of flat tetrahedra at it, and of
-/// small detached fragments.
+/// used to sample the size.
 ///
 /// The result does not depend on the number of threads.
 ///
 /// **Errors**: a size that is not positive, a size so large that no tetrahedron fits, or so small that there are more
 /// than twenty million tetrahedra.
-pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, f64), Fault> {
+pub fn background(
+    region: &Region,
+    bounds: &Aabb,
+    size: &Grade,
+    inside: &[Vec3],
+    layers: Option<&PrismLayers>,
+) -> Result<Background, Fault> {
     let mut sizes = vec![0.0; inside.len()];
     size.values(inside, &mut sizes);
     let wrong = |v: &&f64| !(v.is_finite() && **v > 0.0);
@@ -65,20 +81,20 @@ pub fn background(region: &Region, bounds: &Aabb, size: &Grade, inside: &[Vec3])
         &|| Some(Cuts::as_one(region, true)),
         &|| Some(Cuts::as_one(region, false)),
     ];
-    let mut best = (TetMesh::default(), 0.0);
+    let mut best = Background::default();
     let mut least = usize::MAX;
     for cuts in ways.iter().filter_map(|way| way()) {
-        let made = cuts.mesh(region, grid.clone(), size, cube)?;
-        if made.1 <= LOSS * made.0.volume() && !made.0.tets.is_empty() {
+        let made = cuts.mesh(region, grid.clone(), size, cube, layers)?;
+        if made.left_out <= LOSS * made.mesh.volume() && !made.mesh.tets.is_empty() {
             return Ok(made);
         }
-        let locator = TetLocator::new(&made.0);
+        let locator = TetLocator::new(&made.mesh);
         let missed = inside.par_iter().filter(|p| !locator.covers(**p)).count();
         if missed < least {
             (best, least) = (made, missed);
         }
     }
-    if best.0.tets.is_empty() {
+    if best.mesh.tets.is_empty() {
         let message = format!(
             "no tetrahedron of size {} mm fits into the region; use a smaller one, at most half its thickness",
             number(largest)
@@ -125,14 +141,15 @@ impl Cuts {
         Cuts { surfaces, own: 1, patched: Vec::new(), trees: [CsgTree::Leaf(0)], finer }
     }
 
-    /// The lattice cut and improved, and the volume left out.
+    /// The lattice cut and improved, with layers.
     fn mesh(
         &self,
         region: &Region,
         mut grid: bcc_grid::Grid,
         size: &Grade,
         cube: f64,
-    ) -> Result<(TetMesh, f64), Fault> {
+        layers: Option<&PrismLayers>,
+    ) -> Result<Background, Fault> {
         let Cuts { surfaces, patched, trees, .. } = self;
         let needs = needs::Needs { region, surfaces: if self.finer { surfaces } else { &[] }, patched, size };
         grid.refine(MOST, |p| needs.coarse(p))?;
@@ -146,12 +163,12 @@ impl Cuts {
             partition.cut(s, cube);
         }
         let (shaping, dropped) = prepared(partition, true);
-        Ok(shaped(shaping, cube, dropped))
+        shaped(shaping, cube, dropped, layers)
     }
 }
 
-/// The mesh with its shapes improved, and the volume left out.
-fn shaped(mut shaping: Shaping, cube: f64, mut dropped: f64) -> (TetMesh, f64) {
+/// The mesh with its shapes improved and its layers made.
+fn shaped(mut shaping: Shaping, cube: f64, dropped: f64, layers: Option<&PrismLayers>) -> Result<Background, Fault> {
     let goes_on = || {
         checkpoint();
         true
@@ -160,9 +177,17 @@ fn shaped(mut shaping: Shaping, cube: f64, mut dropped: f64) -> (TetMesh, f64) {
     if shaping.follow_creases(cube) {
         shaping.improve(&goes_on);
     }
-    dropped += shaping.shell(true);
+    let shelled = shaping.shell(true);
+    let made = match layers {
+        None => None,
+        Some(layers) => {
+            let message = "no triangle of the boundary has its middle in this region; move it, or leave it out";
+            Some(shaping.layered(layers).ok_or_else(|| Fault::new("layers.on", message))?)
+        }
+    };
     let tets = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
-    (TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact(), dropped)
+    let mesh = TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact();
+    Ok(Background { mesh, left_out: dropped + shelled, layers: made })
 }
 
 /// The edges of the lattice's cubes, near the requested one, for which the region's bounding planes are planes of the lattice: of corners

@@ -13,7 +13,7 @@ use geometry::tetmesh::FACES;
 /// Shapes better than this are left as they are: dihedral angles of 22 to 149 degrees.
 pub(crate) const GOOD: f64 = 4.2;
 /// For shapes worse than this all directions are tried: dihedral angles of 15 to 159 degrees.
-const POOR: f64 = 1.9;
+pub(super) const POOR: f64 = 1.9;
 /// Rounds of moves, collapses and flips.
 const ROUNDS: usize = 8;
 /// Passes of moves in each.
@@ -135,7 +135,7 @@ impl<'a> Shaping<'a> {
     }
 
     /// The worst shape at a node and its images if it is displaced; `None` if it is no better than `bar`.
-    fn worst(&self, n: u32, by: Vec3, bar: f64) -> Option<f64> {
+    pub(super) fn worst(&self, n: u32, by: Vec3, bar: f64) -> Option<f64> {
         let mut worst = f64::INFINITY;
         for n in images(&self.next, n) {
             for t in &self.around[n as usize] {

@@ -7,8 +7,8 @@ use super::{Design, Loader, Node, Warning, ZoneNames, sample};
 use crate::environment::{self, Environment};
 use crate::grade::{Quantity, key_of};
 use crate::kind::{At, DesignError, Key, Kind};
-use crate::mesher::{self, Fit, background};
-use crate::report::{FitReport, TetMeshReport};
+use crate::mesher::{self, Background, Fit, MadeLayers, PrismLayers, background};
+use crate::report::{FitReport, LayersMade, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::surface_fit::{LostFeature, LostKind};
@@ -23,6 +23,8 @@ const DEEP: f64 = 0.17;
 const MUCH: f64 = 0.1;
 /// Distance above which the boundary is far off, in sizes; cells at cut edges are stretched to there.
 const FAR: f64 = 0.5;
+/// The share of the heights of layers below which it is warned of.
+const THINNED: f64 = 0.9;
 /// Number of lost features that a warning names.
 const NAMED: usize = 3;
 
@@ -50,6 +52,8 @@ pub struct TetReport {
     pub fit: Option<Fit>,
     /// Volume of that region, mm³.
     pub region_volume: Option<f64>,
+    /// Its layers of prisms.
+    pub layers: Option<MadeLayers>,
 }
 
 impl From<&TetReport> for TetMeshReport {
@@ -59,6 +63,7 @@ impl From<&TetReport> for TetMeshReport {
             quality: (&r.quality).into(),
             fit: r.fit.as_ref().map(FitReport::from),
             region_volume: r.region_volume,
+            layers: r.layers.map(|m| LayersMade { prisms: m.prisms, mean: m.mean, least: m.least, at: m.at }),
             warnings: None,
         }
     }
@@ -164,14 +169,23 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let bounds = environment.region.bounds();
     let mut names = Vec::new();
+    let mut notes = crate::region::Notes::default();
+    let mut layers = None;
     let (mut mesh, mended, checked, mesher) = match spec {
         TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
             let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsKind>("size")))?;
             if made.mesher == MesherKind::Background {
-                let (mesh, mended) = background(environment.region, &bounds, &size, &inside).map_err(wrong)?;
-                (mesh, mended, Checked::default(), "background".to_string())
+                let wanted = made.layers.as_ref().map(|l| prism_layers(l, environment, &mut notes)).transpose()?;
+                let made = background(environment.region, &bounds, &size, &inside, wanted.as_ref()).map_err(wrong)?;
+                layers = made.layers;
+                let Background { mesh, left_out, .. } = made;
+                (mesh, left_out, Checked::default(), "background".to_string())
             } else {
+                if made.layers.is_some() {
+                    let message = "layers go with mesher = \"background\"; leave out one of the two";
+                    return Err(DesignError::new(below("layers"), message));
+                }
                 let Some(size) = size.constant() else {
                     let message =
                         "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
@@ -188,7 +202,6 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
             (mesh, 0.0, checked, file.path.clone())
         }
     };
-    let mut notes = crate::region::Notes::default();
     if let TetsKind::Made(made) = spec {
         mesh.zones = zones(&mesh, made, &environment.path, environment.loader, Some(environment.region), &mut notes)?;
     }
@@ -203,8 +216,35 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, is_made)?;
     made.warnings.extend(notes.warnings);
     made.report.region_volume = Some(own);
+    made.report.layers = layers;
+    made.warnings.extend(layers.and_then(|l| thinned(&l, &environment.path)));
     made.names = names;
     Ok(made)
+}
+
+/// The layers that are asked for.
+fn prism_layers(
+    spec: &LayersSpec,
+    environment: &Environment,
+    notes: &mut crate::region::Notes,
+) -> Result<PrismLayers, DesignError> {
+    let path = format!("{}.layers.on", environment.path);
+    let region = |on| environment::region(on, &path, environment.loader, Some(environment.region), notes);
+    Ok(PrismLayers { ends: spec.ends(), on: spec.on.as_ref().map(region).transpose()? })
+}
+
+/// A warning of layers that are much thinner than asked for.
+fn thinned(made: &MadeLayers, path: &str) -> Option<Warning> {
+    (made.least < THINNED).then(|| Warning {
+        path: format!("{path}.layers"),
+        message: format!(
+            "layers have {:.0} % of their heights on average, and {:.0} % at ({}) mm: the tetrahedra there leave no more room; give \
+             fewer or lower ones, or a smaller size",
+            100.0 * made.mean,
+            100.0 * made.least,
+            made.at.map(|v| format!("{v:.3}")).join(", ")
+        ),
+    })
 }
 
 /// The edge of a regular tetrahedron of the mean volume (mm).
@@ -266,7 +306,7 @@ fn checked_mesh(
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
-    let report = TetReport { mesher, quality, fit, region_volume: None };
+    let report = TetReport { mesher, quality, fit, region_volume: None, layers: None };
     let warnings = warnings(&report, checked, path, is_made);
     Ok(Tets { mesh, names: Vec::new(), report, warnings })
 }

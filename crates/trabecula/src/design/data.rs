@@ -8,7 +8,7 @@ pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, OneOrThree, Table};
 pub use crate::map::{
-    AffineKind, Ends, Joined, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
+    AffineKind, Ends, Joined, LayersSpec, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
 };
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::math::Vec3;

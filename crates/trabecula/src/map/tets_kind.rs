@@ -34,9 +34,39 @@ pub struct MadeTetsKind {
     /// the first of several counts, and all others are of zone 0.
     #[kind(default, keyword)]
     pub zones: BTreeMap<u32, RegionKind>,
+    /// Layers of prisms along the part's surface, each prism cut into three tetrahedra.
+    pub layers: Option<Box<LayersSpec>>,
     /// How cells are joined.
     #[kind(flatten)]
     pub joined: Joined,
+}
+
+/// Layers of prisms along a part's surface.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct LayersSpec {
+    /// Number of layers.
+    #[kind(min = 1.0, max = 100.0)]
+    pub count: u32,
+    /// Height of the outermost.
+    #[kind(unit = "mm", above = 0.0)]
+    pub height: f64,
+    /// Height of each over that of the one outside it.
+    #[kind(min = 0.2, max = 5.0, default = 1.0)]
+    pub growth: f64,
+    /// Where they are: on triangles of the boundary whose middles are in this region; everywhere unless given.
+    pub on: Option<RegionKind>,
+}
+
+impl LayersSpec {
+    /// The depth of the end of each layer, mm.
+    pub fn ends(&self) -> Vec<f64> {
+        let heights = (0..self.count).map(|i| self.height * self.growth.powi(i as i32));
+        let sum = |depth: &mut f64, height: f64| {
+            *depth += height;
+            Some(*depth)
+        };
+        heights.scan(0.0, sum).collect()
+    }
 }
 
 /// The program that makes a tetrahedral mesh.

@@ -22,9 +22,25 @@ pub struct TetMeshReport {
     pub fit: Option<FitReport>,
     /// Volume of its region as described, mm³; None without one.
     pub region_volume: Option<f64>,
+    /// Its layers of prisms, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layers: Option<LayersMade>,
     /// Possible mistakes; None within the report of a design, which has them itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warnings: Option<Vec<Warning>>,
+}
+
+/// Layers of prisms along the surface of a tetrahedral mesh.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct LayersMade {
+    /// Number of prisms and wedges, each cut into tetrahedra.
+    pub prisms: usize,
+    /// Mean of their heights over those asked for.
+    pub mean: f64,
+    /// The least of these, where layers do not taper to their end.
+    pub least: f64,
+    /// Where it is, mm.
+    pub at: [f64; 3],
 }
 
 /// Minimum, mean and maximum.

@@ -12,6 +12,7 @@ mod fields;
 mod fixed_faces;
 mod flush;
 mod islands;
+mod layered_tets;
 mod load_cases;
 mod local_thickness;
 mod measured;

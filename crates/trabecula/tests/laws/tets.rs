@@ -32,7 +32,8 @@ fn inside(field: &dyn Field, bounds: &Aabb) -> Vec<Vec3> {
 fn mesh(region: &Region, size: &Grade) -> (TetMesh, Fit) {
     let bounds = region.bounds();
     let inside = inside(&**region, &bounds);
-    let (mesh, mended) = background(region, &bounds, size, &inside).expect("mesh");
+    let made = background(region, &bounds, size, &inside, None).expect("mesh");
+    let (mesh, mended) = (made.mesh, made.left_out);
     let fit = fit_of(&mesh, region, mended);
     (mesh, fit)
 }
@@ -165,7 +166,8 @@ fn the_bounds_of_angles_hold_for_smooth_surfaces() {
     for i in 0..cases(6) {
         let waves = (0..5).map(|_| (some.point(5.0), some.between(0.0, 6.3))).collect();
         let region: Region = Arc::new(Waves(waves));
-        let (mesh, _) = background(&region, &bounds, &Grade::Constant(0.4), &inside(&*region, &bounds)).expect("mesh");
+        let inside = inside(&*region, &bounds);
+        let mesh = background(&region, &bounds, &Grade::Constant(0.4), &inside, None).expect("mesh").mesh;
         sound(&format!("waves {i}"), &mesh);
         angles(&format!("waves {i}"), &mesh);
     }

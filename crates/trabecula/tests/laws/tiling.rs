@@ -240,7 +240,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
         .map(|p| [p[0] + 1.0, p[1] + 2.0, p[2] + 3.0])
         .collect();
     let size_mm = Grade::Constant(3.0);
-    let (mesh, _) = background(&region, &region.bounds(), &size_mm, &inside).expect("mesh");
+    let mesh = background(&region, &region.bounds(), &size_mm, &inside, None).expect("mesh").mesh;
     let (s, part, t) = cell("diamond");
     let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
     let maker = TilingSurface(&tiling);

@@ -20,7 +20,7 @@ use trabecula::tiling::{Level, Tiling, TilingSurface};
 
 fn mesh(region: &Region, size: f64) -> TetMesh {
     let inside = within(region, 5000, 4);
-    background(region, &region.bounds(), &Grade::Constant(size), &inside).expect("mesh").0
+    background(region, &region.bounds(), &Grade::Constant(size), &inside, None).expect("mesh").mesh
 }
 
 fn bent(region: &Region, size: f64, overlap: f64) -> Arc<Tets> {

@@ -1,0 +1,299 @@
+//! Layers of prisms along the boundary, each prism cut into three tetrahedra.
+//!
+//! The boundary stays as it is. Its nodes on the chosen faces are pushed into the mesh, whose shapes are improved on the way, and the
+//! space behind them is filled: a column of prisms over each face. At edges and corners of the part, columns meet in the bisecting
+//! plane; where other faces begin, their nodes move along these; where the choice ends within a smooth face, layers taper to wedges.
+//! A node that the mesh leaves no room for goes as far as it can, and its layers are thinner in proportion.
+//!
+//! Each quadrilateral between two prisms is cut from the lesser node outside to the greater inside, so that adjacent prisms agree
+//! (Dompierre, Labbé, Vallet, Camarero 1999).
+
+use super::chord_balance::interfaces;
+use super::node_surfaces::{HELD, SurfaceSet, onto};
+use super::shaping::{POOR, Shaping};
+use super::tet_shape::shape;
+use crate::region::Region;
+use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, cross, inverse, norm, scale, sub};
+use geometry::progress::checkpoint;
+use geometry::tetmesh::{FACES, volume};
+
+/// Rounds of pushing and improvement, and the parts of the way that are tried in each.
+const ROUNDS: usize = 24;
+const STEPS: [f64; 3] = [0.25, 0.125, 0.0625];
+/// Longest way of a node, in heights of all layers: that of a corner of 60 degrees.
+const LONGEST: f64 = 2.0;
+/// Damping of the equations of a node over their trace, and the number of times they are solved for what is left: ways across planes are
+/// exact to rounding, and none are long along the planes of a curved face, which are nearly the same (iterated Tikhonov regularisation).
+const DAMPING: f64 = 1e-3;
+const SOLUTIONS: usize = 6;
+
+/// The layers that are asked for.
+#[derive(Clone)]
+pub struct PrismLayers {
+    /// The depth of the end of each layer below the surface, ascending, mm.
+    pub ends: Vec<f64>,
+    /// Where they are: on faces of the boundary that have their middles in this region; everywhere without.
+    pub on: Option<Region>,
+}
+
+/// The layers that were made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MadeLayers {
+    /// Number of prisms and wedges.
+    pub prisms: usize,
+    /// The mean of the heights over those that are asked for, of nodes where layers do not taper.
+    pub mean: f64,
+    /// The least of these.
+    pub least: f64,
+    /// Where it is, mm.
+    pub at: Vec3,
+}
+
+/// A node of the boundary that is pushed inwards.
+struct Pushed {
+    node: u32,
+    /// Where it was, and where it goes to.
+    from: Vec3,
+    by: Vec3,
+    /// The surfaces along which it moves.
+    along: SurfaceSet,
+    /// How much of the way is behind it.
+    share: f64,
+}
+
+impl Pushed {
+    /// Its position at a share of the way; `None` if that is on none of its surfaces.
+    fn at(&self, shaping: &Shaping, share: f64) -> Option<Vec3> {
+        let p = add(self.from, scale(self.by, share));
+        if self.along == 0 { Some(p) } else { onto(shaping.surfaces, self.along, p, norm(self.by)) }
+    }
+}
+
+/// The shortest solution of the normal equations of a node, but for directions in which they say little.
+fn shortest(matrix: &Mat3, right: Vec3) -> Vec3 {
+    let trace: f64 = (0..3).map(|i| matrix[i][i]).sum();
+    let damped = inverse(&core::array::from_fn(|i| add(matrix[i], scale(IDENTITY[i], DAMPING * trace))));
+    let solved = (0..SOLUTIONS).fold([0.0; 3], |x, _| add(x, apply(&damped, sub(right, apply(matrix, x)))));
+    if solved.iter().all(|v| v.is_finite()) { solved } else { [0.0; 3] }
+}
+
+/// The nodes of a face in ascending order, and whether these too are counter-clockwise seen from outside.
+fn ascending([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut sorted = [a, b, c];
+    sorted.sort_unstable();
+    (sorted, [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted))
+}
+
+/// The three tetrahedra of a prism over a face, between two levels of the columns of its nodes in ascending order; of negative volume
+/// where these are counter-clockwise seen from outside.
+fn staircase<T: Copy>([a, b, c]: [[T; 2]; 3]) -> [[T; 4]; 3] {
+    [[a[0], b[0], c[0], c[1]], [b[0], a[0], b[1], c[1]], [a[0], a[1], b[1], c[1]]]
+}
+
+fn has_twice<T: PartialEq>(corners: &[T; 4]) -> bool {
+    (0..4).any(|i| (0..i).any(|j| corners[i] == corners[j]))
+}
+
+impl Shaping<'_> {
+    /// Makes the layers, of a mesh of one domain that is not periodic; `None` if no face of the boundary is chosen.
+    pub fn layered(&mut self, layers: &PrismLayers) -> Option<MadeLayers> {
+        let (chosen, others) = self.chosen_faces(layers.on.as_ref());
+        if chosen.is_empty() {
+            return None;
+        }
+        let depth = layers.ends.last().copied().unwrap_or(0.0);
+        let mut pushed = self.pushed(&chosen, &others, depth);
+        let boundary: Vec<(u32, SurfaceSet)> = pushed.iter().map(|p| (p.node, self.on[p.node as usize])).collect();
+        pushed.iter().for_each(|p| self.on[p.node as usize] = HELD);
+        self.push(&mut pushed, &chosen, &layers.ends);
+        for (p, (node, on)) in pushed.iter().zip(&boundary) {
+            self.on[*node as usize] = if p.share > 0.0 { p.along } else { *on };
+        }
+        let prisms = self.fill(&chosen, &pushed, &boundary, &layers.ends);
+        let whole: Vec<&Pushed> = pushed.iter().filter(|p| norm(p.by) > 0.0).collect();
+        let least = whole.iter().min_by(|p, q| p.share.total_cmp(&q.share).then(p.node.cmp(&q.node)));
+        Some(MadeLayers {
+            prisms,
+            mean: whole.iter().map(|p| p.share).sum::<f64>() / whole.len().max(1) as f64,
+            least: least.map_or(0.0, |p| p.share),
+            at: least.map_or([0.0; 3], |p| p.from),
+        })
+    }
+
+    /// The faces of the boundary that have their middles in a region, counter-clockwise seen from outside, and the others.
+    fn chosen_faces(&self, on: Option<&Region>) -> (Vec<[u32; 3]>, Vec<[u32; 3]>) {
+        let faces = interfaces(&self.tets, &self.domain, &|_| true);
+        let outward = faces.into_iter().map(|(_, at, _)| FACES[at as usize % 4].map(|c| self.tets[at as usize / 4][c]));
+        let third = |f: &[u32; 3]| scale(f.iter().fold([0.0; 3], |s, n| add(s, self.nodes[*n as usize])), 1.0 / 3.0);
+        outward.partition(|f| on.is_none_or(|on| on.value(third(f)) < 0.0))
+    }
+
+    /// The nodes of the chosen faces with their ways: to `depth` (mm) below all chosen faces about them, along the others.
+    fn pushed(&self, chosen: &[[u32; 3]], others: &[[u32; 3]], depth: f64) -> Vec<Pushed> {
+        let set = |f: &[u32; 3]| f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
+        let area = |f: &[u32; 3]| {
+            let [a, b, c] = f.map(|n| self.nodes[n as usize]);
+            cross(sub(b, a), sub(c, a))
+        };
+        let mut leave = vec![0; self.nodes.len()];
+        let mut along = vec![0; self.nodes.len()];
+        // Σ n nᵀ and Σ w n over the faces of a node.
+        let mut sums = vec![([[0.0; 3]; 3], [0.0; 3]); self.nodes.len()];
+        let mut plane = |f: &[u32; 3], wanted: f64| {
+            let normal = area(f);
+            let size = norm(normal);
+            if size <= 0.0 {
+                return;
+            }
+            let n = scale(normal, 1.0 / size);
+            for node in f {
+                let (matrix, right) = &mut sums[*node as usize];
+                (0..3).for_each(|i| matrix[i] = add(matrix[i], scale(n, n[i])));
+                *right = add(*right, scale(n, wanted));
+            }
+        };
+        for f in chosen {
+            plane(f, -depth);
+            f.iter().for_each(|n| leave[*n as usize] |= set(f) | HELD);
+        }
+        for f in others {
+            plane(f, 0.0);
+            f.iter().for_each(|n| along[*n as usize] |= if set(f) == 0 { HELD } else { set(f) });
+        }
+        let nodes = (0..self.nodes.len() as u32).filter(|n| leave[*n as usize] != 0);
+        let way = |node: u32| {
+            let (leave, along) = (leave[node as usize], along[node as usize]);
+            let from = self.nodes[node as usize];
+            let ends_here = along & leave != 0;
+            let (matrix, right) = sums[node as usize];
+            let by = if ends_here { [0.0; 3] } else { shortest(&matrix, right) };
+            let by = scale(by, (LONGEST * depth / norm(by).max(f64::MIN_POSITIVE)).min(1.0));
+            Pushed { node, from, by, along: along & !HELD, share: 0.0 }
+        };
+        nodes.map(way).collect()
+    }
+
+    /// Pushes nodes inwards as far as shapes stay fair and prisms have volume, and improves shapes in between.
+    fn push(&mut self, pushed: &mut [Pushed], chosen: &[[u32; 3]], ends: &[f64]) {
+        let goes_on = || true;
+        let mut number = vec![usize::MAX; self.nodes.len()];
+        pushed.iter().enumerate().for_each(|(i, p)| number[p.node as usize] = i);
+        let mut faces: Vec<Vec<[u32; 3]>> = vec![Vec::new(); pushed.len()];
+        for f in chosen {
+            f.iter().for_each(|n| faces[number[*n as usize]].push(*f));
+        }
+        let depth = ends.last().copied().unwrap_or(1.0);
+        let levels: Vec<f64> = core::iter::once(0.0).chain(ends.iter().map(|e| e / depth)).collect();
+        for _ in 0..ROUNDS {
+            checkpoint();
+            let (mut moved, mut left) = (false, false);
+            for i in 0..pushed.len() {
+                let p = &pushed[i];
+                if p.share >= 1.0 || norm(p.by) <= 0.0 {
+                    continue;
+                }
+                let (here, before) = (self.nodes[p.node as usize], p.share);
+                let mut may = |share: f64| {
+                    let to = pushed[i].at(self, share)?;
+                    self.worst(pushed[i].node, sub(to, here), POOR)?;
+                    pushed[i].share = share;
+                    let hollow = |f: &[u32; 3]| !self.has_volume(f.map(|n| &pushed[number[n as usize]]), *f, &levels);
+                    let fits = !faces[i].iter().any(hollow);
+                    pushed[i].share = before;
+                    fits.then_some((share, to))
+                };
+                let next = STEPS.iter().find_map(|s| may((before + s).min(1.0)));
+                let p = &mut pushed[i];
+                if let Some((share, to)) = next {
+                    p.share = share;
+                    self.nodes[p.node as usize] = to;
+                    for t in &self.around[p.node as usize] {
+                        self.shapes[*t as usize] = shape(self.tets[*t as usize].map(|n| self.nodes[n as usize]));
+                    }
+                    moved = true;
+                }
+                left |= p.share < 1.0;
+            }
+            if !moved {
+                break;
+            }
+            self.improve(&goes_on);
+            if !left {
+                break;
+            }
+        }
+    }
+
+    /// Whether all tetrahedra of the column over a face have volume, but those of which two corners are one.
+    fn has_volume(&self, pushed: [&Pushed; 3], face: [u32; 3], levels: &[f64]) -> bool {
+        let (sorted, outward) = ascending(face);
+        let columns = sorted.map(|n| pushed[face.iter().position(|m| *m == n).unwrap_or(0)]);
+        levels.windows(2).all(|between| {
+            let mut ends = [[[0.0; 3]; 2]; 3];
+            for (column, ends) in columns.iter().zip(&mut ends) {
+                for (level, end) in between.iter().zip(ends) {
+                    let Some(at) = column.at(self, column.share * level) else { return false };
+                    *end = at;
+                }
+            }
+            staircase(ends).into_iter().all(|mut corners| {
+                if outward {
+                    corners.swap(0, 1);
+                }
+                has_twice(&corners) || volume(corners) > 0.0
+            })
+        })
+    }
+
+    /// Fills the space behind the pushed nodes with a column of prisms over each face; their number. `boundary` has the surfaces on
+    /// which each node was.
+    fn fill(&mut self, chosen: &[[u32; 3]], pushed: &[Pushed], boundary: &[(u32, SurfaceSet)], ends: &[f64]) -> usize {
+        let depth = ends.last().copied().unwrap_or(1.0);
+        // The nodes of each pushed one from the surface inwards.
+        let mut columns: Vec<Vec<u32>> = vec![Vec::new(); self.nodes.len()];
+        for (p, (_, on)) in pushed.iter().zip(boundary) {
+            let mut column = Vec::with_capacity(ends.len() + 1);
+            for (level, end) in core::iter::once(&0.0).chain(ends).enumerate() {
+                let at = if level == 0 { Some(p.from) } else { p.at(self, p.share * end / depth) };
+                match at {
+                    Some(at) if p.share > 0.0 && level < ends.len() => {
+                        column.push(self.nodes.len() as u32);
+                        self.nodes.push(at);
+                        self.on.push(if level == 0 { *on } else { p.along });
+                        self.next.push(self.nodes.len() as u32 - 1);
+                        self.around.push(Vec::new());
+                    }
+                    _ => column.push(p.node),
+                }
+            }
+            columns[p.node as usize] = column;
+        }
+        let mut prisms = 0;
+        for face in chosen {
+            let (by_number, outward) = ascending(*face);
+            let [a, b, c] = by_number.map(|n| &columns[n as usize]);
+            for level in 0..ends.len() {
+                let before = self.tets.len();
+                let made = staircase([a, b, c].map(|column| [column[level], column[level + 1]]));
+                made.into_iter().for_each(|t| self.add_tet(t, outward));
+                prisms += usize::from(self.tets.len() > before);
+            }
+        }
+        prisms
+    }
+
+    /// Adds a tetrahedron, of a prism over a face that `outward` says to be counter-clockwise, unless two of its nodes are one.
+    fn add_tet(&mut self, mut t: [u32; 4], outward: bool) {
+        if has_twice(&t) {
+            return;
+        }
+        if outward {
+            t.swap(0, 1);
+        }
+        let number = self.tets.len() as u32;
+        t.iter().for_each(|n| self.around[*n as usize].push(number));
+        self.shapes.push(shape(t.map(|n| self.nodes[n as usize])));
+        self.domain.push(0);
+        self.tets.push(t);
+    }
+}
