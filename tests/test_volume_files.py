@@ -386,6 +386,11 @@ def test_the_command(tmp_path):
     figures = json.loads(done.stdout)
     assert {"elements", "nodes", "volume", "min_angle", "max_angle", "pairs", "sets"} <= set(figures)
     assert out.exists() and figures["sets"]["X0"]["faces"] > 0
+    # The folder of a case may be new, not those above it.
+    assert run(design, "-o", tmp_path / "case" / "part.foam", "--per-cell", 12).returncode == 0
+    assert (tmp_path / "case" / "part.foam").exists() and (tmp_path / "case" / "constant" / "polyMesh" / "points").exists()
+    deep = run(design, "-o", tmp_path / "no" / "case" / "part.foam", "--per-cell", 12)
+    assert deep.returncode == 1 and "no does not exist" in deep.stderr and not (tmp_path / "no").exists()
     empty = run(design, "-o", tmp_path / "no.inp", "--per-cell", 12, "--sets", "X0,SKIN")
     assert empty.returncode == 1 and "SKIN is empty" in empty.stderr and not (tmp_path / "no.inp").exists()
 
