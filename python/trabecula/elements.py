@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import shutil
@@ -53,7 +54,7 @@ HDF5 = ("med", "cgns")
 Named = tuple[int, str]
 
 #: The arrays of a file that was read.
-KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names")
+KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names", "sets")
 
 #: Bytes of memory that reading takes at most: of the interpreter with its packages, and for each byte of the file. A digit
 #: of a text may become a list's number of 32 bytes and its place in the list, twice over while lists grow.
@@ -97,15 +98,16 @@ def read(
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     needed(kind)
-    *arrays, named, names = arrays_of(name, limit)
+    found = arrays_of(name, limit)
+    *arrays, named, names, _ = found
     if kept is not None:
-        kept[:] = arrays
+        kept[:] = found
     return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
 
 
 @contextlib.contextmanager
 def keeping() -> Iterator[list[NDArray]]:
-    """A list in which are, once a file has been read within, the arrays that the core took the corners of."""
+    """A list in which are, once a file has been read within, the arrays ``KEYS`` that the core took the corners of."""
     global kept
     kept = found = []
     try:
@@ -133,8 +135,11 @@ def child(name: str, made: str, memory: str) -> None:
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # it talks, and leaves with sys.exit
-            mesh = meshio.read(with_all_nodes(name) if kind_of(name) == "inp" else name)
+            kind = kind_of(name)
+            mesh = meshio.read(with_all_nodes(name) if kind == "inp" else name, "gmsh" if kind == "msh2" else None)
         arrays = volumes(mesh)
+        # As text, since each set has other figures.
+        arrays += (np.array(json.dumps(sets_of(mesh, name, kind))),)
     except MemoryError:
         sys.exit(f"it takes more than {float(memory) / 1e9:.1f} GB of memory")
     except NoVolume as error:
@@ -145,6 +150,16 @@ def child(name: str, made: str, memory: str) -> None:
         # What else goes wrong quotes the file, which may be another than was meant.
         sys.exit(f"meshio finds no mesh in it ({type(error).__name__}); is it damaged?")
     np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+
+
+def sets_of(mesh: meshio.Mesh, name: str, kind: str) -> dict[str, dict[str, int]]:
+    """The named sets of the file; none where they are not as expected, since the mesh is there."""
+    from .file_sets import of_mesh
+
+    try:
+        return of_mesh(mesh, name, kind)
+    except (ValueError, LookupError, MemoryError):
+        return {}
 
 
 def with_all_nodes(name: str) -> str:

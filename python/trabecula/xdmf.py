@@ -45,6 +45,10 @@ def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray]
         attributes.append((name, "Node", flags))
     attributes += [(name, "Node" if len(v) == len(nodes) else "Cell", v) for name, v in fields.items()]
     lines = ['<Xdmf Version="3.0"><Domain><Grid Name="mesh" GridType="Uniform">']
+    if "domain" in cells:
+        # As meshio has names of numbers.
+        named = "".join(f'<map key="{name}" dim="3">{number}</map>' for number, name in enumerate(mesh.domains))
+        lines.append(f'<Information Name="domains" Value="{len(mesh.domains)}"><![CDATA[<main>{named}</main>]]></Information>')
     with whole_file(heavy) as temporary, h5py.File(temporary, "w") as store:
 
         def item(name: str, values: np.ndarray) -> str:
