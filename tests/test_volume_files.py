@@ -209,6 +209,7 @@ def test_meshio_reads_xdmf(tmp_path):
         assert read.cells[0].type == kind and (read.cells[0].data == mesh.elements).all()
         assert (read.points == mesh.nodes).all() and (read.point_data["depth"] == depth).all()
         assert set(np.flatnonzero(read.point_data["X0"])) == set(mesh.sets["X0"].nodes)
+        assert set(np.flatnonzero(read.cell_data["X0"][0])) == set(mesh.sets["X0"].elements)
         own = mesh.fraction if kind == "hexahedron" else mesh.domain
         assert (read.cell_data["fraction" if kind == "hexahedron" else "domain"][0] == own).all()
 
@@ -452,10 +453,10 @@ def test_sets_are_measured_as_far_as_a_format_has_them(tmp_path, kind):
     mesh.write(tmp_path / f"part.{kind}")
     found = measured(tmp_path / f"part.{kind}")["sets"]
     of = {name: {what: len(getattr(one, what)) for what in one._fields} for name, one in mesh.sets.items()}
-    has = {"inp": ["nodes", "elements", "faces"], "msh": ["faces"], "msh2": ["faces"], "mesh": ["faces"]}.get(kind, ["nodes"])
+    has = {"inp": ["nodes", "elements", "faces"], "xdmf": ["nodes", "elements"], "vtu": ["nodes"], "bdf": ["nodes"]}
     domains = {name: {"elements": int((mesh.domain == number).sum())} for number, name in enumerate(mesh.domains)}
     assert {name: found.pop(name) for name in mesh.domains} == domains
-    expected = {name: {what: counts[what] for what in has if counts[what]} for name, counts in of.items()}
+    expected = {name: {what: counts[what] for what in has.get(kind, ["faces"]) if counts[what]} for name, counts in of.items()}
     if kind in ("msh2", "mesh"):  # there a face is in the smallest of its sets
         assert found["LOWER_X0"] == expected["LOWER_X0"] and set(found) <= set(expected)
         every = np.concatenate([one.faces for one in mesh.sets.values()])

@@ -386,7 +386,7 @@ COMMANDS = {
         "Tetrahedra conform to all surfaces, edges and corners. Sets: X0 X1 Y0 Y1 Z0 Z1 (bounding planes), CUT (the region's\n"
         "boundary), LATTICE (the lattice's own surface), SKIN, KEEP_NAME, and NAME of each [set.NAME.REGION] in the design.\n"
         ".inp has the nodes, elements and faces of each set, .msh its faces, .msh2, .mesh and .foam those of its faces that\n"
-        "are in no smaller set, .vtu, .xdmf and .bdf its nodes.\n"
+        "are in no smaller set, .vtu and .bdf its nodes, .xdmf its nodes and elements.\n"
         "The .inp of a --periodic cell has equations and six steps, that of --hold and --load a step: they run as they are.\n"
         "--voxels makes hexahedra with their solid fractions (.inp, .msh, .msh2, .vtu, .xdmf). Beams alone are B31 or CBAR\n"
         "elements by trabecula mesh DESIGN -o OUT.inp --beams.\n\n"

@@ -24,6 +24,8 @@ HEADER = 1 << 20
 
 def of_mesh(mesh: meshio.Mesh, path: str, kind: str) -> Sets:
     """The sets of a file of this kind that meshio has read, but element sets of Abaqus, which are zones."""
+    import numpy as np
+
     if kind in ("msh", "msh2"):
         return gmsh.groups(path)
     if kind == "inp":
@@ -33,7 +35,9 @@ def of_mesh(mesh: meshio.Mesh, path: str, kind: str) -> Sets:
     if kind == "mesh":
         return medit(mesh, path)
     domains = {int(number): name for name, (number, _) in mesh.field_data.items()}
-    return merged(referenced(mesh, "domain", 3, domains, "elements"), flagged(mesh.point_data))
+    nodes = flagged(mesh.point_data)
+    own = flagged({name: np.concatenate(mesh.cell_data[name]) for name in nodes if name in mesh.cell_data}, "elements")
+    return merged(referenced(mesh, "domain", 3, domains, "elements"), nodes, own)
 
 
 def merged(first: Sets, *others: Sets) -> Sets:
@@ -45,10 +49,10 @@ def merged(first: Sets, *others: Sets) -> Sets:
     return found
 
 
-def flagged(arrays: dict[str, NDArray]) -> Sets:
-    """Arrays of nodes that are 1 in a set and 0 elsewhere."""
+def flagged(arrays: dict[str, NDArray], what: str = "nodes") -> Sets:
+    """Arrays that are 1 in a set and 0 elsewhere."""
     flags = {name: v for name, v in arrays.items() if v.ndim == 1 and v.dtype == "u1" and v.any() and v.max() == 1}
-    return {name: {"nodes": int(values.sum())} for name, values in flags.items()}
+    return {name: {what: int(values.sum())} for name, values in flags.items()}
 
 
 def lines(path: str) -> Iterator[str]:
