@@ -83,8 +83,7 @@ def converted(name, schema, required):
     if kind == "Stops":
         return f"Stops{optional}", f"{name}=pairs({name})"
     if "propertyNames" in of:
-        value = annotation(of["additionalProperties"])
-        return f"Mapping[int, {value}]{optional}", f"{name}=numbered({name})"
+        return f"Mapping[int, {annotation(of['additionalProperties'])}]{optional}", f"{name}={name}"
     if name == "path":
         form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
         return f"{PATH}{optional}", f"path={form}"
@@ -149,7 +148,7 @@ def module(definition, text):
     used = ["import os"] * ("os." in body)
     used.append("from collections.abc import " + ", ".join(n for n in ("Mapping", "Sequence") if f"{n}[" in body))
     used += ["from typing import Literal"] * ("Literal[" in body)
-    helpers = ["Points", "Stops", "control", "numbered", "pairs", "settings"]
+    helpers = ["Points", "Stops", "control", "pairs", "settings"]
     given = sorted(["named", *(n for n in helpers if (f": {n}" if n[0].isupper() else f"{n}(") in body)])
     lines += [*used, "", f"from .given import {', '.join(given)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")

@@ -71,6 +71,20 @@ def test_a_design_of_a_file_that_is_changed_is_what_it_says(tmp_path):
         lt.load(file)
 
 
+def test_zones_have_their_numbers():
+    number = next(iter(np.arange(1, 2)))
+    half = lt.region.halfspace(point=[0, 0, 0], normal=[-1, 0, 0])
+    built = {"cell": lt.cell.tet(zones={0: "p43m", number: "f43m"}), "map": lt.map.tets(size=3, zones={number: half})}
+    plain = {"cell": {"tet": {"zones": {0: "p43m", number: "f43m"}}}, "map": {"tets": {"size": 3, "zones": {number: half}}}}
+    more = {"part": "lower", "level": {"fraction": 0.3}}
+    first, second = (lt.Design(BOX, {"core": given | more}) for given in (built, plain))
+    assert first == second and set(second.lattice["core"]["cell"]["tet"]["zones"]) == {"0", "1"}
+    assert second.build().report().lattices["core"].tets.zones
+    for name in (None, 1.5, True):
+        with pytest.raises(lt.DesignError, match="is no text"):
+            lt.cell.tet(zones={name: "p43m"})
+
+
 @pytest.mark.parametrize("name", [1, None, 1.5, True, (1, 2)])
 def test_names_that_are_no_text_are_refused(name):
     with pytest.raises(lt.DesignError, match="is no text"):

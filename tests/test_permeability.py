@@ -142,6 +142,8 @@ def test_a_law_says_where_there_is_none():
         lt.law("gyroid", start=0.5, stop=0.2)
     with pytest.raises(ValueError, match=r'^cell: unknown cell "diamondx"; did you mean "diamond"\?'):
         lt.law("diamondx")
+    with pytest.raises(ValueError, match=r'^cell: unknown cell "nosuch"\. Allowed: gyroid, .*; of beams sc, bcc.*--tet'):
+        lt.law("nosuch")
     with pytest.raises(ValueError, match=r'^part: unknown part "x"'):
         lt.law("gyroid", "x")
 

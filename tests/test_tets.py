@@ -410,6 +410,56 @@ def test_element_sets_are_zones(tmp_path):
         zoned(path, {"core": "p43m", "rim": "f43m", "last": "f43m"})
 
 
+@pytest.mark.parametrize("kind", ["vtu", "msh", "inp", "mesh", "med"])
+def test_zones_come_back_from_what_is_written(tmp_path, kind):
+    """Their numbers from all formats, their names from those that have a place for them, with a warning from others."""
+    meshio = pytest.importorskip("meshio")
+    if kind == "med":
+        pytest.importorskip("h5py")
+    half = lt.region.halfspace(point=[0, 0, 0], normal=[-1, 0, 0])
+    made = lt.TetMesh.of(
+        {"schema": 1, "region": BALL["region"], "lattice": {"a": {"map": lt.map.tets(size=1.5, zones={3: half})}}}
+    )
+    assert set(made.zones) == {0, 3}
+    made.write(tmp_path / f"numbers.{kind}")
+    again = lt.TetMesh.read(tmp_path / f"numbers.{kind}")
+    assert (again.zones == made.zones).all() and again.zone_names == {}
+
+    points, cells = halves()
+    sets = {"core": [np.arange(3)], "rim": [np.arange(3, 6)], "last": [np.array([5])]}
+    meshio.write(tmp_path / "cube.inp", meshio.Mesh(points, cells, cell_sets=sets))
+    tags = [np.array([-6, -6, -6, -7, -7, -7])]
+    cube = meshio.Mesh(points, cells, cell_data={"cell_tags": tags})
+    cube.cell_tags = {-6: ["core"], -7: ["rim", "outside"]}
+    for mesh in [cube] * (kind == "med"):
+        meshio.med.write(tmp_path / "cube.med", mesh)
+    for name in ["cube.inp"] + ["cube.med"] * (kind == "med"):
+        named = lt.TetMesh.read(tmp_path / name)
+        lost = {"vtu": {"core", "last", "rim"}, "mesh": {"core", "last", "rim"}, "msh": {"rim"}}.get(kind, set())
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            named.write(tmp_path / f"named.{kind}")
+        assert [name for name in ("core", "last", "rim") if any(name in str(w.message) for w in heard)] == sorted(lost)
+        again = lt.TetMesh.read(tmp_path / f"named.{kind}")
+        assert again.zones.tolist() == named.zones.tolist()
+        assert again.zone_names == {name: of for name, of in named.zone_names.items() if name not in lost}
+
+
+def test_names_of_zones_that_no_format_takes_are_written_otherwise(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    pytest.importorskip("h5py")
+    points, cells = halves()
+    mesh = meshio.Mesh(points, cells, cell_data={"cell_tags": [np.array([-1, -1, -1, -2, -2, -2])]})
+    mesh.cell_tags = {-1: ["a,b=1"], -2: ["ZONE_9", "rim"]}
+    meshio.med.write(tmp_path / "cube.med", mesh)
+    read = lt.TetMesh.read(tmp_path / "cube.med")
+    assert read.zones.tolist() == [-1, -1, -1, 9, 9, 9] and read.zone_names == {"a,b=1": [-1], "rim": [9]}
+    for kind in ("inp", "msh", "med"):
+        with pytest.warns(lt.DesignWarning, match="cannot hold the name a,b=1 of zones as it is"):
+            read.write(tmp_path / f"out.{kind}")
+        assert lt.TetMesh.read(tmp_path / f"out.{kind}").zone_names == {"a-b-1": [-1], "rim": [9]}
+
+
 def test_families_are_zones_by_number_and_by_name(tmp_path):
     meshio = pytest.importorskip("meshio")
     pytest.importorskip("h5py")

@@ -12,6 +12,7 @@ import pytest
 import trabecula as lt
 from conftest import in_process
 from finite_elements import area_of, faces_of, solid
+from trabecula.file_sets import of_vtu
 from trabecula.local_fields import FIELDS, fields_at
 from trabecula.quadratic import curved
 
@@ -208,6 +209,7 @@ def test_meshio_reads_xdmf(tmp_path):
         assert read.cells[0].type == kind and (read.cells[0].data == mesh.elements).all()
         assert (read.points == mesh.nodes).all() and (read.point_data["depth"] == depth).all()
         assert set(np.flatnonzero(read.point_data["X0"])) == set(mesh.sets["X0"].nodes)
+        assert set(np.flatnonzero(read.cell_data["X0"][0])) == set(mesh.sets["X0"].elements)
         own = mesh.fraction if kind == "hexahedron" else mesh.domain
         assert (read.cell_data["fraction" if kind == "hexahedron" else "domain"][0] == own).all()
 
@@ -386,6 +388,11 @@ def test_the_command(tmp_path):
     figures = json.loads(done.stdout)
     assert {"elements", "nodes", "volume", "min_angle", "max_angle", "pairs", "sets"} <= set(figures)
     assert out.exists() and figures["sets"]["X0"]["faces"] > 0
+    # The folder of a case may be new, not those above it.
+    assert run(design, "-o", tmp_path / "case" / "part.foam", "--per-cell", 12).returncode == 0
+    assert (tmp_path / "case" / "part.foam").exists() and (tmp_path / "case" / "constant" / "polyMesh" / "points").exists()
+    deep = run(design, "-o", tmp_path / "no" / "case" / "part.foam", "--per-cell", 12)
+    assert deep.returncode == 1 and "no does not exist" in deep.stderr and not (tmp_path / "no").exists()
     empty = run(design, "-o", tmp_path / "no.inp", "--per-cell", 12, "--sets", "X0,SKIN")
     assert empty.returncode == 1 and "SKIN is empty" in empty.stderr and not (tmp_path / "no.inp").exists()
 
@@ -435,7 +442,60 @@ def test_a_file_of_tetrahedra_is_measured(tmp_path):
     }
 
 
-@pytest.mark.parametrize("kind", ["inp", "msh", "vtu", "bdf"])
+@pytest.mark.parametrize("kind", ["inp", "msh", "msh2", "vtu", "xdmf", "bdf", "mesh"])
+def test_sets_are_measured_as_far_as_a_format_has_them(tmp_path, kind):
+    pytest.importorskip("meshio")
+    pytest.importorskip("h5py")
+    bolt = {"bolt": {"cylinder": {"base": [0, 0, -2], "radius": 0.5, "height": 4}}}
+    mesh = solid(set={"Top_2": lt.region.halfspace(point=[0, 0, 1], normal=[0, 0, -1])}, keep=bolt).volume_mesh(
+        per_cell=12, of="all"
+    )
+    mesh.write(tmp_path / f"part.{kind}")
+    found = measured(tmp_path / f"part.{kind}")["sets"]
+    of = {name: {what: len(getattr(one, what)) for what in one._fields} for name, one in mesh.sets.items()}
+    has = {"inp": ["nodes", "elements", "faces"], "xdmf": ["nodes", "elements"], "vtu": ["nodes"], "bdf": ["nodes"]}
+    domains = {name: {"elements": int((mesh.domain == number).sum())} for number, name in enumerate(mesh.domains)}
+    assert {name: found.pop(name) for name in mesh.domains} == domains
+    expected = {name: {what: counts[what] for what in has.get(kind, ["faces"]) if counts[what]} for name, counts in of.items()}
+    if kind in ("msh2", "mesh"):  # there a face is in the smallest of its sets
+        assert found["LOWER_X0"] == expected["LOWER_X0"] and set(found) <= set(expected)
+        every = np.concatenate([one.faces for one in mesh.sets.values()])
+        assert sum(one["faces"] for one in found.values()) == len(np.unique(every, axis=0))
+    else:
+        assert found == expected
+
+
+def test_sets_of_other_programs_are_measured(tmp_path):
+    """Binary files of Gmsh, where one name may be of a surface and of a volume; nothing is said of what is not understood."""
+    gmsh = pytest.importorskip("gmsh")
+    pytest.importorskip("meshio")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1, 2], name="ends")
+        gmsh.model.addPhysicalGroup(2, [2], name="one")
+        gmsh.model.addPhysicalGroup(3, [1], name="ends")
+        gmsh.model.mesh.generate(3)
+        (_, tets) = gmsh.model.mesh.getElementsByType(4)
+        faces = [len(gmsh.model.mesh.getElements(2, side)[1][0]) for side in (1, 2)]
+        for version in (2.2, 4.1):
+            for binary in (0, 1):
+                gmsh.option.setNumber("Mesh.MshFileVersion", version)
+                gmsh.option.setNumber("Mesh.Binary", binary)
+                path = tmp_path / f"v{version}-{binary}.msh"
+                gmsh.write(str(path))
+                found = measured(path)["sets"]
+                assert found["ends"] == {"faces": sum(faces), "elements": len(tets) // 4}, (version, binary, found)
+                assert found["one"] == {"faces": faces[1]}
+    finally:
+        gmsh.finalize()
+    (tmp_path / "damaged.vtu").write_bytes(b'<VTKFile header_type="UInt64"><AppendedData encoding="raw">_')
+    assert of_vtu(str(tmp_path / "damaged.vtu")) == {}
+
+
+@pytest.mark.parametrize("kind", ["inp", "msh", "msh2", "vtu", "xdmf", "bdf"])
 def test_quadratic_tetrahedra_are_measured_as_they_are(tmp_path, kind):
     pytest.importorskip("meshio")
     mesh = solid().volume_mesh(per_cell=12, order=2)

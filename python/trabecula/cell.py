@@ -111,11 +111,9 @@ def tet(
     Your own is what a regular tetrahedron of ``edge`` (in edges of the cubic cell) about ``site`` (turns) cuts out of the sum
     of ``terms`` over ``group``, which must have full tetrahedral symmetry there; ``dual`` turns the tetrahedron upside down.
     """
-    given = settings(name=name, group=group, site=site, dual=dual, edge=edge)
+    given = settings(name=name, group=group, site=site, dual=dual, edge=edge, zones=zones)
     if terms is not None:
         given["terms"] = list(terms)
-    if zones is not None:
-        given["zones"] = {str(zone): name for zone, name in zones.items()}
     return {"tet": given}
 
 

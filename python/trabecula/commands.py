@@ -21,7 +21,7 @@ from .slicing import slice
 from .starter import starter
 from .terminal import Progress, figure, put_json, say, settle, warned
 from .texts import counted
-from .volumes import check_order, check_steps
+from .volumes import check_case, check_order, check_steps
 
 # fmt: off
 __all__ = [
@@ -132,7 +132,7 @@ def voxels(args) -> None:
 
 def volume(args) -> None:
     """``trabecula volume``."""
-    check_place(args.output)
+    (check_case if kind_of(args.output) == "foam" else check_place)(args.output)
     keep_file(args.design, args.output)
     check_elements(args)
     check_sets(args)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import shutil
 import sys
 import tempfile
+import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from . import children
+from .errors import DesignWarning
 from .formats import MESHIO_READS, MESHIO_WRITES, TET_READS, dotted, kind_of
 
 if TYPE_CHECKING:
@@ -38,12 +41,20 @@ VOLUMES = {
 ZONES = ("zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "material", "zones")
 
 
+#: A name that is the number of a zone.
+NUMBER = re.compile(r"ZONE_(-?\d{1,9})")
+#: What names in files must not have, and what would make a name that is none a number.
+UNFIT = re.compile(r"[^ -~]|[\"'\\,=/*]|(?<=^ZONE)_(?=-?\d{1,9}$)")
+
 #: Formats that are HDF5 inside, which meshio reads and writes by another package.
 HDF5 = ("med", "cgns")
 
 
+#: The number of a zone and one of its names.
+Named = tuple[int, str]
+
 #: The arrays of a file that was read.
-KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names")
+KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names", "sets")
 
 #: Bytes of memory that reading takes at most: of the interpreter with its packages, and for each byte of the file. A digit
 #: of a text may become a list's number of 32 bytes and its place in the list, twice over while lists grow.
@@ -73,7 +84,7 @@ def needed(kind: str = ""):
 
 def read(
     path: str | os.PathLike[str], limit: float | None = None
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, list[tuple[int, str]]]:
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, list[Named]]:
     """Points (n, 3), the points of all volume cells one after the other, where each ends, its kind (VTK's number), its zone (a
     number), and the names of zones as pairs (number, name).
 
@@ -87,15 +98,16 @@ def read(
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     needed(kind)
-    *arrays, named, names = arrays_of(name, limit)
+    found = arrays_of(name, limit)
+    *arrays, named, names, _ = found
     if kept is not None:
-        kept[:] = arrays
+        kept[:] = found
     return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
 
 
 @contextlib.contextmanager
 def keeping() -> Iterator[list[NDArray]]:
-    """A list in which are, once a file has been read within, the arrays that the core took the corners of."""
+    """A list in which are, once a file has been read within, the arrays ``KEYS`` that the core took the corners of."""
     global kept
     kept = found = []
     try:
@@ -123,8 +135,11 @@ def child(name: str, made: str, memory: str) -> None:
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # it talks, and leaves with sys.exit
-            mesh = meshio.read(with_all_nodes(name) if kind_of(name) == "inp" else name)
+            kind = kind_of(name)
+            mesh = meshio.read(with_all_nodes(name) if kind == "inp" else name, "gmsh" if kind == "msh2" else None)
         arrays = volumes(mesh)
+        # As text, since each set has other figures.
+        arrays += (np.array(json.dumps(sets_of(mesh, name, kind))),)
     except MemoryError:
         sys.exit(f"it takes more than {float(memory) / 1e9:.1f} GB of memory")
     except NoVolume as error:
@@ -135,6 +150,16 @@ def child(name: str, made: str, memory: str) -> None:
         # What else goes wrong quotes the file, which may be another than was meant.
         sys.exit(f"meshio finds no mesh in it ({type(error).__name__}); is it damaged?")
     np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+
+
+def sets_of(mesh: meshio.Mesh, name: str, kind: str) -> dict[str, dict[str, int]]:
+    """The named sets of the file; none where they are not as expected, since the mesh is there."""
+    from .file_sets import of_mesh
+
+    try:
+        return of_mesh(mesh, name, kind)
+    except (ValueError, LookupError, MemoryError):
+        return {}
 
 
 def with_all_nodes(name: str) -> str:
@@ -207,12 +232,12 @@ def volumes(mesh: meshio.Mesh) -> tuple[NDArray, ...]:
         held = ", ".join(sorted({block.type for block in mesh.cells})) or "nothing"
         raise NoVolume(f"it holds no volume (but {held:.60}); tetrahedra are needed")
     flat = np.concatenate(cells), np.cumsum(np.concatenate(ends), dtype=np.uint64), np.concatenate(kinds)
-    zones, names = zones_of(mesh, blocks)
+    zones, names = numbered(*zones_of(mesh, blocks))
     named = np.array([number for number, _ in names], dtype=np.int64)
     return np.ascontiguousarray(points), *flat, zones, named, np.array([name for _, name in names], dtype=np.str_)
 
 
-def zones_of(mesh: meshio.Mesh, blocks: list[int]) -> tuple[NDArray, list[tuple[int, str]]]:
+def zones_of(mesh: meshio.Mesh, blocks: list[int]) -> tuple[NDArray, list[Named]]:
     """The zone of each cell of these blocks, a number, or none, and the names of zones as pairs (number, name).
 
     Numbers are the file's own. Where it has sets of elements, cells of equal number in different sets get numbers of their
@@ -273,18 +298,66 @@ def members(mesh: meshio.Mesh, name: str, blocks: list[int]) -> NDArray:
     return np.concatenate(parts)
 
 
-def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uint32], zones: NDArray[np.int64]) -> None:
-    """Writes tetrahedra as a file of the format that ``kind`` (an extension) names."""
+def numbered(zones: NDArray, names: list[Named]) -> tuple[NDArray, list[Named]]:
+    """Zones with the numbers that ``write`` put into names, and the other names."""
+    import numpy as np
+
+    found = [(number, int(match[1])) for number, name in names if (match := NUMBER.fullmatch(name))]
+    own = {number: number for number in np.unique(zones).tolist()} | dict(found)
+    if not found or len(dict(found)) < len(found) or len(set(own.values())) < len(own):
+        return zones, names
+    rest = [(own[number], name) for number, name in names if not NUMBER.fullmatch(name)]
+    return np.vectorize(own.get, otypes=[np.int64])(zones), rest
+
+
+def kept_names(kind: str, names: list[Named]) -> list[Named]:
+    """The names of zones as a file of this format has them; warns of those that are other than before, or left out."""
+    plain = [(number, UNFIT.sub("-", name)[:80].strip()) for number, name in names]
+    if kind == "msh":
+        several = {name for number, name in plain if any(other == name and n != number for n, other in plain)}
+        plain = [(number, name) for number, name in plain if name not in several]
+    elif kind in ("mesh", "vtu"):
+        plain = []
+    lost = sorted({name for _, name in names} - {name for _, name in plain})
+    if lost:
+        warnings.warn(
+            f"a .{kind} cannot hold {'the name' if len(lost) == 1 else 'the names'} {', '.join(lost):.300} of zones as "
+            f"{'it is' if len(lost) == 1 else 'they are'}; numbers are kept",
+            DesignWarning,
+            stacklevel=3,
+        )
+    return plain
+
+
+def write(
+    path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uint32], zones: NDArray[np.int64], names: list[Named]
+) -> None:
+    """Writes tetrahedra as a file of the format that ``kind`` (an extension) names, with their zones and those ``names`` of
+    zones that it can hold (``kept_names``).
+    """
     meshio = needed(kind)
     import numpy as np
 
-    data = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
     form = MESHIO_WRITES[kind]
-    whole = zones.astype(np.int32) if len(zones) else np.zeros(len(tets), dtype=np.int32)
-    fields = {data[form]: [whole]} if form in data and len(zones) else {}
+    mesh = meshio.Mesh(nodes, [("tetra", tets.astype(np.int64))])
+    numbers = [int(number) for number in np.unique(zones)]
     if form == "gmsh":
-        fields = {"gmsh:physical": [whole], "gmsh:geometrical": [whole]}
-    mesh = meshio.Mesh(nodes, [("tetra", tets.astype(np.int64))], cell_data=fields)
+        whole = zones.astype(np.int32) if len(zones) else np.zeros(len(tets), dtype=np.int32)
+        mesh.cell_data = {"gmsh:physical": [whole], "gmsh:geometrical": [whole]}
+        mesh.field_data = {name: np.array([number, 3]) for number, name in names}
+    elif form == "medit" and len(zones):
+        mesh.cell_data = {"medit:ref": [zones.astype(np.int32)]}
+    elif form == "abaqus":
+        of = {f"ZONE_{number}": [number] for number in numbers}
+        for number, name in names:
+            of.setdefault(name, []).append(number)
+        mesh.cell_sets = {name: [np.flatnonzero(np.isin(zones, own))] for name, own in of.items()}
+    elif form == "med" and numbers:
+        # Families of elements have numbers below 0.
+        family = {n: n if n < 0 else min(0, numbers[0]) - 1 - n for n in numbers}
+        mesh.cell_data = {"cell_tags": [np.vectorize(family.get)(zones)]}
+        own = {number: [name for n, name in names if n == number] for number in numbers}
+        mesh.cell_tags = {family[n]: of + [f"ZONE_{n}"] * (n >= 0 or not of) for n, of in own.items()}
     more = {"file_format": "gmsh22", "binary": True} if form == "gmsh" else {"file_format": form}
     if kind not in HDF5:
         meshio.write(path, mesh, **more)

@@ -77,10 +77,10 @@ VOLUME_WRITES = tuple(VOLUMES)
 SHELL_WRITES = tuple(suffix for suffix, _ in _core.shell_formats())
 VOXEL_ELEMENT_WRITES = (*dict(_core.voxel_element_formats()), "xdmf")
 #: Those that are read back.
-VOLUME_READS = ("inp", "msh", "vtu", "bdf", "mesh")
+VOLUME_READS = ("inp", "msh", "msh2", "vtu", "xdmf", "bdf", "mesh")
 #: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
 MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
-MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+MESHIO_READS = (*MESHIO_WRITES, "msh2", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
 #: Formats of results: those of the core, and those that results.py reads.
 RESULT_READS = ("vtu", "vtk", "vti", "frd", "med", "rmed", "e", "exo", "msh", "xdmf", "avs")
 TET_READS = ("vtu", "vtk", "frd", *MESHIO_READS)

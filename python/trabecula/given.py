@@ -7,6 +7,7 @@ import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence, Set
+from numbers import Integral
 
 from .errors import DesignError
 
@@ -29,7 +30,6 @@ __all__ = [
     "flag",
     "named",
     "number",
-    "numbered",
     "pairs",
     "plain",
     "poisson",
@@ -169,11 +169,13 @@ def plain(value: Any) -> Any:
 
 def settings(**given: Any) -> dict:
     """Copies of the settings that were given."""
-    return {k: copied(v) for k, v in given.items() if v is not None}
+    return copied({k: v for k, v in given.items() if v is not None})
 
 
 def copied(data: Any, depth: int = 0) -> Any:
-    """A copy of data in lists and dictionaries, arrays, tuples, ranges as lists. A DesignError for a name that is no text."""
+    """A copy of data in lists and dictionaries, arrays, tuples, ranges as lists. Numbers of zones become text, as in TOML; a
+    DesignError for any other name that is no text.
+    """
     if depth > DEPTH:
         raise DesignError(f"a design is at most {DEPTH} levels deep; does it hold itself?")
     data = plain(data)
@@ -181,8 +183,15 @@ def copied(data: Any, depth: int = 0) -> Any:
         for name in data:
             if not isinstance(name, str):
                 raise DesignError(f"the name {name!r} is no text; names of a design's keys, lattices and regions are")
-        return {k: copied(v, depth + 1) for k, v in data.items()}
+        return {k: copied(zones(v) if k == "zones" else v, depth + 1) for k, v in data.items()}
     return [copied(v, depth + 1) for v in data] if isinstance(data, list) else data
+
+
+def zones(given: Any) -> Any:
+    """The table of zones with their numbers as text; what is no table as it is."""
+    if not isinstance(given, Mapping):
+        return given
+    return {str(k) if isinstance(k, Integral) and not isinstance(k, bool) else k: v for k, v in given.items()}
 
 
 def pairs(given: Stops | None) -> list | None:
@@ -197,11 +206,6 @@ def control(points: Points) -> dict:
     if isinstance(points, (str, os.PathLike)):
         return {"path": os.fspath(points)}
     return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
-
-
-def numbered(given: Mapping[int, Any] | None) -> dict | None:
-    """A table whose keys are whole numbers."""
-    return None if given is None else {str(number): value for number, value in given.items()}
 
 
 def thread_count(threads: int | None) -> int | None:

@@ -1,15 +1,18 @@
-"""Results in Gmsh's format 2.2 and 4.1, text or binary: $NodeData and $ElementData."""
+"""Results and physical groups in Gmsh's format 2.2 and 4.1, text or binary."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from .results import Array, Mesh, Unreadable, selected
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-__all__ = ["read"]
+__all__ = ["groups", "read"]
 
 #: Points of each type of element.
 POINTS = {
@@ -35,13 +38,15 @@ KINDS = {
     14: 14,
     19: 14,
 }
+#: Triangles and quadrilaterals.
+FLAT = (2, 3, 9, 10, 16, 20, 21, 22, 23, 24, 25)
 
 
 class Source:
     """The bytes of a file, taken number by number."""
 
     def __init__(self, data: bytes) -> None:
-        self.data, self.at, self.binary, self.wide = data, 0, False, "u8"
+        self.data, self.at, self.new, self.binary, self.wide = data, 0, True, False, "u8"
 
     def line(self) -> str:
         end = self.data.find(b"\n", self.at)
@@ -98,6 +103,23 @@ class Numbers:
         return [table[f"c{i}"] for i in range(len(columns))]
 
 
+def sections(source: Source) -> Iterator[str]:
+    """The names of the sections that follow the first, each while its contents come next."""
+    while source.at < len(source.data):
+        line = source.line()
+        if line == "$MeshFormat":
+            version, binary, size = source.line().split()[:3]
+            if version not in ("2.2", "4.1"):
+                raise Unreadable(f"it has version {version[:8]} of the format; save it as 4.1")
+            source.new, source.binary, source.wide = version == "4.1", binary == "1", f"u{size}"
+            if source.binary and source.data[source.at : source.at + 4] != b"\1\0\0\0":
+                raise Unreadable("its numbers are binary of another machine; save it as text")
+            source.skip("MeshFormat")
+        elif line.startswith("$") and not line.startswith("$End"):
+            yield line[1:]
+            source.skip(line[1:])
+
+
 def read(name: str, wanted: str) -> Mesh:
     """The mesh of a file and its data: of several steps the one whose number is asked for, or the last. Data go to nodes and
     elements by their numbers; what has none gets no numbers."""
@@ -105,26 +127,15 @@ def read(name: str, wanted: str) -> Mesh:
 
     with open(name, "rb") as file:
         source = Source(file.read())
-    nodes, elements, found, new = None, [], {}, True
-    while source.at < len(source.data):
-        line = source.line()
-        if line == "$MeshFormat":
-            version, binary, size = source.line().split()[:3]
-            if version not in ("2.2", "4.1"):
-                raise Unreadable(f"it has version {version[:8]} of the format; save it as 4.1")
-            new, source.binary, source.wide = version == "4.1", binary == "1", f"u{size}"
-            if source.binary and source.data[source.at : source.at + 4] != b"\1\0\0\0":
-                raise Unreadable("its numbers are binary of another machine; save it as text")
-            source.skip("MeshFormat")
-        elif line == "$Nodes":
-            nodes = (nodes_41 if new else nodes_22)(source)
-        elif line == "$Elements":
-            elements = (elements_41 if new else elements_22)(source)
-        elif line in ("$NodeData", "$ElementData"):
-            key, step, components, numbers, rows = data_of(source, line[1:])
-            found.setdefault((line == "$ElementData", key), []).append((step, components, numbers, rows))
-        elif line.startswith("$") and not line.startswith("$End"):
-            source.skip(line[1:])
+    nodes, elements, found = None, [], {}
+    for section in sections(source):
+        if section == "Nodes":
+            nodes = (nodes_41 if source.new else nodes_22)(source)
+        elif section == "Elements":
+            elements = (elements_41 if source.new else elements_22)(source)
+        elif section in ("NodeData", "ElementData"):
+            key, step, components, numbers, rows = data_of(source, section)
+            found.setdefault((section == "ElementData", key), []).append((step, components, numbers, rows))
     if nodes is None:
         raise Unreadable("it has no $Nodes: is it of Gmsh? Meshes of ANSYS have no results")
     tags, points = nodes
@@ -190,19 +201,24 @@ def points_of(kind: float) -> int:
     return POINTS[int(kind)]
 
 
-def elements_41(source: Source) -> list[tuple[int, NDArray, NDArray]]:
+def blocks_41(source: Source) -> list[tuple[tuple[int, int], int, NDArray]]:
+    """Of each block of elements the entity (dimension and number), their type, and their numbers with those of their nodes."""
     import numpy as np
 
     numbers = source.section("Elements")
     blocks, *_ = numbers.take(4, source.wide)
     out = []
     for _ in range(int(blocks)):
-        _, _, kind = numbers.take(3, "i4")
+        dimension, entity, kind = (int(v) for v in numbers.take(3, "i4"))
         (count,) = numbers.take(1, source.wide)
         width = 1 + points_of(kind)
         table = numbers.take(int(count) * width, source.wide).reshape(-1, width).astype(np.int64)
-        out.append((int(kind), table[:, 0], table[:, 1:]))
+        out.append(((dimension, entity), kind, table))
     return out
+
+
+def elements_41(source: Source) -> list[tuple[int, NDArray, NDArray]]:
+    return [(kind, table[:, 0], table[:, 1:]) for _, kind, table in blocks_41(source)]
 
 
 def elements_22(source: Source) -> list[tuple[int, NDArray, NDArray]]:
@@ -235,5 +251,63 @@ def data_of(source: Source, section: str) -> tuple[str, int, int, NDArray, NDArr
     whole = [int(source.line()) for _ in range(int(source.line()))]
     step, components, count = whole[:3]
     items, rows = source.section(section).rows(count, [("i4", 1), ("f8", components)])
-    source.skip(section)
     return (texts[0] if texts else ""), step, components, items[:, 0].astype(np.int64), np.asarray(rows, dtype=np.float64)
+
+
+def groups(name: str) -> dict[str, dict[str, int]]:
+    """The physical groups of surfaces and volumes that have a name: how many faces and elements are in each."""
+    with open(name, "rb") as file:
+        source = Source(file.read())
+    names, physical, counts = {}, {}, Counter()
+    for section in sections(source):
+        if section == "PhysicalNames":
+            for _ in range(int(source.line())):
+                dimension, tag, text = source.line().split(maxsplit=2)
+                names[int(dimension), int(tag)] = text.strip('"')
+        elif section == "Entities":
+            physical = entities(source)
+        elif section == "Elements" and source.new:
+            for (dimension, entity), _, table in blocks_41(source):
+                counts.update({(dimension, tag): len(table) for tag in physical.get((dimension, entity), ())})
+        elif section == "Elements":
+            counts = members_22(source)
+    found: dict[str, dict[str, int]] = {}
+    for (dimension, tag), text in names.items():
+        if dimension > 1 and counts[dimension, tag]:
+            found.setdefault(text, {})["faces" if dimension == 2 else "elements"] = counts[dimension, tag]
+    return found
+
+
+def entities(source: Source) -> dict[tuple[int, int], set[int]]:
+    """The physical groups of each entity, by its dimension and number."""
+    numbers, found = source.section("Entities"), {}
+    for dimension, count in enumerate(numbers.take(4, source.wide).tolist()):
+        for _ in range(int(count)):
+            (entity,) = numbers.take(1, "i4")
+            numbers.take(6 if dimension else 3, "f8")
+            for part in range(2 if dimension else 1):
+                (size,) = numbers.take(1, source.wide)
+                tags = {abs(int(tag)) for tag in numbers.take(int(size), "i4")}
+                if part == 0:
+                    found[dimension, int(entity)] = tags
+    return found
+
+
+def members_22(source: Source) -> Counter[tuple[int, int]]:
+    """How many elements each physical group has, by its dimension and number."""
+    count, counts, done = int(source.line()), Counter(), 0
+    if source.binary:
+        numbers = source.section("Elements")
+        while done < count:
+            kind, follow, tags = numbers.take(3, "i4").tolist()
+            table = numbers.take(follow * (1 + tags + points_of(kind)), "i4").reshape(follow, -1)
+            counts.update((kind, tag) for tag in table[:, 1].tolist() if tags)
+            done += follow
+    else:
+        end = source.data.find(b"$EndElements", source.at)
+        rows = (line.split(None, 4) for line in source.data[source.at : end].splitlines())
+        counts.update((int(row[1]), int(row[3])) for row in rows if len(row) > 3 and row[2] != b"0")
+    of: Counter[tuple[int, int]] = Counter()
+    for (kind, tag), size in counts.items():
+        of[3 if kind in KINDS else 2 if kind in FLAT else 1, abs(tag)] += size
+    return of

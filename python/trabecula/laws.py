@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -228,7 +229,8 @@ def _part_of(cell: str, part: str | None, tet: bool) -> str:
         if part == "beams":
             raise ValueError("the part of a tetrahedral cell is sheet, lower or upper, found 'beams'")
         return part or meant
-    named = cell in (it[0] for it in _core.cells())
+    series = [it[0] for it in _core.cells()]
+    named = cell in series
     part = part or ("beams" if not named and cell in unit_cells.names() else "sheet")
     if part == "beams":
         try:
@@ -237,6 +239,13 @@ def _part_of(cell: str, part: str | None, tet: bool) -> str:
             raise ValueError(why.args[0]) from None
     elif not named and cell in unit_cells.names():
         raise ValueError(f"{cell} is a cell of beams: its part is 'beams', found {part!r}")
+    elif not named:
+        near = get_close_matches(cell, [*series, *unit_cells.names()], 1)
+        meant = f'; did you mean "{near[0]}"?' if near else "."
+        raise ValueError(
+            f'cell: unknown cell "{cell:.80}"{meant} Allowed: {", ".join(series)}; of beams {", ".join(unit_cells.names())}; '
+            f"tetrahedral, with tet (--tet), {', '.join(tet_names())}"
+        )
     return part
 
 

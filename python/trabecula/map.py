@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from .given import Points, control, named, numbered, settings
+from .given import Points, control, named, settings
 
 __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
@@ -223,7 +223,7 @@ def tets(
         size=size,
         mesher=mesher,
         limit=limit,
-        zones=numbered(zones),
+        zones=zones,
         overlap=overlap,
         method=method,
         surface=surface,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import warnings
@@ -103,10 +104,11 @@ def apart_of(args) -> dict | None:
 
 
 def measure_tets(args) -> None:
-    """``trabecula measure`` of a file of tetrahedra: volume, dihedral angles, sets of elements."""
+    """``trabecula measure`` of a file of tetrahedra: volume, dihedral angles, sets."""
     import numpy as np
 
     from . import elements
+    from .file_sets import merged, of_vtu
     from .quadratic import found_in
     from .tets import TetMesh
 
@@ -129,7 +131,9 @@ def measure_tets(args) -> None:
         )
     volume = quality.volume if full is None or full.volume is None else full.volume
     zones = np.asarray(made.zones)
-    sets = {name: {"elements": int(np.isin(zones, numbers).sum())} for name, numbers in made.zone_names.items()}
+    counts = {name: int(np.isin(zones, numbers).sum()) for name, numbers in made.zone_names.items()}
+    own = {name: {"elements": count} for name, count in counts.items() if count}
+    sets = merged(json.loads(str(arrays[-1])) if arrays else of_vtu(args.file), own)
     figures = {
         "elements": quality.tets,
         "order": 1 if full is None else 2,
@@ -148,7 +152,7 @@ def measure_tets(args) -> None:
     print(f"{quality.tets} {kind}tetrahedra, {figures['nodes']} nodes, volume {figure(volume)} mm³")
     print(f"dihedral angles{between} {quality.dihedral.min:.2f} to {quality.dihedral.max:.2f} degrees, pieces {quality.pieces}")
     for name, of in sets.items():
-        print(f"set {name}: {of['elements']} elements")
+        print(f"set {name}: {', '.join(f'{of[what]} {what}' for what in ('nodes', 'elements', 'faces') if what in of)}")
 
 
 def check_measure(args) -> None:

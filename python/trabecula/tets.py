@@ -139,17 +139,22 @@ class TetMesh(Picture, Transformed):
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: vtu (with ``least_dihedral`` and ``size`` of each tetrahedron); with the extra ``fe`` msh, inp, med,
         mesh.
+
+        Zones keep their numbers in all of them, and their names in .inp (element sets), .med (groups) and .msh (physical
+        groups, where a name is that of one number). In .inp, and in .med if it is not negative, the number n is the name ZONE_n
+        of a set. Warns of names that are lost.
         """
+        from . import elements
+
         kind = extension(path, TET_WRITES)
+        names = elements.kept_names(kind, self._core.zone_names)
         if kind == "vtu":
             with whole_file(path) as temporary:
                 self._core.write_vtu(temporary)
             return
-        from . import elements
-
         elements.needed(kind)
         with whole_file(path) as temporary:
-            elements.write(temporary, kind, self.nodes, self.tets, self.zones)
+            elements.write(temporary, kind, self.nodes, self.tets, self.zones, names)
 
     def _picture(self) -> Mesh:
         return self.boundary()

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from . import _core
 from .errors import DesignWarning
-from .files import extension, whole_file
+from .files import check_place, extension, whole_file
 from .formats import SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive, thread_count, whole
 from .mesh import Mesh
@@ -228,8 +228,9 @@ class VolumeMesh(FiniteElements):
         """Writes .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .vtu (VTK), .xdmf (with
         arrays in an .h5 of the same name; needs h5py), .bdf (Nastran) or .mesh (Medit), with domains and sets.
 
-        .foam, an empty file that ParaView opens, stands for OpenFOAM: the mesh, in m, is the folder constant/polyMesh of the
-        file's own folder, which is replaced. Several domains are cell zones, opposite sides of a periodic mesh cyclic patches.
+        .foam, an empty file that ParaView opens, stands for OpenFOAM: the mesh, in m, is the folder constant/polyMesh, which is
+        replaced, of the case, the file's own folder, which may be new. Several domains are cell zones, opposite sides of a
+        periodic mesh cyclic patches.
         In .foam, .msh2 and .mesh, where a face can belong to one patch or group only, it belongs to the smallest of its sets.
 
         ``E`` (MPa) and ``nu`` are Young's modulus and Poisson's ratio of the material in .bdf, and in an .inp that runs as it
@@ -258,21 +259,25 @@ class VolumeMesh(FiniteElements):
 
     def _write_case(self, path: str) -> None:
         """The mesh of an OpenFOAM case, which has another name until it is whole, and the file that stands for it."""
+        check_case(path)
         constant = os.path.join(os.path.dirname(os.path.abspath(path)), "constant")
         whole = os.path.join(constant, "polyMesh")
-        with whole_file(path) as temporary, open(temporary, "w", encoding="ascii"):
-            os.makedirs(constant, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=".polyMesh-", dir=constant) as scratch:
-                made, old = os.path.join(scratch, "new"), os.path.join(scratch, "old")
-                os.mkdir(made)
-                self._core.write_poly(made)
-                with suppress(FileNotFoundError):
-                    os.replace(whole, old)
-                try:
-                    os.replace(made, whole)
-                except OSError:
-                    os.replace(old, whole)
-                    raise
+        os.makedirs(constant, exist_ok=True)
+        with (
+            whole_file(path) as temporary,
+            open(temporary, "w", encoding="ascii"),
+            tempfile.TemporaryDirectory(prefix=".polyMesh-", dir=constant) as scratch,
+        ):
+            made, old = os.path.join(scratch, "new"), os.path.join(scratch, "old")
+            os.mkdir(made)
+            self._core.write_poly(made)
+            with suppress(FileNotFoundError):
+                os.replace(whole, old)
+            try:
+                os.replace(made, whole)
+            except OSError:
+                os.replace(old, whole)
+                raise
 
 
 class Carrier(VolumeMesh):
@@ -458,6 +463,12 @@ def check_order(kind: str, order: int) -> None:
     """Refuses quadratic tetrahedra where a format has none."""
     if kind in ("foam", "mesh") and order == 2:
         raise ValueError(f".{kind} takes linear tetrahedra; make the mesh with order 1")
+
+
+def check_case(path: str | os.PathLike[str]) -> None:
+    """Refuses a .foam that cannot be written; the folder of its case is made if that one alone is missing."""
+    folder = os.path.dirname(os.path.abspath(os.fsdecode(path)))
+    check_place(path if os.path.isdir(folder) else folder)
 
 
 def check_steps(kind: str, hold: Sequence[str], load: Mapping[str, Sequence[float]] | None) -> None:

@@ -27,8 +27,8 @@ ATTRIBUTES = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray], fields: dict[str, NDArray]) -> None:
     """Writes ``path`` and, with the arrays, a file of the same name that ends in .h5.
 
-    ``cells`` are numbers of the elements, ``fields`` further numbers at nodes or in elements; each set is a field of nodes, 1
-    in it and 0 elsewhere.
+    ``cells`` are numbers of the elements, ``fields`` further numbers at nodes or in elements; each set is a field of nodes and
+    one of elements, 1 in it and 0 elsewhere.
     """
     try:
         import h5py
@@ -40,11 +40,16 @@ def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray]
     nodes, elements = mesh.nodes, mesh.elements
     attributes = [(name, "Cell", values) for name, values in cells.items()]
     for name, of in mesh.sets.items():
-        flags = np.zeros(len(nodes), dtype=np.uint8)
-        flags[of.nodes] = 1
-        attributes.append((name, "Node", flags))
+        for center, count, members in (("Node", len(nodes), of.nodes), ("Cell", len(elements), of.elements)):
+            flags = np.zeros(count, dtype=np.uint8)
+            flags[members] = 1
+            attributes.append((name, center, flags))
     attributes += [(name, "Node" if len(v) == len(nodes) else "Cell", v) for name, v in fields.items()]
     lines = ['<Xdmf Version="3.0"><Domain><Grid Name="mesh" GridType="Uniform">']
+    if "domain" in cells:
+        # As meshio has names of numbers.
+        named = "".join(f'<map key="{name}" dim="3">{number}</map>' for number, name in enumerate(mesh.domains))
+        lines.append(f'<Information Name="domains" Value="{len(mesh.domains)}"><![CDATA[<main>{named}</main>]]></Information>')
     with whole_file(heavy) as temporary, h5py.File(temporary, "w") as store:
 
         def item(name: str, values: np.ndarray) -> str:
