@@ -261,13 +261,13 @@ def test_loose_components_are_dropped_or_refused():
     growing = lt.level.fraction(lt.grade.linear(along=[1, 0, 0], stops=[[-6, 0.15], [6, 0.55]]))
     cut = lt.Design(lt.region.box(size=[12, 8, 8]), lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4), growing)).build()
     with pytest.warns(lt.DesignWarning, match="do not touch.*--islands drop"):
-        all_of_it = cut.volume_mesh(per_cell=16)
-    whole = cut.volume_mesh(per_cell=16, islands="drop")
+        all_of_it = cut.volume_mesh(per_cell=24)
+    whole = cut.volume_mesh(per_cell=24, islands="drop")
     figures = whole.report()
     assert figures.pieces == 1 and figures.loose > 0
     assert whole.volume + figures.loose == pytest.approx(all_of_it.volume, abs=0.1 * figures.loose)  # chords, balanced or not
     with pytest.raises(ValueError, match="components that do not touch"):
-        cut.volume_mesh(per_cell=16, islands="error")
+        cut.volume_mesh(per_cell=24, islands="error")
     with pytest.raises(ValueError, match='islands is "drop"; of a periodic cell'):
         solid().volume_mesh(per_cell=12, periodic=True, islands="drop")
 

@@ -192,6 +192,7 @@ def tets(
     limit: float | None = None,
     *,
     zones: Mapping[int, dict] | None = None,
+    layers: dict | None = None,
     overlap: float | None = None,
     method: Literal["explicit", "implicit"] | None = None,
     surface: Literal["capped", "open", "net", "rounded"] | None = None,
@@ -208,6 +209,7 @@ def tets(
     limit: Time that another mesher than the background one may take. [s, above 0, default 600.0]
     zones: Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius
         = 5 } } }`; the first of several counts, and all others are of zone 0. [default {}]
+    layers: Layers of prisms along the part's surface, each prism cut into three tetrahedra. [optional]
     overlap: Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach
         beyond themselves and are mixed with their neighbours, from 0 (creases) to 0.2. [from 0 to 0.2, default 0.0]
     method: How the surface is made. [default "explicit"]
@@ -224,6 +226,7 @@ def tets(
         mesher=mesher,
         limit=limit,
         zones=zones,
+        layers=layers,
         overlap=overlap,
         method=method,
         surface=surface,

@@ -29,6 +29,7 @@ __all__ = [
     "LargestBit",
     "LargestIsland",
     "LatticeReport",
+    "LayersMade",
     "LayersReport",
     "LooseBodies",
     "LostFeatureReport",
@@ -208,6 +209,8 @@ class ConductivityReport(Report):
         "warnings": "WarningReport",
     }
 
+    axis_errors: list[float]
+    """Estimated relative errors of k along the axes."""
     bounds: list[float]
     """Hashin's and Shtrikman's bounds of the mean conductivity."""
     edges: list[list[float]]
@@ -228,7 +231,7 @@ class ConductivityReport(Report):
     n: int
     """Voxels along the edge of the cell, or of a cube of its volume."""
     order: float
-    """Exponent of the voxel's edge with which the error was taken to fall."""
+    """Exponent of the voxel's edge with which the error was taken to fall, of the eigenvalue that changes most."""
     pore: float
     """Conductivity of the pore relative to the solid's."""
     residual: float
@@ -556,6 +559,19 @@ class LatticeReport(Report):
     wavelengths: list[float] | None
     """The least and the greatest wavelength over the region, mm, where a solved map is asked for one that varies; of unequal
     edges, the smallest. None elsewhere."""
+
+
+class LayersMade(Report):
+    """Layers of prisms along the surface of a tetrahedral mesh."""
+
+    at: list[float]
+    """Where it is, mm."""
+    least: float
+    """The least of these, where layers do not taper to their end."""
+    mean: float
+    """Mean of their heights over those asked for."""
+    prisms: int
+    """Number of prisms and wedges, each cut into tetrahedra."""
 
 
 class LayersReport(Report):
@@ -960,8 +976,12 @@ class StiffnessReport(Report):
     """Stiffness at n voxels."""
     E: list[float] | None
     """Young's moduli along the axes; None where the cell resists some strain not at all."""
+    E_error: list[float] | None
+    """Estimated relative errors of E."""
     G: list[float] | None
     """Shear moduli of the planes 23, 13, 12."""
+    G_error: list[float] | None
+    """Estimated relative errors of G."""
     anisotropy: float | None
     """Universal anisotropy 5 G_V / G_R + K_V / K_R - 6; 0 is isotropic."""
     bulk: float | None
@@ -972,7 +992,8 @@ class StiffnessReport(Report):
     """Edges of the cell, mm, one row each."""
     error: float
     """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much
-    for an extrapolation C is C_n, and this the distance of the extrapolated one."""
+    for an extrapolation C is C_n, and this the distance of the extrapolated one. Each eigenvalue of C is extrapolated by
+    an order of its own; soft ones are less sure than C is as a whole: see E_error and G_error."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
@@ -984,7 +1005,7 @@ class StiffnessReport(Report):
     nu: list[float] | None
     """Poisson's ratios 23, 13, 12: contraction along the second axis under tension along the first."""
     order: float
-    """Exponent of the voxel's edge with which the error was taken to fall."""
+    """Exponent of the voxel's edge with which the error was taken to fall, of the eigenvalue that changes most."""
     residual: float
     """Greatest relative residual of the load cases."""
     shear: float | None
@@ -1052,12 +1073,15 @@ class TetMeshReport(Report):
 
     _parts = {
         "fit": "FitReport",
+        "layers": "LayersMade",
         "quality": "TetQualityReport",
         "warnings": "WarningReport",
     }
 
     fit: FitReport | None
     """How it fits its region; None without one, and within the report of a lattice, which has it itself."""
+    layers: LayersMade | None
+    """Its layers of prisms, if any."""
     mesher: str
     """What made it: background, ftetwild, or the file's name."""
     quality: TetQualityReport
@@ -1262,6 +1286,8 @@ class VolumeReport(Report):
     """Edges of the background's cubes along x, y, z, mm: the longest edges of most tetrahedra."""
     elements: int
     """Number of tetrahedra."""
+    loose: float
+    """Volume of the components other than the largest that were left out on request, mm³."""
     max_angle: float
     """Greatest dihedral angle, degrees."""
     min_angle: float

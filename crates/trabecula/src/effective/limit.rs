@@ -12,7 +12,7 @@ pub struct Limit {
     pub error: f64,
     /// The exponent of the voxel's edge; of modes, that of the one that changes most.
     pub order: f64,
-    /// Whether the entries, or those of a mode, are the finest grid's, the grids being too far apart for an extrapolation.
+    /// Whether the grids are too far apart for an extrapolation: the entries are the finest grid's, or a mode is changed by half.
     pub finest: bool,
     /// The modes of a symmetric tensor.
     pub modes: Vec<Mode>,
@@ -96,8 +96,8 @@ fn none(tensor: Vec<f64>, error: f64) -> Limit {
     Limit { tensor, error, order: USUAL, finest: error.is_infinite(), modes: Vec::new() }
 }
 
-/// The limit of symmetric, positive semidefinite tensors, as `limit`, but each eigenvalue with an order and an error of its own: soft modes,
-/// in which members bend, converge later than stiff ones, and their errors are lost in the size of the whole.
+/// The limit of symmetric, positive semidefinite tensors, each eigenvalue with an order and an error of its own: soft modes, in which
+/// members bend, converge later than stiff ones, and their errors are lost in the size of the whole. An eigenvalue changes by half at most.
 ///
 /// The eigenvectors are those of the finest grid; what the others have between them falls by the usual order.
 pub fn modal_limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
@@ -136,7 +136,8 @@ pub fn modal_limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
         let (order, doubt) = fall(&[at - next], before.as_ref().map(|b| &b[..]), ratio);
         let by = (at - next) / (ratio.powf(order) - 1.0);
         let far = by.abs() > FARTHEST * at.max(ROUNDING * largest);
-        let value = if far { at } else { at + by };
+        let most_by = FARTHEST * at.max(0.0);
+        let value = at + if far { by.clamp(-most_by, most_by) } else { by };
         let error = by.abs().max(doubt);
         if error > most {
             (most, out.order) = (error, order);
@@ -185,7 +186,7 @@ impl Limit {
     pub fn doubt(&self, path: &str, n: usize) -> Option<Warning> {
         let (by, need) = (100.0 * self.error, 2 * n);
         let message = format!(
-            "the grids differ too much for an extrapolation: the figures are those of the finest, with an error of {by:.0} %; take n = {need}"
+            "the grids differ too much for an extrapolation, and figures may be off by more than it changes them ({by:.0} %); take n = {need}"
         );
         (self.finest && self.error.is_finite()).then(|| Warning { path: path.into(), message })
     }

@@ -26,9 +26,8 @@ pub struct StiffnessReport {
     pub C_n: [[f64; 6]; 6],
     /// Voxels along the edge of the cell, or of a cube of its volume.
     pub n: usize,
-    /// Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much for
-    /// an extrapolation C is C_n, and this the distance of the extrapolated one. Each eigenvalue of C is extrapolated by an order of its own;
-    /// soft ones are less sure than C is as a whole: see E_error and G_error.
+    /// Estimated relative error of C: its distance from C_n over its size (Frobenius's norm). Each eigenvalue of C is extrapolated by an
+    /// order of its own, and changed by half at most; soft ones are less sure than C is as a whole: see E_error and G_error.
     pub error: f64,
     /// Exponent of the voxel's edge with which the error was taken to fall, of the eigenvalue that changes most.
     pub order: f64,
@@ -79,8 +78,8 @@ pub struct ConductivityReport {
     pub k_n: [[f64; 3]; 3],
     /// Voxels along the edge of the cell, or of a cube of its volume.
     pub n: usize,
-    /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm); where the grids differ too much for
-    /// an extrapolation k is k_n, and this the distance of the extrapolated one.
+    /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm). Each eigenvalue of k is extrapolated by an
+    /// order of its own, and changed by half at most.
     pub error: f64,
     /// Estimated relative errors of k along the axes.
     pub axis_errors: [f64; 3],

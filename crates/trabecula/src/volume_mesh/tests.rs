@@ -84,8 +84,8 @@ fn the_largest_component_alone_is_kept_on_request() {
     let text = "schema = 1\nunits = \"mm\"\nregion.box.size = [12, 8, 8]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\n\
                 map.affine.wavelength = 4\nlevel.fraction = { linear = { along = [1, 0, 0], stops = [[-6, 0.15], [6, 0.55]] } }\n";
     let design = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design");
-    let all = design.volume_mesh(&options(0.25), &Silent).expect("a mesh");
-    let one = design.volume_mesh(&Options { largest: true, ..options(0.25) }, &Silent).expect("a mesh");
+    let all = design.volume_mesh(&options(4.0 / 24.0), &Silent).expect("a mesh");
+    let one = design.volume_mesh(&Options { largest: true, ..options(4.0 / 24.0) }, &Silent).expect("a mesh");
     assert!(all.pieces > 1 && one.pieces == 1, "{} {}", all.pieces, one.pieces);
     assert!(one.loose > 0.0 && all.loose == 0.0);
     // Faces apart are balanced each by itself: the chip's volume is that of its unbalanced chords.
