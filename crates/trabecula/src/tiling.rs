@@ -30,7 +30,7 @@ use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm
 pub use crease::Creases;
 pub use node_levels::Amount;
 pub use ports::Ports;
-pub use rounded::Rounded;
+pub use rounded::{BLUNT, Rounded};
 pub use space_filling::SpaceFilling;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
 pub use walls::Spread;

@@ -12,7 +12,7 @@ use crate::implicit::Implicit;
 use crate::kind::DesignError;
 use crate::map::{Ends, Joined};
 use crate::region::{Notes, Region};
-use crate::tiling::{Rounded, Tiling};
+use crate::tiling::{BLUNT, Rounded, Tiling};
 use geometry::fault::number;
 use geometry::math::Vec3;
 use geometry::progress::checkpoint;
@@ -223,7 +223,7 @@ impl<'a> Finish<'a> {
                 Ok(Finished { net: Some(self.rods(net, radius)?), radius: Some(radius), ..plain })
             }
             (Ends::Rounded, _) => {
-                let own = if tiling.part == Part::Sheet { sheet().map(|w| 0.5 * w) } else { None };
+                let own = if tiling.part == Part::Sheet { sheet().map(|w| BLUNT * 0.5 * w) } else { None };
                 let radius = own.unwrap_or_else(|| tiling.ports().1);
                 let field = Arc::new(Rounded::new(&tiling, &self.region, radius));
                 Ok(Finished { field, radius: Some(radius), ..plain })
