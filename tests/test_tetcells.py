@@ -149,7 +149,7 @@ def test_zones_pass_into_each_other_and_keep_the_fraction():
     # Levels settle until the tetrahedra about each node are within 0.001.
     assert report["fraction"] == pytest.approx(0.3, abs=2e-3)
     for zone in zones.values():
-        assert zone["solid_fraction"] == pytest.approx(0.3, abs=0.01)
+        assert zone["finished_fraction"] == pytest.approx(0.3, abs=0.01)
     mesh = solid.mesh(edge=0.2)
     assert mesh.closed and mesh.pieces == 1
     # Second order in the steps of the surface, of which there are twenty to an edge.

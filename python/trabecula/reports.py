@@ -1189,6 +1189,9 @@ class TilingReport(Report):
     """Radius of the net's rods, or of rounded ends, mm; None with flat ends."""
     face_fraction: float | list[float] | None
     """Share of a tetrahedron's face that is solid; None for zones."""
+    finished_fraction: float | None
+    """Solid fraction of the finished part, with net, rounding and tetrahedra that are bent onto the surface; None where it
+    is `solid_fraction`."""
     joins: list[ZoneJoin] | None
     """Which zones join, where zones have cells of their own."""
     mesh: TetMeshReport
@@ -1201,8 +1204,7 @@ class TilingReport(Report):
     ports: int | None
     """Number of ports on each face of a tetrahedron; None for zones."""
     solid_fraction: float
-    """Solid fraction of the lattice in its flat tetrahedra, without net or rounding: the lattice's `fraction` is that of the
-    finished part."""
+    """Solid fraction of the lattice in its flat tetrahedra, without net or rounding."""
     surface: str
     """How the lattice ends at the part's surface: capped, open, net or rounded."""
     thickness: WallSpread | None
@@ -1378,6 +1380,8 @@ class ZoneReport(Report):
     """Name of its cell."""
     count: int
     """Number of tetrahedra."""
+    finished_fraction: float | None
+    """Solid fraction of the finished part in the zone, by samples; None where it is `solid_fraction`."""
     numbers: list[int]
     """Numbers of its tetrahedra in the mesh: several, where elements of a group are of other groups too."""
     solid_fraction: float

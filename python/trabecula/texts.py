@@ -148,10 +148,17 @@ def _shortfalls(them: list[Report]) -> Iterator[str]:
         yield f"             hub {it.hub} at {point(it.position)} mm: {got}"
 
 
+def _finished(it: Report) -> str:
+    """The solid fraction of the finished part where that is not the one of flat tetrahedra alone, and this."""
+    if it.finished_fraction is None:
+        return f"{it.solid_fraction:.4f}"
+    return f"{it.finished_fraction:.4f} finished, {it.solid_fraction:.4f} in flat tetrahedra without ends"
+
+
 def _tiling(it: Report) -> Iterator[str]:
     yield f"  mesh       {it.count} tetrahedra, edges {figure(it.edge)} mm on average, {figure(it.volume)} mm³"
     for zone, z in (it.zones or {}).items():
-        yield f"  zone {zone}     {z.cell} in {z.count} tetrahedra; solid fraction {z.solid_fraction:.4f}"
+        yield f"  zone {zone}     {z.cell} in {z.count} tetrahedra; solid fraction {_finished(z)}"
     for join in it.joins or []:
         a, b = join.zones
         state = "join" if join.joined else "do not join"
@@ -160,7 +167,7 @@ def _tiling(it: Report) -> Iterator[str]:
     if it.pieces is not None:
         yield f"  pieces     {it.pieces}, predicted from ports"
     if it.ports is not None:
-        yield f"  faces      {counted(it.ports, 'port')} on each; solid fraction of the part {it.solid_fraction:.4f}"
+        yield f"  faces      {counted(it.ports, 'port')} on each; solid fraction {_finished(it)}"
     if it.thickness:
         w = it.thickness
         yield f"  walls      {figure(w.mean)} mm on average, 90 % between {figure(w.low)} and {figure(w.high)} mm"

@@ -17,7 +17,7 @@ mod space_filling;
 mod surface;
 mod walls;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::cell::tet::{Bary, FractionTable, TetCell};
 use crate::cell::{Cut, Part};
@@ -30,8 +30,9 @@ use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm
 pub use crease::Creases;
 pub use node_levels::Amount;
 pub use ports::Ports;
-pub use rounded::Rounded;
+pub use rounded::{BLUNT, Rounded};
 pub use space_filling::SpaceFilling;
+use surface::Bending;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
 pub use walls::Spread;
 
@@ -74,6 +75,8 @@ pub struct Tiling {
     blended: Option<Arc<FractionTable>>,
     /// Factors of its values as a field, if they are lowered anywhere.
     eased: Option<Arc<Eased>>,
+    /// What bending the mesh changes, once it is known; the same at all levels.
+    bending: Arc<OnceLock<Option<Arc<Bending>>>>,
 }
 
 /// Factors of a field's values at the nodes, linear between them, so that it is hardly steeper in some tetrahedra than in most.
@@ -148,6 +151,7 @@ impl Tiling {
             cut: Cut::new(part),
             blended: None,
             eased: None,
+            bending: Arc::default(),
         }
     }
 

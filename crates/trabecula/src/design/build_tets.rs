@@ -25,6 +25,8 @@ const MUCH: f64 = 0.1;
 const FAR: f64 = 0.5;
 /// The share of the heights of layers below which it is warned of.
 const THINNED: f64 = 0.9;
+/// Tetrahedra along the longest side of a part that a warning of too few advises.
+const ACROSS: f64 = 4.0;
 /// Number of lost features that a warning names.
 const NAMED: usize = 3;
 
@@ -214,6 +216,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     let fit = mesher::fit(&mesh, size, &surface, (&**environment.region, own), &inside, mended);
     let is_made = matches!(spec, TetsKind::Made(_));
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, is_made)?;
+    made.warnings.extend(oversized(spec, bounds.size(), &made.report, &environment.path));
     made.warnings.extend(notes.warnings);
     made.report.region_volume = Some(own);
     made.report.layers = layers;
@@ -245,6 +248,31 @@ fn thinned(made: &MadeLayers, path: &str) -> Option<Warning> {
             made.at.map(|v| format!("{v:.3}")).join(", ")
         ),
     })
+}
+
+/// Says that tetrahedra were asked for that are larger than the part, which has none of that size.
+fn oversized(spec: &TetsKind, part: Vec3, report: &TetReport, path: &str) -> Option<Warning> {
+    let TetsKind::Made(MadeTetsKind { size: GradeSpec::Constant(size), .. }) = spec else { return None };
+    let longest = part.into_iter().fold(0.0, f64::max);
+    if *size <= longest {
+        return None;
+    }
+    let [x, y, z] = part.map(|v| rounded(v, 4));
+    let uncovered = report.fit.as_ref().map_or(0.0, |f| f.uncovered.share);
+    let left = if uncovered < 1e-3 {
+        String::new()
+    } else {
+        format!(" and leave {:.1} % of the region out", 100.0 * uncovered)
+    };
+    let message = format!(
+        "{} mm is more than the region, {x} × {y} × {z} mm: its {} tetrahedra, of {} mm on average, are as large as they can be{left}; use \
+         a size of {} mm or less",
+        number(*size),
+        report.quality.tets,
+        rounded(report.quality.size.mean, 3),
+        rounded(longest / ACROSS, 2)
+    );
+    Some(Warning { path: format!("{path}.size"), message })
 }
 
 /// The edge of a regular tetrahedron of the mean volume (mm).
@@ -466,6 +494,11 @@ mod tests {
         assert!((it.mesh.volume() - 1.0).abs() < 1e-12 && it.mesh.tets.len() == 12);
         let it = made("path = \"tets.vtk\"\nunit = \"cm\"").unwrap();
         assert!(it.warnings.iter().any(|w| w.message.contains("off the region")), "{:?}", it.warnings);
+        // The cube has none of that size.
+        let it = made("size = 1e9").unwrap();
+        let said = it.warnings.iter().find(|w| w.path.ends_with("map.tets.size")).unwrap();
+        assert!(said.message.contains("more than the region, 1 × 1 × 1 mm"), "{said:?}");
+        assert!(said.message.ends_with("use a size of 0.25 mm or less"), "{said:?}");
         let graded = "size = { linear = { along = [1, 0, 0], stops = [[0, 0.1], [1, 0.3]] } }";
         assert!(made(graded).unwrap().report.quality.tets > 500);
     }

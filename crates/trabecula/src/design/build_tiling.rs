@@ -350,7 +350,11 @@ fn made(
     let explicit = alone && domain.joined.method == Method::Explicit && domain.fit == MeshFit::Whole;
     let done = match asked {
         // Blended functions are evaluated by position on both roads.
-        Some(asked) if explicit && bent && map.overlap() <= 0.0 => finish.bent(tiling, asked)?,
+        _ if explicit && bent && map.overlap() <= 0.0 => {
+            let volume = domain.report.region_volume.unwrap_or_else(|| map.boundary().volume());
+            finish.bent(tiling, asked, volume)?
+        }
+        None if bent || finish.changes() => finish.told(tiling)?,
         _ => finish.made(tiling, asked, whole)?,
     };
     Ok(Made { done, alone, explicit, zones: Vec::new(), joins: None })

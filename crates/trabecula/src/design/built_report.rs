@@ -17,6 +17,8 @@ use crate::report::*;
 use crate::truss::Beams;
 use geometry::math::Mat3;
 
+/// How many times as many points a zone's fraction is sampled at as others.
+const ZONES: usize = 10;
 /// Fractions that differ by less are one.
 const SAME: f64 = 1e-6;
 
@@ -110,7 +112,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
     points.extend(sample::nodes(region));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
     let lattices = built.lattices.iter().map(|(name, l)| (name.clone(), lattice(l, &points)));
-    let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it)));
+    let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it, built)));
     let beams = built.beams.iter().map(|(name, made)| {
         let sampled = LazyCell::new(|| filling(built, made));
         (name.clone(), build_beams::report(made, built, &sampled))
@@ -204,8 +206,23 @@ fn blend(b: &Blended) -> BlendReport {
     }
 }
 
+/// The solid fraction of the finished part in each of these zones, by samples.
+fn finished_zones(it: &Tiled, built: &Built) -> Vec<f64> {
+    let (points, _) = sample::inside(&built.solid.region, ZONES * sample::COUNT);
+    let values = sample::values(&points, |p, out| built.solid.values(p, out));
+    let mut counts = vec![[0.0; 2]; it.zones.len()];
+    for (p, v) in points.iter().zip(values) {
+        let number = it.tiling.map.zone(it.tiling.map.locate(*p).0);
+        if let Some(zone) = it.zones.iter().position(|z| z.numbers.contains(&number)) {
+            counts[zone][0] += 1.0;
+            counts[zone][1] += f64::from(u8::from(v <= 0.0));
+        }
+    }
+    counts.into_iter().map(|[all, solid]| solid / f64::max(all, 1.0)).collect()
+}
+
 /// A lattice over a tetrahedral mesh.
-fn tiled(it: &Tiled) -> LatticeReport {
+fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
     let tiling = &it.tiling;
     let part = tiling.part;
     let shares = tiling.shares();
@@ -223,6 +240,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
         edge: tiling.map.mean_edge(),
         volume,
         solid_fraction: solid / volume,
+        finished_fraction: it.finished,
         zones: None,
         pieces: None,
         joins: None,
@@ -255,10 +273,12 @@ fn tiled(it: &Tiled) -> LatticeReport {
     };
     if !it.zones.is_empty() {
         // Cells of zones have no level in common, and transitions between them no target fraction.
-        let zones = it.zones.iter().map(|zone| {
+        let finished = it.finished.map(|_| finished_zones(it, built));
+        let zones = it.zones.iter().enumerate().map(|(i, zone)| {
             let (count, volume, solid) = sums(Some(&zone.numbers));
             let (cell, numbers) = (zone.cell.clone(), zone.numbers.clone());
-            (zone.name.clone(), ZoneReport { cell, numbers, count, volume, solid_fraction: solid / volume })
+            let (solid_fraction, finished_fraction) = (solid / volume, finished.as_ref().map(|of| of[i]));
+            (zone.name.clone(), ZoneReport { cell, numbers, count, volume, solid_fraction, finished_fraction })
         });
         let tets = TilingReport {
             zones: Some(zones.collect()),

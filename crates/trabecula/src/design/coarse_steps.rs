@@ -10,6 +10,8 @@ const OFF: f64 = 0.01;
 const OFF_GRID: f64 = 0.05;
 /// Share of the mesh that may be solid or not: with an overlap, and where tetrahedra are bent, the fraction is known by samples.
 const SAMPLED: f64 = 0.002;
+/// The most of a volume that chords cost in one step along the edge of a tetrahedron, were it of second order there: a tenth in twelve.
+const CHORDS: f64 = 0.1 * 12.0 * 12.0;
 /// Fewest steps along the edge of a tetrahedron.
 pub(super) const LEAST: f64 = 4.0;
 
@@ -38,8 +40,9 @@ impl Built {
         }
         let mean = tiling.map.mean_edge();
         let steps = (mean / edge).round().max(LEAST);
-        // The error of the volume falls with the square of the step.
+        // The error of the volume falls with the square of the step. More than chords cost is nothing that finer steps mend.
         let for_volume = (steps * (off.abs() / most).sqrt()).ceil();
+        let for_volume = if only.explicit { for_volume.min((CHORDS / most).sqrt().ceil()) } else { for_volume };
         let for_pieces = match (broken, only.explicit) {
             (None, _) => 0,
             (Some(_), true) => steps_enough(tiling, steps as usize + 1).unwrap_or(0),

@@ -12,7 +12,7 @@ use crate::implicit::Implicit;
 use crate::kind::DesignError;
 use crate::map::{Ends, Joined};
 use crate::region::{Notes, Region};
-use crate::tiling::{Rounded, Tiling};
+use crate::tiling::{BLUNT, Rounded, Tiling};
 use geometry::fault::number;
 use geometry::math::Vec3;
 use geometry::progress::checkpoint;
@@ -22,6 +22,8 @@ const POINTS: usize = 150_000;
 /// The most rounds of the level, and the share that is close enough.
 const ROUNDS: usize = 12;
 const NEAR: f64 = 2e-4;
+/// The first change of the level, as a share of it.
+const NUDGE: f64 = 0.02;
 /// By how much the finished part may have more than was asked for.
 const OFF: f64 = 5e-3;
 
@@ -36,7 +38,7 @@ pub(super) struct Finished {
     pub net: Option<CsgSolid>,
     /// The radius of the net's rods, or of rounded ends, mm.
     pub radius: Option<f64>,
-    /// The solid fraction of the finished part, where the level was solved for it.
+    /// The solid fraction of the finished part, where it is another than that of the flat tetrahedra.
     pub fraction: Option<f64>,
 }
 
@@ -152,27 +154,24 @@ impl<'a> Finish<'a> {
         DesignError::new(&self.path, message)
     }
 
-    /// The lattice with flat ends at the level at which its surface, made without a grid, encloses the fraction asked for: that of flat
-    /// tetrahedra, and what bending them changes.
-    pub fn bent(&self, tiling: Tiling, asked: f64) -> Result<Finished, DesignError> {
-        let samples = tiling.bent_shares().map_err(|f| DesignError::new(&self.map, f.message))?;
-        let below = |by: f64| {
-            let some = samples.iter().take_while(|s| s[0] <= by);
-            some.fold([0.0; 2], |[bent, flat], s| [bent + s[1], flat + s[2]])
+    /// The lattice with flat ends at the level at which its surface, made without a grid, encloses the fraction asked for, or at its own:
+    /// that of flat tetrahedra, and what bending them changes, over the region's `volume` (mm³).
+    pub fn bent(&self, tiling: Tiling, asked: Option<f64>, volume: f64) -> Result<Finished, DesignError> {
+        let fraction = |of: &Tiling| of.bent_volume().map(|solid| solid / volume);
+        let Some(asked) = asked else {
+            let fraction = fraction(&tiling);
+            return Ok(Finished { fraction, ..self.finished(Arc::new(tiling), None)? });
         };
-        // What the share gains where the field rises, over a twentieth of the samples to either side.
-        let middle = samples.partition_point(|s| s[0] <= 0.0);
-        let [low, high] =
-            [middle.saturating_sub(samples.len() / 20), (middle + samples.len() / 20).min(samples.len() - 1)];
-        let mut rate = 0.1 / (samples[high][0] - samples[low][0]).max(1e-12);
-        let (mut by, mut last): (f64, Option<[f64; 2]>) = (0.0, None);
+        let range = tiling.levels();
+        let nudge = NUDGE * range.lo.abs().max(range.hi.abs()).max(NUDGE);
+        let mut by = 0.0;
+        // The last level and its fraction, and what a level adds.
+        let (mut last, mut rate): (Option<[f64; 2]>, f64) = (None, 0.0);
         let mut best: Option<(f64, Tiling)> = None;
         for _ in 0..ROUNDS {
             checkpoint();
             let moved = tiling.clone().moved(by);
-            let (volume, solid) = moved.volumes();
-            let [bent, flat] = below(by);
-            let found = solid / volume + bent - flat;
+            let Some(found) = fraction(&moved) else { break };
             if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
                 best = Some((found, moved));
             }
@@ -184,13 +183,26 @@ impl<'a> Finish<'a> {
                 rate = if secant > 0.1 * rate { secant } else { 2.0 * rate };
             }
             last = Some([by, found]);
-            by += (asked - found) / rate;
+            by += if rate > 0.0 { (asked - found) / rate } else { nudge.copysign(asked - found) };
         }
         // By position tetrahedra are bent as quadratic ones, and made one by one after the surface itself: each has the fraction at a level
         // of its own.
         let placed = self.made(tiling.clone(), Some(asked), false)?;
-        let (found, tiling) = best.unwrap_or((asked, tiling));
+        let Some((found, tiling)) = best else { return Ok(placed) };
         Ok(Finished { fraction: Some(found), tiling: Arc::new(tiling), ..placed })
+    }
+
+    /// The lattice with its ends at its own level, and the fraction that the finished part has by that.
+    pub fn told(&self, tiling: Tiling) -> Result<Finished, DesignError> {
+        let made = self.made(tiling, None, false)?;
+        let (points, _) = sample::inside(&self.region, POINTS);
+        let mut solid = vec![false; points.len()];
+        fill(&mut solid, &points, |p, out| made.field.values(p, out));
+        if let Some(rods) = &made.net {
+            fill(&mut solid, &points, |p, out| rods.values(p, out));
+        }
+        let fraction = solid.iter().filter(|s| **s).count() as f64 / points.len() as f64;
+        Ok(Finished { fraction: Some(fraction), ..made })
     }
 
     /// The middle lines of the net.
@@ -223,7 +235,7 @@ impl<'a> Finish<'a> {
                 Ok(Finished { net: Some(self.rods(net, radius)?), radius: Some(radius), ..plain })
             }
             (Ends::Rounded, _) => {
-                let own = if tiling.part == Part::Sheet { sheet().map(|w| 0.5 * w) } else { None };
+                let own = if tiling.part == Part::Sheet { sheet().map(|w| BLUNT * 0.5 * w) } else { None };
                 let radius = own.unwrap_or_else(|| tiling.ports().1);
                 let field = Arc::new(Rounded::new(&tiling, &self.region, radius));
                 Ok(Finished { field, radius: Some(radius), ..plain })

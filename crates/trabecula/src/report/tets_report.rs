@@ -232,8 +232,11 @@ pub struct TilingReport {
     pub edge: f64,
     /// Volume of the mesh, mm³.
     pub volume: f64,
-    /// Solid fraction of the lattice in its flat tetrahedra, without net or rounding: the lattice's `fraction` is that of the finished part.
+    /// Solid fraction of the lattice in its flat tetrahedra, without net or rounding.
     pub solid_fraction: f64,
+    /// Solid fraction of the finished part, with net, rounding and tetrahedra that are bent onto the surface; None where it is
+    /// `solid_fraction`.
+    pub finished_fraction: Option<f64>,
     /// The zones by the number or the name in the design, where zones have cells of their own.
     pub zones: Option<BTreeMap<String, ZoneReport>>,
     /// Number of connected components, predicted from values at small steps; None with a skin or kept zones, and where more than 20 000
@@ -270,6 +273,8 @@ pub struct ZoneReport {
     pub volume: f64,
     /// Solid fraction of the lattice in the zone's flat tetrahedra, without net or rounding.
     pub solid_fraction: f64,
+    /// Solid fraction of the finished part in the zone, by samples; None where it is `solid_fraction`.
+    pub finished_fraction: Option<f64>,
 }
 
 /// Two zones with faces in common.

@@ -30,15 +30,15 @@ pub(super) struct Mixture {
 }
 
 /// Small tetrahedra of one size.
-struct Size {
+pub(super) struct Size {
     nodes: Vec<[f64; 4]>,
-    tets: Vec<[u32; 4]>,
+    pub tets: Vec<[u32; 4]>,
     /// For each cell, its values at the nodes, divided by its scale.
-    cells: Vec<Vec<f64>>,
+    pub cells: Vec<Vec<f64>>,
 }
 
 impl Size {
-    fn new(cells: &[Share], n: usize) -> Size {
+    pub fn new(cells: &[Share], n: usize) -> Size {
         let grid = Subdivision { n };
         let mut tets = Vec::with_capacity(n.pow(3));
         grid.each_tet(|at, _| tets.push(at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32)));
@@ -53,8 +53,8 @@ impl Size {
         }
     }
 
-    /// The share where f < `sign` · t.
-    fn below(&self, weights: &[[f64; 4]], levels: [f64; 4], sign: f64) -> f64 {
+    /// The share of each where f < `sign` · t.
+    fn each_below(&self, weights: &[[f64; 4]], levels: [f64; 4], sign: f64) -> impl Iterator<Item = f64> {
         let linear = |v: &[f64; 4], l: &[f64; 4]| (0..4).map(|i| v[i] * l[i]).sum::<f64>();
         let value = |(i, l): (usize, &[f64; 4])| {
             let f = weights.iter().zip(&self.cells);
@@ -62,7 +62,7 @@ impl Size {
             f - sign * linear(&levels, l)
         };
         let values: Vec<f64> = self.nodes.iter().enumerate().map(value).collect();
-        let of = |t: &[u32; 4]| {
+        self.tets.iter().map(move |t| {
             let v = t.map(|n| values[n as usize]);
             // Most are on one side.
             match v.iter().filter(|v| **v < 0.0).count() {
@@ -70,8 +70,25 @@ impl Size {
                 4 => 1.0,
                 _ => share_below(v, 0.0),
             }
+        })
+    }
+
+    /// The share where f < `sign` · t.
+    fn below(&self, weights: &[[f64; 4]], levels: [f64; 4], sign: f64) -> f64 {
+        self.each_below(weights, levels, sign).sum::<f64>() / self.tets.len() as f64
+    }
+
+    /// What is solid of something that small tetrahedra have each so much of.
+    pub fn solid(&self, part: Part, weights: &[[f64; 4]], levels: [f64; 4], of: &[f32]) -> f64 {
+        let below = |sign: f64| {
+            let shares = self.each_below(weights, levels, sign).zip(of);
+            shares.map(|(s, v)| s * f64::from(*v)).sum::<f64>()
         };
-        self.tets.iter().map(of).sum::<f64>() / self.tets.len() as f64
+        match part {
+            Part::Lower => below(1.0),
+            Part::Upper => of.iter().map(|v| f64::from(*v)).sum::<f64>() - below(1.0),
+            Part::Sheet => below(1.0) - below(-1.0),
+        }
     }
 }
 

@@ -3,12 +3,18 @@
 //! With a the lattice's function, divided by its steepness so that it is about a distance at its surface, and b the region's distance, the
 //! intersection max(a, b) becomes min(max(a, b), −r) + |(max(a + r, 0), max(b + r, 0))|: within r of both surfaces the solid ends on a
 //! quarter circle of radius r. A strut of that radius ends in a half ball, the edge of a wall 2r thick in a half circle.
+//!
+//! *No surface is tangent to another.* Of a sheet both sides are rounded, and as half circles they would meet in their common tangent, which
+//! is the region's face besides: what is cut there is decided by rounding. So r is a little more than half the wall at every place, the sides
+//! meet in an obtuse ridge, and b is taken a little less deep than it is: what is rounded ends before the face.
 
 use std::sync::Arc;
 
-use super::Tiling;
+use super::{Level, Tiling};
+use crate::cell::Part;
 use crate::field::Field;
 use crate::implicit::Implicit;
+use crate::map::curved_tets::within;
 use crate::region::Region;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
 
@@ -18,16 +24,30 @@ const NEAR: f64 = 0.04;
 /// By how much a tetrahedron may be steeper than the mean of those about a node: more it is where one is much smaller or flatter than the rest.
 const SPREAD: f64 = 2.0;
 
+/// The radius of a wall's end over half the wall, more than one, so that its sides meet at an angle of 2 acos(1 − 1/1.2), 160°.
+pub const BLUNT: f64 = 1.2;
+
+/// How far below the region's surface what is rounded ends, in radii.
+const BELOW: f64 = 0.01;
+
 /// A lattice with rounded ends.
 pub struct Rounded {
     /// The lattice, or one side of its sheet.
     of: Arc<dyn Implicit>,
     region: Region,
-    /// The radius, mm.
-    radius: f64,
+    radius: Radius,
     /// The steepness (per mm) of the lattice at its surface.
     steepness: Steepness,
     parts: Vec<Arc<dyn Implicit>>,
+}
+
+/// The radius of ends.
+#[derive(Clone, Copy)]
+enum Radius {
+    /// The same everywhere, mm.
+    Same(f64),
+    /// That of walls, of which the least and the greatest, mm.
+    OfWalls(Interval),
 }
 
 /// |∇f| at the surface, as it varies with the size of tetrahedra.
@@ -63,16 +83,36 @@ impl Steepness {
         Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()) }
     }
 
-    fn at(&self, p: Vec3) -> f64 {
+    /// The steepness, and the level over it.
+    fn at(&self, p: Vec3) -> [f64; 2] {
         let (t, l) = self.tiling.map.locate(p);
-        self.tiling.linear(&self.at_nodes, t, crate::map::curved_tets::within(l, 0.0))
+        let l = within(l, 0.0);
+        let steep = self.tiling.linear(&self.at_nodes, t, l);
+        [steep, self.tiling.level_at(t, l) / steep]
+    }
+
+    /// The least and the greatest level over the steepness: between nodes it is a mean of theirs.
+    fn levels(&self) -> Interval {
+        let level = |n: usize| match &self.tiling.level {
+            Level::Same(t) => *t,
+            Level::Nodes(of) => of[n],
+        };
+        let of: Vec<f64> = self.at_nodes.iter().enumerate().map(|(n, steep)| level(n) / steep).collect();
+        self.tiling.used(&of)
     }
 }
 
 impl Rounded {
-    /// A lattice in a region with its ends rounded to a radius (mm).
+    /// A lattice in a region with its ends rounded: to a radius (mm), or to that of its walls if it is a sheet.
     pub fn new(tiling: &Arc<Tiling>, region: &Region, radius: f64) -> Rounded {
         let steepness = Steepness::new(tiling);
+        let radius = match tiling.part {
+            Part::Sheet => {
+                let of = steepness.levels();
+                Radius::OfWalls(Interval::new(BLUNT * of.lo, BLUNT * of.hi))
+            }
+            _ => Radius::Same(radius),
+        };
         let one = |of: Arc<dyn Implicit>, parts| Rounded {
             of,
             region: region.clone(),
@@ -85,13 +125,22 @@ impl Rounded {
         one(tiling.clone(), parts)
     }
 
-    /// The value where the lattice's is `a` and the region's `b`, and its derivatives by both.
-    fn joined(&self, a: f64, b: f64) -> (f64, f64, f64) {
-        let r = self.radius;
-        let (x, y) = ((a + r).max(0.0), (b + r).max(0.0));
-        let round = x.hypot(y);
-        if round > 0.0 { (round - r, x / round, y / round) } else { (a.max(b), f64::from(a >= b), f64::from(a < b)) }
+    /// The steepness and the radius at a point.
+    fn at(&self, p: Vec3) -> [f64; 2] {
+        let [steep, level] = self.steepness.at(p);
+        match self.radius {
+            Radius::Same(r) => [steep, r],
+            Radius::OfWalls(_) => [steep, BLUNT * level],
+        }
     }
+}
+
+/// The value where the lattice's is `a` and the region's `b`, and its derivatives by both.
+fn joined(r: f64, a: f64, b: f64) -> (f64, f64, f64) {
+    let b = b + BELOW * r;
+    let (x, y) = ((a + r).max(0.0), (b + r).max(0.0));
+    let round = x.hypot(y);
+    if round > 0.0 { (round - r, x / round, y / round) } else { (a.max(b), f64::from(a >= b), f64::from(a < b)) }
 }
 
 impl Field for Rounded {
@@ -100,7 +149,8 @@ impl Field for Rounded {
         self.of.values(points, out);
         self.region.values(points, &mut b);
         for ((p, o), b) in points.iter().zip(out).zip(b) {
-            *o = self.joined(*o / self.steepness.at(*p), b).0;
+            let [steep, r] = self.at(*p);
+            *o = joined(r, *o / steep, b).0;
         }
     }
 
@@ -109,8 +159,8 @@ impl Field for Rounded {
         self.of.gradients(points, values, gradients);
         self.region.gradients(points, &mut b, &mut g);
         for (i, p) in points.iter().enumerate() {
-            let steep = self.steepness.at(*p);
-            let (v, da, db) = self.joined(values[i] / steep, b[i]);
+            let [steep, r] = self.at(*p);
+            let (v, da, db) = joined(r, values[i] / steep, b[i]);
             values[i] = v;
             gradients[i] = add(scale(gradients[i], da / steep), scale(g[i], db));
         }
@@ -119,10 +169,14 @@ impl Field for Rounded {
     fn bound(&self, b: &Aabb) -> Interval {
         let (of, region) = (self.of.bound(b), self.region.bound(b));
         let steep = self.steepness.at_nodes.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
-        // The function rises with both.
+        // The function rises with both, and with the radius.
+        let r = match self.radius {
+            Radius::Same(r) => Interval::new(r, r),
+            Radius::OfWalls(of) => of,
+        };
         let low = if of.lo < 0.0 { of.lo / steep.0 } else { of.lo / steep.1 };
         let high = if of.hi < 0.0 { of.hi / steep.1 } else { of.hi / steep.0 };
-        Interval::new(self.joined(low, region.lo).0, self.joined(high, region.hi).0)
+        Interval::new(joined(r.lo, low, region.lo).0, joined(r.hi, high, region.hi).0)
     }
 }
 

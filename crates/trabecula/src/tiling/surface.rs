@@ -13,6 +13,7 @@
 //! *After rounding to single precision.* Vertices stay `MARGIN` of a step away from nodes, so parts of the surface that do not
 //! meet are separated by that share of a small tetrahedron's height. Designs where rounding is not well below are refused.
 
+mod bending;
 mod bent_nodes;
 mod component_links;
 mod connectivity;
@@ -34,6 +35,7 @@ use crate::map::tet_map::NONE;
 use crate::surface_maker::{
     self, Estimate, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty,
 };
+pub use bending::Bending;
 use bent_nodes::{BentNodes, Places};
 use component_links::ComponentLinks;
 pub use connectivity::{Connectivity, ZonePair, connectivity, steps_enough};
@@ -181,9 +183,13 @@ impl<'a> Work<'a> {
 
     /// The nodes of the small tetrahedra, where they are bent.
     fn places(&self, t: usize) -> Option<Places> {
+        self.bent_nodes()?.places(&self.tiling.map, t, &self.cells[0].0)
+    }
+
+    /// How nodes are moved. Parallel itself, so it is asked for before parallel work that needs it, which would wait for itself.
+    fn bent_nodes(&self) -> Option<&BentNodes> {
         let nodes = &self.cells[0].0;
-        let bent = self.bent.get_or_init(|| BentNodes::new(&self.tiling.map, nodes, &self.template));
-        bent.as_ref()?.places(&self.tiling.map, t, nodes)
+        self.bent.get_or_init(|| BentNodes::new(&self.tiling.map, nodes, &self.template)).as_ref()
     }
 
     fn tet_surface(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
@@ -331,6 +337,7 @@ impl<'a> Work<'a> {
         stl: bool,
         mut take: impl FnMut(usize, Chunk<'s>) -> Result<(), Stopped>,
     ) -> Result<(), Stopped> {
+        self.bent_nodes();
         let total = self.tiling.map.len();
         let batch = CHUNK * 4 * rayon::current_num_threads();
         let make = |first: usize| -> Vec<Chunk> {
@@ -448,47 +455,6 @@ impl SurfaceMaker for TilingSurface<'_> {
             memory: triangles * (12.0 + 12.0 + 1.0),
             stl: stl::HEADER as f64 + triangles * stl::RECORD as f64,
         })
-    }
-}
-
-impl Tiling {
-    /// The tiling's field in small tetrahedra of some tetrahedra: the value in the middle of each, its share of the volume as they are bent
-    /// onto the region, and of that of the flat ones. Ascending by value. Without an overlap.
-    ///
-    /// # Errors
-    /// A mesh whose surface cannot be cut.
-    pub fn bent_shares(&self) -> Result<Vec<[f64; 3]>, Fault> {
-        const STEPS: usize = 8;
-        const TETS: usize = 600;
-        let work = Work::in_steps(self, STEPS)?;
-        let count = self.map.len().min(TETS);
-        let nodes = &work.cells[0].0;
-        let tet = |i: usize| {
-            let t = i * self.map.len() / count;
-            let middle = |small: &small_simplices::Small| {
-                let sum = |c: usize| small.nodes.iter().map(|n| f64::from(nodes.whole[*n as usize][c])).sum::<f64>();
-                core::array::from_fn(|c| sum(c) / (4 * STEPS) as f64)
-            };
-            let places = work.places(t);
-            let known = self.known_in(&work.template.tets.iter().map(|s| (t, middle(s))).collect::<Vec<_>>());
-            let values: Vec<f64> = known.iter().map(|k| self.cut.value(k.f, k.t)).collect();
-            let flat = self.map.volume(t) / values.len() as f64;
-            let volume = |small: &small_simplices::Small| match &places {
-                None => flat,
-                Some(p) => {
-                    let [a, b, c, d] = small.nodes.map(|n| p.nodes[n as usize]);
-                    dot(cross(sub(b, a), sub(c, a)), sub(d, a)).abs() / 6.0
-                }
-            };
-            let smalls = values.into_iter().zip(&work.template.tets);
-            smalls.map(|(v, small)| [v, volume(small), flat]).collect::<Vec<[f64; 3]>>()
-        };
-        let found: Vec<Vec<[f64; 3]>> = (0..count).into_par_iter().map(tet).collect();
-        let mut all = found.concat();
-        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let [bent, flat] = [1, 2].map(|k| all.iter().map(|s| s[k]).sum::<f64>());
-        all.iter_mut().for_each(|s| (s[1], s[2]) = (s[1] / bent, s[2] / flat));
-        Ok(all)
     }
 }
 

@@ -97,10 +97,16 @@ impl Tiling {
         (0..self.map.len()).step_by(step).collect()
     }
 
-    /// The volume of walls over the area of their mid-surface, mm.
+    /// The volume of walls over the area of their mid-surface, mm: of bent tetrahedra where the mesh is bent.
     fn mean_wall(&self, pieces: &[Piece]) -> f64 {
         let first_order = |tets: &[usize]| mean(tets, pieces, |t, p| self.first_order(t, p));
-        self.realised(pieces) * first_order(&self.many(pieces)) / first_order(&self.some())
+        let many = self.many(pieces);
+        let flat = self.realised(pieces) * first_order(&many) / first_order(&self.some());
+        let Some(bending) = self.bending() else { return flat };
+        let areas: Vec<f64> =
+            many.par_iter().map(|t| pieces.iter().map(|p| self.first_order(*t, p)[1]).sum()).collect();
+        let area = areas.iter().sum::<f64>() * self.map.len() as f64 / many.len() as f64;
+        bending.thickness(self, flat * area, area)
     }
 
     /// The sheet whose walls are on average as thick as asked (mm; one number, or one for each node, of which the mean over the

@@ -38,6 +38,7 @@ mod thickness;
 mod tiling;
 mod tiling_amounts;
 mod tiling_curved;
+mod tiling_ends;
 mod tiling_fields;
 mod walls;
 mod wavelength;

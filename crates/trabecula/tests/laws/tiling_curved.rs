@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::common::{Random, ball, check, cuboid, meshed, within};
-use geometry::math::{Aabb, Vec3, norm, sub};
+use geometry::math::{Aabb, Vec3, cross, norm, sub};
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh;
 use trabecula::cell::Part;
 use trabecula::cell::tet::named_tet_cell;
+use trabecula::design::{Built, Design, NoFiles};
 use trabecula::extract::GridSurface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
@@ -167,4 +168,77 @@ fn what_is_flat_stays_as_it_was() {
     assert_eq!(a.mesh.triangles, b.mesh.triangles);
     let far = a.mesh.vertices.iter().zip(&b.mesh.vertices).map(|(p, q): (&Vec3, &Vec3)| norm(sub(*p, *q)));
     assert!(far.fold(0.0, f64::max) < 1e-9);
+}
+
+const BALL: &str = "sphere.radius = 9";
+const SHELL: &str = "difference = [{ sphere.radius = 10 }, { sphere.radius = 9 }]";
+
+fn built(region: &str, lattice: &str, size: f64) -> Built {
+    let text = format!("schema = 1\nregion.{region}\n[lattice.a]\n{lattice}\nmap.tets.size = {size}\n");
+    Design::from_toml(&text).expect(lattice).build(&NoFiles).expect(lattice)
+}
+
+/// A figure of surfaces in these steps along the edge of a tetrahedron: the finer one, and that of steps without end.
+fn in_steps(tiling: &Tiling, figure: impl Fn(&SurfaceMesh) -> f64) -> [f64; 2] {
+    let [coarse, fine] = [16.0, 32.0].map(|steps| figure(&explicit(tiling, steps)));
+    [fine, fine + (fine - coarse) / 3.0]
+}
+
+/// The volume of the finished part is that of the reported fraction, and of that asked for if one is: of tetrahedra that are bent far
+/// onto balls and shells, over the region's volume. No step is asked for that would not help. A shell of tetrahedra as flat as they are
+/// bent is off the spheres by some of its own volume, the more the finer its steps.
+#[test]
+fn bent_lattices_have_the_fraction_that_is_reported() {
+    let diamond = "part = \"lower\"\ncell.tet.name = \"diamond\"\nlevel.fraction = 0.3";
+    let iso = "part = \"lower\"\ncell.tet.name = \"diamond_sheet\"\nlevel.iso = 0.0";
+    let sheet = "part = \"sheet\"\ncell.tet.name = \"primitive_sheet\"\nlevel.fraction = 0.2";
+    let cubes = |r: f64| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3);
+    for (region, volume, lattice, size, asked, near) in [
+        (SHELL, cubes(10.0) - cubes(9.0), diamond, 4.0, Some(0.3), 0.01),
+        (BALL, cubes(9.0), diamond, 9.0, Some(0.3), 0.004),
+        (BALL, cubes(9.0), sheet, 6.0, Some(0.2), 0.004),
+        (BALL, cubes(9.0), iso, 5.0, None, 0.004),
+    ] {
+        let design = built(region, lattice, size);
+        let tiling = &design.tilings[0].tiling;
+        let told = design.tilings[0].finished.expect(lattice);
+        let [fine, limit] = in_steps(tiling, |s| s.mesh.volume());
+        let found = limit / volume;
+        println!(
+            "{region} {size}: {found:.5}, told {told:.5}, {:.5} of flat ones",
+            tiling.volumes().1 / tiling.volumes().0
+        );
+        assert!((found / told - 1.0).abs() < near, "{region}: {found}, told {told}");
+        assert!(asked.is_none_or(|a| (told / a - 1.0).abs() < 1e-3), "{region}: told {told}");
+        let warned = design.coarse_steps(tiling.map.mean_edge() / 32.0, fine, 1);
+        assert!(warned.is_none(), "{region}: {warned:?}");
+    }
+}
+
+/// Walls of bent tetrahedra are as thick on average as asked: their volume over the area of the surface f = 0, both of the part as it
+/// is made.
+#[test]
+fn bent_walls_are_as_thick_as_asked_on_average() {
+    let sheet = "part = \"sheet\"\ncell.tet.name = \"diamond_sheet\"\nlevel.thickness = 0.5";
+    let thick = "difference = [{ sphere.radius = 10 }, { sphere.radius = 8 }]";
+    for (region, size) in [(BALL, 8.0), (BALL, 5.0), (thick, 4.0)] {
+        let design = built(region, sheet, size);
+        let tiling = &design.tilings[0].tiling;
+        let cell = tiling.cells[0].cell.clone();
+        let middle = Tiling::new(tiling.map.clone(), cell, Part::Lower, Level::Same(0.0));
+        let area = |s: &SurfaceMesh| {
+            let of = |i: usize| {
+                let [a, b, c] = s.mesh.corners(i);
+                norm(cross(sub(b, a), sub(c, a))) / 2.0
+            };
+            (0..s.cut.len()).filter(|i| !s.cut[*i]).map(of).sum::<f64>()
+        };
+        let found = in_steps(tiling, |s| s.mesh.volume())[1] / in_steps(&middle, area)[1];
+        let told = tiling.thickness().expect("walls").mean;
+        println!("{region} {size}: {found:.5} mm, told {told:.5}");
+        assert!(
+            (told / 0.5 - 1.0).abs() < 2e-3 && (found / 0.5 - 1.0).abs() < 0.01,
+            "{region} {size}: {found}, {told}"
+        );
+    }
 }

@@ -73,8 +73,7 @@ impl BentNodes {
             curves.edges.par_chunks(BATCH).map(|some| edge_moves(map, curves, some, n)).collect();
         let edges: HashMap<[u32; 2], Vec<Vec3>> = found.into_iter().flatten().collect();
         let mut out = BentNodes { n, edges, stiff: HashSet::new() };
-        let touched = |t: &usize| map.across(*t).contains(&NONE) || out.edges_of(map, *t) != 0;
-        let mut left: Vec<usize> = (0..map.len()).filter(touched).collect();
+        let mut left = out.touched(map);
         for round in 0..=HALVINGS + 1 {
             checkpoint();
             let sound = |t: &usize| {
@@ -104,6 +103,12 @@ impl BentNodes {
                 .collect();
         }
         Some(out)
+    }
+
+    /// The tetrahedra in which nodes may be moved.
+    pub fn touched(&self, map: &Tets) -> Vec<usize> {
+        let touched = |t: &usize| map.across(*t).contains(&NONE) || self.edges_of(map, *t) != 0;
+        (0..map.len()).filter(touched).collect()
     }
 
     /// The edges of a tetrahedron that are moved, a bit for each.
