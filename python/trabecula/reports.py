@@ -216,8 +216,8 @@ class ConductivityReport(Report):
     edges: list[list[float]]
     """Edges of the cell, mm, one row each."""
     error: float
-    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm); where the grids differ too much
-    for an extrapolation k is k_n, and this the distance of the extrapolated one."""
+    """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm). Each eigenvalue of k is
+    extrapolated by an order of its own, and changed by half at most."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
@@ -991,9 +991,9 @@ class StiffnessReport(Report):
     edges: list[list[float]]
     """Edges of the cell, mm, one row each."""
     error: float
-    """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm); where the grids differ too much
-    for an extrapolation C is C_n, and this the distance of the extrapolated one. Each eigenvalue of C is extrapolated by
-    an order of its own; soft ones are less sure than C is as a whole: see E_error and G_error."""
+    """Estimated relative error of C: its distance from C_n over its size (Frobenius's norm). Each eigenvalue of C is
+    extrapolated by an order of its own, and changed by half at most; soft ones are less sure than C is as a whole: see
+    E_error and G_error."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]

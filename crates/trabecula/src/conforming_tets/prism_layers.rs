@@ -3,7 +3,8 @@
 //! The boundary stays as it is. Its nodes on the chosen faces are pushed into the mesh, whose shapes are improved on the way, and the
 //! space behind them is filled: a column of prisms over each face. At edges and corners of the part, columns meet in the bisecting
 //! plane; where other faces begin, their nodes move along these; where the choice ends within a smooth face, layers taper to wedges.
-//! A node that the mesh leaves no room for goes as far as it can, and its layers are thinner in proportion.
+//! Where the mesh leaves no room for a node it goes less far, and its
+//! layers are thinner in proportion.
 //!
 //! Each quadrilateral between two prisms is cut from the lesser node outside to the greater inside, so that adjacent prisms agree
 //! (Dompierre, Labbé, Vallet, Camarero 1999).
@@ -173,7 +174,7 @@ impl Shaping<'_> {
         nodes.map(way).collect()
     }
 
-    /// Pushes nodes inwards as far as shapes stay fair and prisms have volume, and improves shapes in between.
+    /// Pushes nodes inwards while shapes stay fair and prisms have volume, and improves shapes in between.
     fn push(&mut self, pushed: &mut [Pushed], chosen: &[[u32; 3]], ends: &[f64]) {
         let goes_on = || true;
         let mut number = vec![usize::MAX; self.nodes.len()];

@@ -190,7 +190,7 @@ fn checked_lattice(
     warn::solved_map(&built.map, &spec.map, path, warnings);
     warn::wrapped_map(&built, &spec.map, environment, warnings);
     let level = Environment { path: format!("{path}.level"), ..*environment };
-    warn::fraction_beside_thickness(&built, spec, &level, warnings)?;
+    warn::fraction_with_thickness(&built, spec, &level, warnings)?;
     Ok(built)
 }
 

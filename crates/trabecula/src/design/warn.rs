@@ -17,7 +17,7 @@ const TURN: f64 = 45.0;
 const OUTSIDE: f64 = 0.05;
 /// The density of cells over the one asked for below which there is a warning: they are drawn out twenty times.
 const PRESSED: f64 = 0.05;
-/// The relative deviation of the fraction from the one asked for, beside a thickness, above which it is warned of.
+/// The relative deviation of the fraction from the one asked for together with a thickness, above which it is warned of.
 const DRIFT: f64 = 0.05;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
@@ -218,7 +218,7 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
 
 /// Warns of a fraction that a wall of given thickness does not keep, where the map's cells have another size or shape than follows
 /// from both.
-pub(super) fn fraction_beside_thickness(
+pub(super) fn fraction_with_thickness(
     lattice: &Lattice,
     spec: &LatticeSpec,
     at_level: &Environment,
