@@ -102,14 +102,14 @@ def test_the_side_of_a_network_is_refused():
 
 
 def test_a_law_has_its_columns_fits_and_files(tmp_path):
-    found = lt.law("gyroid", "sheet", 0.2, 0.4, 3, n=16)
+    found = lt.law("gyroid", "sheet", 0.2, 0.4, 3, n=24)
     x = found.columns["fraction"]
     assert np.allclose(x, [0.2, 0.3, 0.4])
     known = ("across", "grids differ too much")  # walls of a voxel or two
     assert all(any(word in message for word in known) for said in found.notes.values() for message in said)
-    single = solid().stiffness(n=16)
+    single = solid().stiffness(n=24)
     assert found.columns["C11"][1] == pytest.approx(single.C[0][0], rel=1e-4)  # a table, for other cells
-    assert found.columns["K"][1] == pytest.approx(solid().permeability(n=16).k_cell[0][0], rel=1e-3)
+    assert found.columns["K"][1] == pytest.approx(solid().permeability(n=24).k_cell[0][0], rel=1e-3)
     assert found.at("E", 0.3) == pytest.approx(found.columns["E"][1], rel=1e-12)
     asked = float(found.at("E", 0.27))
     assert found.fraction(E=asked) == pytest.approx(0.27, abs=1e-9)

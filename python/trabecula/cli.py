@@ -417,8 +417,8 @@ COMMANDS = {
             "--islands",
             choices=("keep", "drop", "error"),
             default="keep",
-            help="components other than the largest, which no support on that one holds: keep with a warning (default), drop, "
-            "or refuse",
+            help="components other than the largest, which no support on that one holds: keep (default), with a warning if "
+            "it is the solid, drop, or refuse",
         ),
         option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -68,7 +69,7 @@ def surfaces(path: str) -> Sets:
         if line.startswith("*"):
             match = re.match(r"\*surface\b.*?\bname\s*=\s*\"?([^,\"\n]+)", line, re.IGNORECASE)
             name = match[1].strip() if match else None
-        elif name is not None and line[:1].isdigit():
+        elif name is not None and re.match(r"\s*\d+\s*,\s*S\d", line, re.IGNORECASE):
             found[name] = found.get(name, 0) + 1
     return {name: {"faces": count} for name, count in found.items()}
 
@@ -132,12 +133,13 @@ def of_vtu(path: str) -> Sets:
             return {}
         start = len(head) + len(mark)
         file.seek(start)
-        start += file.read(64).index(b"_") + 1
+        start += file.read(64).find(b"_") + 1
+        whole = os.fstat(file.fileno()).st_size
 
         def array(tag: str) -> NDArray[np.uint8]:
             match = re.search(r'offset="(\d+)"', tag)
             file.seek(start + int(match[1] if match else 0))
-            size = int.from_bytes(file.read(8), "little")
+            size = min(int.from_bytes(file.read(8), "little"), whole)
             return np.frombuffer(file.read(size), dtype=np.uint8)
 
         def bytes_of(part: str) -> dict[str, NDArray]:

@@ -191,7 +191,10 @@ def zones(given: Any) -> Any:
     """The table of zones with their numbers as text; what is no table as it is."""
     if not isinstance(given, Mapping):
         return given
-    return {str(k) if isinstance(k, Integral) and not isinstance(k, bool) else k: v for k, v in given.items()}
+    made = {str(k) if isinstance(k, Integral) and not isinstance(k, bool) else k: v for k, v in given.items()}
+    if len(made) < len(given):
+        raise DesignError(f"zones has a number twice, as a number and as text; it has {', '.join(map(repr, given))}")
+    return made
 
 
 def pairs(given: Stops | None) -> list | None:

@@ -83,7 +83,8 @@ class Simulated:
 
         Crumbs, flat tetrahedra at the boundary, and places where it touches itself are left out, ``report().dropped`` is their
         volume. ``islands`` says what becomes of components other than the largest, which no support on that one holds:
-        ``"keep"``, with a warning; ``"drop"``; or ``"error"``; the last two of one domain that is not periodic.
+        ``"keep"``, with a warning if it is the solid; ``"drop"``; or ``"error"``; the last two of one domain that is not
+        periodic.
 
         Warns of boundary triangles that cross, and of dihedral angles below 12 or above 160 degrees. The same for any number of
         ``threads``. Raises ValueError for an edge greater than the thinnest wall, a mesh beyond the memory there is, a side of

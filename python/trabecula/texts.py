@@ -156,6 +156,9 @@ def _finished(it: Report) -> str:
 
 
 def _tiling(it: Report) -> Iterator[str]:
+    yield f"  method     {it.method}, " + (
+        "in each tetrahedron apart" if it.method == "explicit" else "on a grid over the part"
+    )
     yield f"  mesh       {it.count} tetrahedra, edges {figure(it.edge)} mm on average, {figure(it.volume)} mm³"
     for zone, z in (it.zones or {}).items():
         yield f"  zone {zone}     {z.cell} in {z.count} tetrahedra; solid fraction {_finished(z)}"

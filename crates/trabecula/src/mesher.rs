@@ -178,13 +178,9 @@ fn shaped(mut shaping: Shaping, cube: f64, dropped: f64, layers: Option<&PrismLa
         shaping.improve(&goes_on);
     }
     let shelled = shaping.shell(true);
-    let made = match layers {
-        None => None,
-        Some(layers) => {
-            let message = "no triangle of the boundary has its middle in this region; move it, or leave it out";
-            Some(shaping.layered(layers).ok_or_else(|| Fault::new("layers.on", message))?)
-        }
-    };
+    // What leaves nothing has no triangle to choose: other ways may.
+    let layers = layers.filter(|_| shaping.tets.iter().any(|t| *t != GONE));
+    let made = layers.map(|layers| shaping.layered(layers, MOST)).transpose()?;
     let tets = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
     let mesh = TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact();
     Ok(Background { mesh, left_out: dropped + shelled, layers: made })

@@ -3,8 +3,7 @@
 //! The boundary stays as it is. Its nodes on the chosen faces are pushed into the mesh, whose shapes are improved on the way, and the
 //! space behind them is filled: a column of prisms over each face. At edges and corners of the part, columns meet in the bisecting
 //! plane; where other faces begin, their nodes move along these; where the choice ends within a smooth face, layers taper to wedges.
-//! Where the mesh leaves no room for a node it goes less far, and its
-//! layers are thinner in proportion.
+//! Where the mesh leaves no room for a node it goes less far, and its layers are thinner in proportion.
 //!
 //! Each quadrilateral between two prisms is cut from the lesser node outside to the greater inside, so that adjacent prisms agree
 //! (Dompierre, Labbé, Vallet, Camarero 1999).
@@ -14,6 +13,7 @@ use super::node_surfaces::{HELD, SurfaceSet, onto};
 use super::shaping::{POOR, Shaping};
 use super::tet_shape::shape;
 use crate::region::Region;
+use geometry::fault::Fault;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, cross, inverse, norm, scale, sub};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{FACES, volume};
@@ -35,6 +35,18 @@ pub struct PrismLayers {
     pub ends: Vec<f64>,
     /// Where they are: on faces of the boundary that have their middles in this region; everywhere without.
     pub on: Option<Region>,
+}
+
+impl PrismLayers {
+    /// The ends of `count` layers, of which the outermost is `height` high and each other `growth` times the one outside it, mm.
+    pub fn ends(count: u32, height: f64, growth: f64) -> Vec<f64> {
+        let heights = (0..count).map(|i| height * growth.powi(i as i32));
+        let sum = |depth: &mut f64, height: f64| {
+            *depth += height;
+            Some(*depth)
+        };
+        heights.scan(0.0, sum).collect()
+    }
 }
 
 /// The layers that were made.
@@ -96,15 +108,36 @@ fn has_twice<T: PartialEq>(corners: &[T; 4]) -> bool {
 }
 
 impl Shaping<'_> {
-    /// Makes the layers, of a mesh of one domain that is not periodic; `None` if no face of the boundary is chosen.
-    pub fn layered(&mut self, layers: &PrismLayers) -> Option<MadeLayers> {
+    /// Makes the layers, of a mesh of one domain that is not periodic.
+    ///
+    /// # Errors
+    /// No face of the boundary is chosen, or none that has a node within the choice; there would be more than `most` tetrahedra.
+    pub fn layered(&mut self, layers: &PrismLayers, most: usize) -> Result<MadeLayers, Fault> {
         let (chosen, others) = self.chosen_faces(layers.on.as_ref());
         if chosen.is_empty() {
-            return None;
+            let message = "no triangle of the boundary has its middle in this region; move it, or leave it out";
+            return Err(Fault::new("layers.on", message));
+        }
+        let more = 3 * chosen.len() * layers.ends.len();
+        if self.tets.len() + more > most {
+            let message = format!(
+                "{} triangles in {} layers make {more} tetrahedra, of at most {most} in all; give fewer",
+                chosen.len(),
+                layers.ends.len()
+            );
+            return Err(Fault::new("layers.count", message));
         }
         let depth = layers.ends.last().copied().unwrap_or(0.0);
         let mut pushed = self.pushed(&chosen, &others, depth);
         let boundary: Vec<(u32, SurfaceSet)> = pushed.iter().map(|p| (p.node, self.on[p.node as usize])).collect();
+        if pushed.iter().all(|p| norm(p.by) <= 0.0) {
+            let message = format!(
+                "all nodes of the {} triangles of the boundary in this region lie at its edge, where layers end; enlarge it, or give a \
+                 smaller size",
+                chosen.len()
+            );
+            return Err(Fault::new("layers.on", message));
+        }
         pushed.iter().for_each(|p| self.on[p.node as usize] = HELD);
         self.push(&mut pushed, &chosen, &layers.ends);
         for (p, (node, on)) in pushed.iter().zip(&boundary) {
@@ -113,7 +146,7 @@ impl Shaping<'_> {
         let prisms = self.fill(&chosen, &pushed, &boundary, &layers.ends);
         let whole: Vec<&Pushed> = pushed.iter().filter(|p| norm(p.by) > 0.0).collect();
         let least = whole.iter().min_by(|p, q| p.share.total_cmp(&q.share).then(p.node.cmp(&q.node)));
-        Some(MadeLayers {
+        Ok(MadeLayers {
             prisms,
             mean: whole.iter().map(|p| p.share).sum::<f64>() / whole.len().max(1) as f64,
             least: least.map_or(0.0, |p| p.share),
@@ -230,18 +263,19 @@ impl Shaping<'_> {
         let (sorted, outward) = ascending(face);
         let columns = sorted.map(|n| pushed[face.iter().position(|m| *m == n).unwrap_or(0)]);
         levels.windows(2).all(|between| {
-            let mut ends = [[[0.0; 3]; 2]; 3];
-            for (column, ends) in columns.iter().zip(&mut ends) {
-                for (level, end) in between.iter().zip(ends) {
+            // Each position with a number: both ends of a node that was not pushed are one.
+            let mut ends = [[(0, [0.0; 3]); 2]; 3];
+            for (k, (column, ends)) in columns.iter().zip(&mut ends).enumerate() {
+                for (l, (level, end)) in between.iter().zip(ends).enumerate() {
                     let Some(at) = column.at(self, column.share * level) else { return false };
-                    *end = at;
+                    *end = (2 * k + if column.share > 0.0 { l } else { 0 }, at);
                 }
             }
             staircase(ends).into_iter().all(|mut corners| {
                 if outward {
                     corners.swap(0, 1);
                 }
-                has_twice(&corners) || volume(corners) > 0.0
+                has_twice(&corners.map(|c| c.0)) || volume(corners.map(|c| c.1)) > 0.0
             })
         })
     }

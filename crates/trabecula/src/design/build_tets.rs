@@ -23,6 +23,8 @@ const DEEP: f64 = 0.17;
 const MUCH: f64 = 0.1;
 /// Distance above which the boundary is far off, in sizes; cells at cut edges are stretched to there.
 const FAR: f64 = 0.5;
+/// The least height of a layer, over that of all: thinner ones are lost in the rounding of positions.
+const THINNEST: f64 = 1e-4;
 /// The share of the heights of layers below which it is warned of.
 const THINNED: f64 = 0.9;
 /// Tetrahedra along the longest side of a part that a warning of too few advises.
@@ -231,9 +233,24 @@ fn prism_layers(
     environment: &Environment,
     notes: &mut crate::region::Notes,
 ) -> Result<PrismLayers, DesignError> {
-    let path = format!("{}.layers.on", environment.path);
-    let region = |on| environment::region(on, &path, environment.loader, Some(environment.region), notes);
-    Ok(PrismLayers { ends: spec.ends(), on: spec.on.as_ref().map(region).transpose()? })
+    let path = |key: &str| format!("{}.layers.{key}", environment.path);
+    let ends = PrismLayers::ends(spec.count, spec.height, spec.growth);
+    let depth = ends.last().copied().unwrap_or(0.0);
+    let most = environment.region.bounds().size().into_iter().fold(0.0, f64::max);
+    if depth > most {
+        let message =
+            format!("the layers are {} mm high together, more than the part, {} mm", number(depth), number(most));
+        return Err(DesignError::new(path("height"), message));
+    }
+    let thinnest = spec.height * spec.growth.powi(spec.count as i32 - 1).min(1.0);
+    if thinnest < THINNEST * depth {
+        let message =
+            format!("the thinnest of the layers is {} mm high; give fewer, or a growth nearer to 1", number(thinnest));
+        return Err(DesignError::new(path("count"), message));
+    }
+    let on = path("on");
+    let region = |of| environment::region(of, &on, environment.loader, Some(environment.region), notes);
+    Ok(PrismLayers { ends, on: spec.on.as_ref().map(region).transpose()? })
 }
 
 /// A warning of layers that are much thinner than asked for.

@@ -207,7 +207,7 @@ fn blend(b: &Blended) -> BlendReport {
 }
 
 /// The solid fraction of the finished part in each of these zones, by samples.
-fn finished_zones(it: &Tiled, built: &Built) -> Vec<f64> {
+fn finished_zones(it: &Tiled, built: &Built) -> Vec<Option<f64>> {
     let (points, _) = sample::inside(&built.solid.region, ZONES * sample::COUNT);
     let values = sample::values(&points, |p, out| built.solid.values(p, out));
     let mut counts = vec![[0.0; 2]; it.zones.len()];
@@ -218,7 +218,7 @@ fn finished_zones(it: &Tiled, built: &Built) -> Vec<f64> {
             counts[zone][1] += f64::from(u8::from(v <= 0.0));
         }
     }
-    counts.into_iter().map(|[all, solid]| solid / f64::max(all, 1.0)).collect()
+    counts.into_iter().map(|[all, solid]| (all > 0.0).then(|| solid / all)).collect()
 }
 
 /// A lattice over a tetrahedral mesh.
@@ -235,6 +235,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
     };
     let (_, volume, solid) = sums(None);
     let mesh = TilingReport {
+        method: if it.explicit && built.blend.is_none() { "explicit" } else { "implicit" },
         count: tiling.map.len(),
         mesh: TetMeshReport { fit: None, ..(&it.mesh).into() },
         edge: tiling.map.mean_edge(),
@@ -277,7 +278,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         let zones = it.zones.iter().enumerate().map(|(i, zone)| {
             let (count, volume, solid) = sums(Some(&zone.numbers));
             let (cell, numbers) = (zone.cell.clone(), zone.numbers.clone());
-            let (solid_fraction, finished_fraction) = (solid / volume, finished.as_ref().map(|of| of[i]));
+            let (solid_fraction, finished_fraction) = (solid / volume, finished.as_ref().and_then(|of| of[i]));
             (zone.name.clone(), ZoneReport { cell, numbers, count, volume, solid_fraction, finished_fraction })
         });
         let tets = TilingReport {

@@ -10,7 +10,8 @@ const OFF: f64 = 0.01;
 const OFF_GRID: f64 = 0.05;
 /// Share of the mesh that may be solid or not: with an overlap, and where tetrahedra are bent, the fraction is known by samples.
 const SAMPLED: f64 = 0.002;
-/// The most of a volume that chords cost in one step along the edge of a tetrahedron, were it of second order there: a tenth in twelve.
+/// The most of a volume that chords are taken to cost, times the square of the steps along the edge of a tetrahedron: a tenth at twelve steps.
+/// What is more off than that has another cause, and no finer step is advised for it.
 const CHORDS: f64 = 0.1 * 12.0 * 12.0;
 /// Fewest steps along the edge of a tetrahedron.
 pub(super) const LEAST: f64 = 4.0;

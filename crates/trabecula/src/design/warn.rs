@@ -245,7 +245,7 @@ pub(super) fn fraction_with_thickness(
         points[worst].map(figure).join(", "),
         figure(asked[worst])
     );
-    warnings.push(Warning { path: format!("{}.fraction", at_level.path), message });
+    warnings.push(Warning { path: format!("{}.{}", at_level.path, amount.key()), message });
     Ok(())
 }
 

@@ -23,7 +23,7 @@ pub struct Mode {
     vector: Vec<f64>,
     /// Its limit.
     value: f64,
-    /// The estimated relative error of that.
+    /// The estimated error of that.
     error: f64,
 }
 
@@ -104,17 +104,7 @@ pub fn modal_limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
     let Some((shape, finest)) = grids.first() else { return none(Vec::new(), 0.0) };
     let n = finest.len().isqrt();
     let (values, vectors) = eigen(finest.chunks(n).map(<[f64]>::to_vec).collect());
-    let modes = |errors: &dyn Fn(usize) -> (f64, f64)| -> Vec<Mode> {
-        let each = vectors.iter().enumerate().map(|(i, vector)| {
-            let (value, error) = errors(i);
-            Mode { vector: vector.clone(), value, error }
-        });
-        each.collect()
-    };
-    let Some((coarse, _)) = grids.get(1) else {
-        let modes = modes(&|i| (values[i], f64::INFINITY));
-        return Limit { modes, ..none(finest.clone(), f64::INFINITY) };
-    };
+    let Some((coarse, _)) = grids.get(1) else { return none(finest.clone(), f64::INFINITY) };
     let ratio = ratio(shape, coarse);
     // The tensor of a grid between two of the eigenvectors.
     let between = |(_, t): &([usize; 3], Vec<f64>), i: usize, j: usize| -> f64 {
@@ -124,12 +114,12 @@ pub fn modal_limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
             .sum()
     };
     let largest = (0..n).fold(0.0f64, |m, i| m.max(values[i]).max(between(&grids[1], i, i)));
-    let mut out = Limit { modes: Vec::with_capacity(n), finest: false, ..none(vec![0.0; n * n], 0.0) };
+    let mut out = Limit { modes: Vec::with_capacity(n), finest: false, ..none(Vec::new(), 0.0) };
     let (mut squares, mut most) = (0.0, -1.0);
+    let mut tensor = vec![0.0; n * n];
     let mut add = |i: usize, j: usize, by: f64| {
-        (0..n * n).for_each(|k| out.tensor[k] += by * vectors[i][k / n] * vectors[j][k % n]);
+        (0..n * n).for_each(|k| tensor[k] += by * vectors[i][k / n] * vectors[j][k % n]);
     };
-    let mut found = Vec::with_capacity(n);
     for i in 0..n {
         let [at, next] = [values[i], between(&grids[1], i, i)];
         let before = grids.get(2).map(|g| [next - between(g, i, i)]);
@@ -145,46 +135,56 @@ pub fn modal_limit(grids: &[([usize; 3], Vec<f64>)]) -> Limit {
         out.finest |= far;
         squares += error * error;
         add(i, i, value);
-        // Of nothing on the finest grid: wrong by all of it.
-        let whole = if value > ROUNDING * largest { value } else { value.abs().max(error) };
-        found.push((value, if error > 0.0 { error / whole } else { 0.0 }));
-        for j in (0..n).filter(|j| *j != i) {
-            let by = -between(&grids[1], i, j) / (ratio.powf(USUAL) - 1.0);
-            squares += by * by;
-            add(i, j, by);
-        }
+        out.modes.push(Mode { vector: vectors[i].clone(), value, error });
     }
-    out.modes = modes(&|i| found[i]);
+    // What is between modes is kept so small that the tensor stays positive (Gershgorin).
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).filter(|(i, j)| i != j) {
+        let by = -between(&grids[1], i, j) / (ratio.powf(USUAL) - 1.0);
+        let product = out.modes[i].value.max(0.0) * out.modes[j].value.max(0.0);
+        let most = FARTHEST / (n - 1) as f64 * product.sqrt();
+        out.finest |= by.abs() > most + ROUNDING * largest;
+        squares += by * by;
+        add(i, j, by.clamp(-most, most));
+    }
+    out.tensor = tensor;
     let whole = if size(&out.tensor) > 0.0 { size(&out.tensor) } else { squares.sqrt().max(f64::MIN_POSITIVE) };
     out.error = squares.sqrt() / whole;
     out
 }
 
 impl Limit {
-    /// The estimated relative error of a · T a, to first order, for the tensor T.
+    /// The estimated relative error of a · T a for the tensor T, but for what is between modes: 1 where nothing is left of it, 0 where
+    /// there is nothing but rounding.
     pub fn error_along(&self, a: &[f64]) -> f64 {
-        self.mean_error(a, |value| value)
+        let sums = self.sums(a, |_| 1.0);
+        if sums.iter().all(|s| *s <= ROUNDING * self.largest()) { 0.0 } else { sums[1] / sums[0].max(sums[1]) }
     }
 
-    /// The estimated relative error of 1 / (a · T⁻¹ a), to first order.
+    /// The estimated relative error of 1 / (a · T⁻¹ a), to first order, but for what is between modes.
     pub fn error_of_inverse(&self, a: &[f64]) -> f64 {
-        self.mean_error(a, |value| 1.0 / value)
+        let least = ROUNDING * self.largest();
+        // d(1/v) = −dv/v².
+        let [value, error] = self.sums(a, |v| if v > least { 1.0 / (v * v) } else { 0.0 });
+        if value > 0.0 { error / value } else { 0.0 }
     }
 
-    /// The mean of the errors of modes, weighted by their shares in a · f(T) a.
-    fn mean_error(&self, a: &[f64], of: impl Fn(f64) -> f64) -> f64 {
-        let (mut sum, mut all) = (0.0, 0.0);
-        for mode in self.modes.iter().filter(|m| m.value > 0.0) {
+    fn largest(&self) -> f64 {
+        self.modes.iter().fold(0.0, |m, mode| m.max(mode.value))
+    }
+
+    /// The limits and the errors of modes, summed by their squared parts in a times a factor.
+    fn sums(&self, a: &[f64], factor: impl Fn(f64) -> f64) -> [f64; 2] {
+        self.modes.iter().fold([0.0; 2], |[value, error], mode| {
             let along: f64 = mode.vector.iter().zip(a).map(|(v, a)| v * a).sum();
-            let share = along * along * of(mode.value);
-            (sum, all) = (sum + share * mode.error, all + share);
-        }
-        if all > 0.0 { sum / all } else { 0.0 }
+            let share = along * along * factor(mode.value);
+            [value + share * mode.value.max(0.0), error + share * mode.error]
+        })
     }
 
     /// A warning if the figures at this path, from `n` voxels along an edge, are no limit.
     pub fn doubt(&self, path: &str, n: usize) -> Option<Warning> {
-        let (by, need) = (100.0 * self.error, 2 * n);
+        let relative = self.modes.iter().map(|m| m.error / m.value.max(m.error).max(f64::MIN_POSITIVE));
+        let (by, need) = (100.0 * relative.fold(self.error, f64::max), 2 * n);
         let message = format!(
             "the grids differ too much for an extrapolation, and figures may be off by more than it changes them ({by:.0} %); take n = {need}"
         );
@@ -245,6 +245,16 @@ mod tests {
         let (stiff, soft) = (found.error_along(&[c, s]), found.error_of_inverse(&[-s, c]));
         assert!((stiff / (0.1 / 512.0) - 1.0).abs() < 1e-6, "{stiff}");
         assert!((soft / (2.0 / 4096.0 / 1e-3) - 1.0).abs() < 1e-6 && found.error < 1e-3, "{soft}");
+        // Nothing on the finest grid and something on the next is wrong by all of it.
+        let gone = |k: f64| vec![1.0, 0.0, 0.0, k];
+        let found = modal_limit(&[([32; 3], gone(0.0)), ([16; 3], gone(0.5))]);
+        assert!(found.error_along(&[0.0, 1.0]) == 1.0 && found.error_along(&[1.0, 0.0]) == 0.0);
+        let noise = modal_limit(&[([32; 3], gone(6e-12)), ([16; 3], gone(2e-12))]);
+        assert!(noise.error_along(&[0.0, 1.0]) == 0.0);
+        // However far the grids are from each other between modes, the limit is positive definite.
+        let found = modal_limit(&[([32; 3], gone(0.02)), ([16; 3], vec![1.1, 0.3, 0.3, 0.12])]);
+        assert!(found.tensor[0] * found.tensor[3] > found.tensor[1] * found.tensor[2], "{:?}", found.tensor);
+        let found = modal_limit(&[grid(64), grid(32), grid(16)]);
         // Along an axis the soft mode is most of the compliance.
         assert!(found.error_of_inverse(&[1.0, 0.0]) > 0.4);
     }

@@ -57,18 +57,6 @@ pub struct LayersSpec {
     pub on: Option<RegionKind>,
 }
 
-impl LayersSpec {
-    /// The depth of the end of each layer, mm.
-    pub fn ends(&self) -> Vec<f64> {
-        let heights = (0..self.count).map(|i| self.height * self.growth.powi(i as i32));
-        let sum = |depth: &mut f64, height: f64| {
-            *depth += height;
-            Some(*depth)
-        };
-        heights.scan(0.0, sum).collect()
-    }
-}
-
 /// The program that makes a tetrahedral mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(name = "Mesher", noun = "mesher")]
@@ -129,7 +117,7 @@ pub enum Ends {
     /// Tied by a net of rods on the surface, from port to port.
     #[kind(hints("tied", "web", "mesh"))]
     Net,
-    /// Rounded: struts end in half balls, walls in half circles.
+    /// Rounded: struts end in half balls, walls nearly in half circles.
     #[kind(hints("round", "balls"))]
     Rounded,
 }

@@ -224,6 +224,8 @@ impl From<&Fit> for FitReport {
 /// A lattice over a tetrahedral mesh.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TilingReport {
+    /// How its surface is made: explicit, in each tetrahedron apart, or implicit, on a grid over the part.
+    pub method: &'static str,
     /// Number of tetrahedra.
     pub count: usize,
     /// The mesh.
@@ -273,7 +275,8 @@ pub struct ZoneReport {
     pub volume: f64,
     /// Solid fraction of the lattice in the zone's flat tetrahedra, without net or rounding.
     pub solid_fraction: f64,
-    /// Solid fraction of the finished part in the zone, by samples; None where it is `solid_fraction`.
+    /// Solid fraction of the finished part in the zone, skin and keep zones included, by samples; None where it is `solid_fraction`, and
+    /// for a zone too small to be sampled.
     pub finished_fraction: Option<f64>,
 }
 

@@ -14,12 +14,7 @@ fn made(space: &Region, size: f64, layers: Option<PrismLayers>) -> Background {
 }
 
 fn layers(count: u32, height: f64, growth: f64, on: Option<Region>) -> PrismLayers {
-    let heights = (0..count).map(|i| height * growth.powi(i as i32));
-    let ends = heights.scan(0.0, |depth, h| {
-        *depth += h;
-        Some(*depth)
-    });
-    PrismLayers { ends: ends.collect(), on }
+    PrismLayers { ends: PrismLayers::ends(count, height, growth), on }
 }
 
 /// The triangles of the boundary by their corners, from the least on.
@@ -59,7 +54,8 @@ fn layers_all_over_a_part_keep_its_boundary() {
         let height = some.between(0.1, 0.4) * size / f64::from(count);
         let what = format!("kind {} {r} {s} {t}, size {size}, {count} layers of {height}", i % 7);
         let plain = made(&space, size, None).mesh;
-        let layered = made(&space, size, Some(layers(count, height, 1.1, None)));
+        let growth = some.between(0.5, 2.0);
+        let layered = made(&space, size, Some(layers(count, height / growth.max(1.0), growth, None)));
         let mesh = &layered.mesh;
         sound(&what, mesh);
         assert!(boundary(&plain) == boundary(mesh), "{what}: another boundary");
@@ -67,7 +63,6 @@ fn layers_all_over_a_part_keep_its_boundary() {
         let found = layered.layers.expect("layers");
         assert_eq!(found.prisms, count as usize * plain.boundary().triangles.len(), "{what}: {found:?}");
         assert!(found.least > 0.0 && found.mean <= 1.0, "{what}: {found:?}");
-        eprintln!("{what}: {found:?}");
     }
 }
 
@@ -120,8 +115,14 @@ fn layers_taper_where_they_end_and_are_thinner_where_there_is_no_room() {
     let found = thin.layers.expect("layers");
     assert!(found.least < 0.7, "{found:?}");
     assert!((thin.mesh.volume() - 4.8).abs() < 1e-11);
-    let nowhere = layers(1, 0.1, 1.0, Some(cuboid([8.0; 3], [9.0; 3])));
+    // Nothing is chosen, or a few triangles all of whose nodes are at the edge of the choice.
     let inside = within(&space, 500, 4);
-    let refused = background(&space, &space.bounds(), &Grade::Constant(0.5), &inside, Some(&nowhere));
-    assert_eq!(refused.expect_err("refused").at, "layers.on");
+    for (on, words) in
+        [(cuboid([8.0; 3], [9.0; 3]), "no triangle"), (cuboid([1.8, 1.3, 1.9], [2.2, 1.7, 2.1]), "lie at its edge")]
+    {
+        let few = layers(1, 0.1, 1.0, Some(on));
+        let refused =
+            background(&space, &space.bounds(), &Grade::Constant(0.7), &inside, Some(&few)).expect_err("refused");
+        assert!(refused.at == "layers.on" && refused.message.contains(words), "{refused}");
+    }
 }

@@ -80,6 +80,10 @@ fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
     let most = if tiling.map.overlap() > 0.0 { MOST_BLENDED } else { MOST } / n.pow(3);
     let work = Work::in_steps(tiling, n).ok()?;
     let map = &tiling.map;
+    if map.overlap() > 0.0 {
+        // Overlapping tetrahedra need positions, which are found in parallel themselves.
+        work.bent_nodes();
+    }
     // The first tetrahedron of each kind, and the kind of each.
     let (mut firsts, mut kinds, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for t in 0..map.len() {
