@@ -1196,6 +1196,8 @@ class TilingReport(Report):
     """Which zones join, where zones have cells of their own."""
     mesh: TetMeshReport
     """The mesh."""
+    method: str
+    """How its surface is made: explicit, in each tetrahedron apart, or implicit, on a grid over the part."""
     overlap: float
     """Overlap of tetrahedra, 0 to 0.2 of their size."""
     pieces: int | None
@@ -1381,7 +1383,8 @@ class ZoneReport(Report):
     count: int
     """Number of tetrahedra."""
     finished_fraction: float | None
-    """Solid fraction of the finished part in the zone, by samples; None where it is `solid_fraction`."""
+    """Solid fraction of the finished part in the zone, skin and keep zones included, by samples; None where it is
+    `solid_fraction`, and for a zone too small to be sampled."""
     numbers: list[int]
     """Numbers of its tetrahedra in the mesh: several, where elements of a group are of other groups too."""
     solid_fraction: float
