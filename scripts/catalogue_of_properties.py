@@ -131,7 +131,8 @@ def lines(laws):
     yield (
         "Effective figures of the periodic cell by its solid fraction, for a solid of Poisson's ratio 0.3: limits of three "
         "grids, by [`trabecula law`](../guide/what-the-cell-does.md). All numbers, with the error of each, stand in "
-        "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through. "
+        "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through "
+        "or was not computed: flow takes most of the time, and is of as many nodes along the cell as stand after K. "
         "Tetrahedral cells stand in the equal tetrahedra of a body-centred cubic lattice, and λ is the edge of a regular one "
         "of the same volume; their permeability is left out."
     )
