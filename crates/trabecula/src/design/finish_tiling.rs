@@ -238,9 +238,9 @@ impl<'a> Finish<'a> {
                 let own = if tiling.part == Part::Sheet { sheet().map(|w| BLUNT * 0.5 * w) } else { None };
                 let radius = own.unwrap_or_else(|| tiling.ports().1);
                 let field = Arc::new(Rounded::new(&tiling, &self.region, radius));
-                // Each wall has a radius of its own: the mean is told where that is known.
-                let told = if tiling.part == Part::Sheet { own } else { Some(radius) };
-                Ok(Finished { field, radius: told, ..plain })
+                // Each wall has a radius of its own: the mean is reported where that is known.
+                let known = if tiling.part == Part::Sheet { own } else { Some(radius) };
+                Ok(Finished { field, radius: known, ..plain })
             }
             _ => Ok(plain),
         }
