@@ -14,7 +14,9 @@ __all__ = ["Curve", "Panel", "law_plots", "panels"]
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 460, 320, 64, 112, 34, 44
 #: Distinct also to those who see fewer colours (after Okabe and Ito); dashes where there are more curves.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#28282c")
-DASHES = ("", "6 3", "2 2")
+DASHES = ("", "6 3", "2 2", "8 3 2 3")
+#: Height of a row of the legend and width of a letter in it, px.
+ROW, LETTER = 16, 6.2
 
 
 @dataclass
@@ -44,13 +46,16 @@ class Panel:
 def panels(of: Sequence[Panel], wide: int = 2) -> str:
     """The panels in rows of ``wide``."""
     columns, rows = min(wide, len(of)), math.ceil(len(of) / wide)
-    x, y = WIDTH * columns, HEIGHT * rows
+    longest = max((len(c.name) for panel in of for c in panel.curves), default=0)
+    legend = max(RIGHT, math.ceil(34 + LETTER * longest))
+    width = WIDTH - RIGHT + legend
+    x, y = width * columns, HEIGHT * rows
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{x}" height="{y}" viewBox="0 0 {x} {y}" {FONT}>'
     parts = [head, f'<rect width="{x}" height="{y}" fill="white"/>']
     for i, panel in enumerate(of):
         parts += [
-            f'<g transform="translate({WIDTH * (i % wide)} {HEIGHT * (i // wide)})" fill="{INK}">',
-            *_drawn(panel),
+            f'<g transform="translate({width * (i % wide)} {HEIGHT * (i // wide)})" fill="{INK}">',
+            *_drawn(panel, WIDTH - RIGHT),
             "</g>",
         ]
     return "\n".join([*parts, "</svg>\n"])
@@ -60,7 +65,8 @@ def _good(x: float, y: float, log: bool) -> bool:
     return math.isfinite(x) and math.isfinite(y) and (y > 0 or not log)
 
 
-def _drawn(panel: Panel) -> Iterator[str]:
+def _drawn(panel: Panel, right: int) -> Iterator[str]:
+    """A panel whose plot ends at ``right``, where its legend begins."""
     pairs = [(x, y) for c in panel.curves for x, y in [*zip(c.x, c.y, strict=True), *zip(c.along, c.values, strict=True)]]
     pairs = [pair for pair in pairs if _good(*pair, panel.log)]
     yield label(LEFT, 20, panel.title, 'font-weight="bold"')
@@ -71,7 +77,8 @@ def _drawn(panel: Panel) -> Iterator[str]:
     low, high = min(y for _, y in pairs), max(y for _, y in pairs)
     up = _decades(low, high) if panel.log else ticks(min(low, 0.0), high)
     scale = math.log10 if panel.log else float
-    right, base = WIDTH - RIGHT, HEIGHT - BELOW
+    base = HEIGHT - BELOW
+    step = min(ROW, (HEIGHT - ABOVE - 14) / max(len(panel.curves), 1))
 
     def px(x: float) -> float:
         return LEFT + (right - LEFT) * (x - across[0]) / (across[-1] - across[0])
@@ -97,9 +104,10 @@ def _drawn(panel: Panel) -> Iterator[str]:
             if _good(x, y, panel.log):
                 words = escape(f"{curve.name}: {x:.4g}, {y:.5g}")
                 yield f'<circle cx="{px(x):.2f}" cy="{py(y):.2f}" r="2.6" fill="{colour}"><title>{words}</title></circle>'
-        row = ABOVE + 10 + 16 * i
-        yield f'<path d="M{right + 10} {row - 4}h16" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash or "none"}"/>'
-        yield label(right + 30, row, curve.name, 'font-size="11"')
+        row = ABOVE + 10 + step * i
+        drawn = f'stroke="{colour}" stroke-width="2" stroke-dasharray="{dash or "none"}"'
+        yield f'<path d="M{right + 10} {row - 4:.2f}h16" {drawn}/>'
+        yield label(right + 30, row, curve.name, f'font-size="{min(11, round(step))}"')
 
 
 def _decades(low: float, high: float) -> list[float]:
