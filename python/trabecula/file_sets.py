@@ -138,7 +138,7 @@ def of_vtu(path: str) -> Sets:
 
         def array(tag: str) -> NDArray[np.uint8]:
             match = re.search(r'offset="(\d+)"', tag)
-            file.seek(start + int(match[1] if match else 0))
+            file.seek(min(start + int(match[1] if match else 0), whole))
             size = min(int.from_bytes(file.read(8), "little"), whole)
             return np.frombuffer(file.read(size), dtype=np.uint8)
 

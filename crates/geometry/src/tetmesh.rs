@@ -1,6 +1,6 @@
 //! Tetrahedral meshes: the domain of a lattice that follows the part's own shape.
 
-use crate::math::{Vec3, cross, dot, sub};
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 use crate::union_find::{find, unite};
 
@@ -35,6 +35,28 @@ pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 
 /// Volume of a tetrahedron (mm³): (b − a) × (c − a) · (d − a) / 6.
 pub fn volume([a, b, c, d]: [Vec3; 4]) -> f64 {
     dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0
+}
+
+/// The area (mm²) where the linear function with these values at the corners of a tetrahedron is zero; 0 where it has one sign.
+pub fn cut_area(corners: [Vec3; 4], values: [f64; 4]) -> f64 {
+    // Most are on one side.
+    if values.iter().all(|v| *v > 0.0) || values.iter().all(|v| *v <= 0.0) {
+        return 0.0;
+    }
+    let (above, below): (Vec<usize>, Vec<usize>) = (0..4).partition(|i| values[*i] > 0.0);
+    let cut = |a: usize, b: usize| {
+        let at = values[a] / (values[a] - values[b]);
+        add(corners[a], scale(sub(corners[b], corners[a]), at))
+    };
+    let triangle = |a: Vec3, b: Vec3, c: Vec3| 0.5 * norm(cross(sub(b, a), sub(c, a)));
+    match (&above[..], &below[..]) {
+        ([a], [b, c, d]) | ([b, c, d], [a]) => triangle(cut(*a, *b), cut(*a, *c), cut(*a, *d)),
+        ([a, b], [c, d]) => {
+            let [p, q, r, s] = [cut(*a, *c), cut(*a, *d), cut(*b, *d), cut(*b, *c)];
+            triangle(p, q, r) + triangle(p, r, s)
+        }
+        _ => 0.0,
+    }
 }
 
 impl TetMesh {
@@ -139,6 +161,16 @@ impl TetMesh {
 mod tests {
     use super::*;
     use crate::measure::size;
+
+    /// Planes that cut one corner and two corners off a tetrahedron: a right triangle and a rectangle.
+    #[test]
+    fn areas_of_cuts_are_those_of_plane_sections() {
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let of = |f: fn(Vec3) -> f64| cut_area(corners, corners.map(f));
+        assert!((of(|p| p[0] - 0.5) - 0.125).abs() < 1e-15);
+        assert!((of(|p| p[0] + p[1] - 0.5) - 0.125f64.sqrt()).abs() < 1e-15);
+        assert_eq!((of(|_| 1.0), of(|p| -p[0])), (0.0, 0.0));
+    }
 
     /// The unit cube as six tetrahedra around a diagonal.
     pub fn cube() -> TetMesh {

@@ -354,7 +354,7 @@ fn made(
             let volume = domain.report.region_volume.unwrap_or_else(|| map.boundary().volume());
             finish.bent(tiling, asked, volume)?
         }
-        None if bent || finish.changes() => finish.told(tiling)?,
+        None if bent || finish.changes() => finish.at_own_level(tiling)?,
         _ => finish.made(tiling, asked, whole)?,
     };
     Ok(Made { done, alone, explicit, zones: Vec::new(), joins: None })

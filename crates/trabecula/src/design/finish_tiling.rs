@@ -193,7 +193,7 @@ impl<'a> Finish<'a> {
     }
 
     /// The lattice with its ends at its own level, and the fraction that the finished part has by that.
-    pub fn told(&self, tiling: Tiling) -> Result<Finished, DesignError> {
+    pub fn at_own_level(&self, tiling: Tiling) -> Result<Finished, DesignError> {
         let made = self.made(tiling, None, false)?;
         let (points, _) = sample::inside(&self.region, POINTS);
         let mut solid = vec![false; points.len()];

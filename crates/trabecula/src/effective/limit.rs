@@ -183,7 +183,8 @@ impl Limit {
 
     /// A warning if the figures at this path, from `n` voxels along an edge, are no limit.
     pub fn doubt(&self, path: &str, n: usize) -> Option<Warning> {
-        let relative = self.modes.iter().map(|m| m.error / m.value.max(m.error).max(f64::MIN_POSITIVE));
+        let counts = |m: &&Mode| m.value.max(m.error) > ROUNDING * self.largest();
+        let relative = self.modes.iter().filter(counts).map(|m| m.error / m.value.max(m.error));
         let (by, need) = (100.0 * relative.fold(self.error, f64::max), 2 * n);
         let message = format!(
             "the grids differ too much for an extrapolation, and figures may be off by more than it changes them ({by:.0} %); take n = {need}"

@@ -1,8 +1,9 @@
 //! The pore of a periodic cell on a cubic grid: nodes, the distances of walls along links, the area of the wall.
 
 use geometry::fault::Fault;
-use geometry::math::{Mat3, Vec3, add, apply, cross, determinant, inverse, norm, product, scale, sub, transpose};
+use geometry::math::{Mat3, Vec3, apply, determinant, inverse, product, transpose};
 use geometry::progress::{Progress, Stage, Stopped};
+use geometry::tetmesh::cut_area;
 use homogenise::{PoreGrid, VELOCITIES, WallLink, upper_edges};
 use rayon::prelude::*;
 
@@ -275,22 +276,4 @@ fn zero_area(grid: &CubicGrid, alone: &PoreGrid, values: &[f64]) -> f64 {
         })
         .collect();
     each.into_iter().sum::<f64>() * grid.step * grid.step
-}
-
-/// The area of the zero set of the linear function with these values at the corners of a tetrahedron.
-fn cut_area(corners: [Vec3; 4], values: [f64; 4]) -> f64 {
-    let (above, below): (Vec<usize>, Vec<usize>) = (0..4).partition(|i| values[*i] > 0.0);
-    let cut = |a: usize, b: usize| {
-        let at = values[a] / (values[a] - values[b]);
-        add(corners[a], scale(sub(corners[b], corners[a]), at))
-    };
-    let triangle = |a: Vec3, b: Vec3, c: Vec3| 0.5 * norm(cross(sub(b, a), sub(c, a)));
-    match (&above[..], &below[..]) {
-        ([a], [b, c, d]) | ([b, c, d], [a]) => triangle(cut(*a, *b), cut(*a, *c), cut(*a, *d)),
-        ([a, b], [c, d]) => {
-            let [p, q, r, s] = [cut(*a, *c), cut(*a, *d), cut(*b, *d), cut(*b, *c)];
-            triangle(p, q, r) + triangle(p, r, s)
-        }
-        _ => 0.0,
-    }
 }

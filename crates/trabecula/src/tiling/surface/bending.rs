@@ -13,7 +13,8 @@ use super::Work;
 use crate::cell::Part;
 use crate::tiling::Tiling;
 use crate::tiling::mixture::{Size, weights};
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, scale};
+use geometry::tetmesh::{cut_area, volume};
 
 /// Steps along the edge of a tetrahedron, coarse and fine.
 const STEPS: [usize; 2] = [8, 16];
@@ -106,38 +107,18 @@ fn bent_tet(work: &Work, size: &Size, t: usize) -> BentTet {
     let Some(places) = work.places(t) else {
         return BentTet { t, gains: vec![0.0; size.tets.len()], area: 0.0 };
     };
-    let volume = |at: &[Vec3], small: &[u32; 4]| {
-        let [a, b, c, d] = small.map(|n| at[n as usize]);
-        dot(cross(sub(b, a), sub(c, a)), sub(d, a)).abs() / 6.0
-    };
-    let gain = |small: &[u32; 4]| (volume(&places.nodes, small) - volume(&flat, small)) as f32;
+    let corners = |at: &[Vec3], small: &[u32; 4]| small.map(|n| at[n as usize]);
+    let change =
+        |small: &[u32; 4], of: &dyn Fn([Vec3; 4]) -> f64| of(corners(&places.nodes, small)) - of(corners(&flat, small));
+    let gain = |small: &[u32; 4]| change(small, &|corners| volume(corners).abs()) as f32;
     let area = match work.tiling.part {
         Part::Sheet => {
-            let f = &size.cells[0];
-            let crossed = size
-                .tets
-                .iter()
-                .filter(|s| s.iter().any(|n| f[*n as usize] < 0.0) && s.iter().any(|n| f[*n as usize] >= 0.0));
-            crossed.map(|small| zero_area(&places.nodes, f, small) - zero_area(&flat, f, small)).sum()
+            let values = |small: &[u32; 4]| small.map(|n| size.cells[0][n as usize]);
+            size.tets.iter().map(|small| change(small, &|corners| cut_area(corners, values(small)))).sum()
         }
         _ => 0.0,
     };
     BentTet { t, gains: size.tets.iter().map(gain).collect(), area }
-}
-
-/// The area where what is linear in a small tetrahedron is zero.
-fn zero_area(at: &[Vec3], f: &[f64], small: &[u32; 4]) -> f64 {
-    let (below, above): (Vec<usize>, Vec<usize>) = small.iter().map(|n| *n as usize).partition(|n| f[*n] < 0.0);
-    let root = |a: usize, b: usize| add(at[a], scale(sub(at[b], at[a]), f[a] / (f[a] - f[b])));
-    let triangle = |p: Vec3, q: Vec3, r: Vec3| norm(cross(sub(q, p), sub(r, p))) / 2.0;
-    match (&below[..], &above[..]) {
-        ([a], [b, c, d]) | ([b, c, d], [a]) => triangle(root(*a, *b), root(*a, *c), root(*a, *d)),
-        ([a, b], [c, d]) => {
-            let [p, q, r, s] = [root(*a, *c), root(*a, *d), root(*b, *d), root(*b, *c)];
-            triangle(p, q, r) + triangle(p, r, s)
-        }
-        _ => 0.0,
-    }
 }
 
 impl Tiling {
