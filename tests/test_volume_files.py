@@ -456,7 +456,10 @@ def test_sets_are_measured_as_far_as_a_format_has_them(tmp_path, kind):
     has = {"inp": ["nodes", "elements", "faces"], "xdmf": ["nodes", "elements"], "vtu": ["nodes"], "bdf": ["nodes"]}
     domains = {name: {"elements": int((mesh.domain == number).sum())} for number, name in enumerate(mesh.domains)}
     assert {name: found.pop(name) for name in mesh.domains} == domains
-    expected = {name: {what: counts[what] for what in has.get(kind, ["faces"]) if counts[what]} for name, counts in of.items()}
+    # A keep zone is a part of the solid, so that its elements are a group of volumes of Gmsh and an array of a VTU.
+    bulk = {"msh": ["faces", "elements"], "vtu": ["nodes", "elements"]}
+    wanted = {name: (bulk if name == "KEEP_bolt" else has).get(kind, has.get(kind, ["faces"])) for name in of}
+    expected = {name: {what: counts[what] for what in wanted[name] if counts[what]} for name, counts in of.items()}
     if kind in ("msh2", "mesh"):  # there a face is in the smallest of its sets
         assert found["LOWER_X0"] == expected["LOWER_X0"] and set(found) <= set(expected)
         every = np.concatenate([one.faces for one in mesh.sets.values()])
@@ -545,6 +548,29 @@ def test_a_periodic_mesh_with_reference_nodes_is_measured(tmp_path):
     assert (figures["elements"], figures["nodes"]) == (report.elements, report.nodes)
     assert figures["volume"] == pytest.approx(report.volume, rel=1e-12)
     assert {"SOLID", "X0", "LATTICE"} <= set(figures["sets"])
+
+
+@pytest.mark.parametrize("order, suffix", [(1, "msh"), (2, "msh"), (1, "msh2")])
+def test_gmsh_is_told_which_surfaces_are_periodic(order, suffix, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    # A set on X1 alone parts that plane in two, each with its images on X0.
+    part = {"part": lt.region.box(min=[1.5, -3, 0], max=[3, 3, 3])}
+    mesh = solid(set=part).volume_mesh(per_cell=14, periodic=True, order=order)
+    mesh.write(tmp_path / f"rve.{suffix}")
+    assert "part" in measured(tmp_path / f"rve.{suffix}")["sets"]
+    links = meshio.gmsh.read(tmp_path / f"rve.{suffix}").gmsh_periodic
+    along, period = np.zeros((3, len(mesh.nodes)), dtype=bool), np.ptp(mesh.nodes, axis=0)
+    for dimension, (own, master), transform, nodes in links:
+        shift = np.reshape([float(v) for v in transform if np.ndim(v) == 0][-16:], (4, 4))[:3, 3]
+        (axis,) = np.flatnonzero(shift)
+        a, b = mesh.nodes[nodes[:, 0]], mesh.nodes[nodes[:, 1]]
+        assert dimension == 2 and own != master
+        assert (np.delete(a, axis, 1) == np.delete(b, axis, 1)).all()
+        assert (a[:, axis] - b[:, axis] == period[axis]).all() and shift[axis] == period[axis]
+        along[axis, nodes[:, 0]] = True
+    for axis, name in enumerate(("X1", "Y1", "Z1")):
+        assert (np.flatnonzero(along[axis]) == mesh.sets[name].nodes).all()
+    assert len(links) > 3
 
 
 def test_nodes_in_several_blocks_are_read_and_parts_are_not_mixed_up(tmp_path):

@@ -32,10 +32,11 @@ if TYPE_CHECKING:
     from .thickness import Thickness
     from .transition import Transitions
     from .viewer import View, view
-    from .volumes import Carrier, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
+    from .volumes import BeamMesh, Carrier, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
+    "BeamMesh",
     "Beams",
     "Carrier",
     "Design",
@@ -101,6 +102,7 @@ _HOMES = {
     "Transitions": "transition",
     "Carrier": "volumes",
     "VolumeMesh": "volumes",
+    "BeamMesh": "volumes",
     "ShellMesh": "volumes",
     "VoxelElements": "volumes",
     "VolumeSet": "volumes",

@@ -388,29 +388,31 @@ COMMANDS = {
         ".inp has the nodes, elements and faces of each set, .msh its faces, .msh2, .mesh and .foam those of its faces that\n"
         "are in no smaller set, .vtu and .bdf its nodes, .xdmf its nodes and elements.\n"
         "The .inp of a --periodic cell has equations and six steps, that of --hold and --load a step: they run as they are.\n"
-        "--voxels makes hexahedra with their solid fractions (.inp, .msh, .msh2, .vtu, .xdmf). Beams alone are B31 or CBAR\n"
-        "elements by trabecula mesh DESIGN -o OUT.inp --beams.\n\n"
+        "--voxels makes hexahedra with their solid fractions (.inp, .msh, .msh2, .vtu, .xdmf), --of beams line elements of\n"
+        "beams alone (.inp, .bdf, .vtu); of their sections CalculiX takes diameters and Abaqus radii (--solver).\n\n"
         "examples:\n  trabecula volume part.toml -o part.inp --wall 3 --order 2\n"
         "  trabecula volume part.toml -o part.inp --edge 0.5 --order 2 --E 114000 --nu 0.34 --hold X0 --load X1=0,-1000,0\n"
         "  trabecula volume part.toml -o voxels.inp --voxels 0.2\n"
         "  trabecula volume part.toml -o shell.inp --of shell --per-cell 24 --order 2\n"
+        "  trabecula volume frame.toml -o frame.inp --of beams --E 114000 --nu 0.34 --hold Z0 --load Z1=0,0,-100\n"
         "  trabecula volume exchanger.toml -o fluids.msh --of all\n"
         "  trabecula volume foam.toml -o carrier.vtu --of carrier --fields stiffness\n"
         "  trabecula volume cell.toml -o rve.inp --periodic --per-cell 32 --E 114000 --nu 0.34",
         *(DESIGN, output(VOLUME_WRITES, f"the mesh to write ({dotted(VOLUME_WRITES)})")),
         [
-            option("--edge", type=LENGTH, metavar="MM", help="longest edge of most tetrahedra, mm"),
+            option("--edge", type=LENGTH, metavar="MM", help="longest edge of most tetrahedra, longest element of beams, mm"),
             option("--per-cell", type=SAMPLES, metavar="N", help="edges along the smallest wavelength"),
             option("--wall", type=SAMPLES, metavar="N", help="edges through the thinnest wall (default: 2)"),
             option("--voxels", type=LENGTH, metavar="MM", help="hexahedra of a grid instead, with their exact solid fractions"),
         ],
-        option("--order", type=int, choices=(1, 2), default=1, help="linear (default) or quadratic elements"),
+        option("--order", type=int, choices=(1, 2), help="linear or quadratic elements (default: 1, of beams 2, but in .bdf)"),
         option(
             "--of",
-            choices=("solid", "pore", "lower", "upper", "all", "shell", "carrier"),
+            choices=("solid", "pore", "lower", "upper", "all", "shell", "beams", "carrier"),
             default="solid",
             help="solid (default), pore, the space on one side of a sheet, or all of them with common nodes; "
-            "shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu); or carrier: the "
+            "shell: triangles on the mid-surface of a sheet with its thickness at nodes (.inp, .bdf, .vtu); beams: line "
+            "elements along their axes with sections (.inp, .bdf, .vtu); or carrier: the "
             "tetrahedra of a lattice over tetrahedra, each a material by its solid fraction",
         ),
         option(
@@ -430,6 +432,7 @@ COMMANDS = {
             help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), "
             "orientation (unit vectors along the cell's axes), wavelength; and of a carrier's elements stiffness",
         ),
+        option("--solver", choices=("calculix", "abaqus"), help="whose .inp of --of beams it is: calculix (default) or abaqus"),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(
             "--load",

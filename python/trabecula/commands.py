@@ -11,7 +11,7 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import DesignError, Refused, WrongUsage
 from .files import check_place, read_text, write_text
-from .formats import DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
+from .formats import BEAM_ELEMENT_WRITES, DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .local_fields import fields_at
 from .measuring import draw, measure, transitions
@@ -21,7 +21,7 @@ from .slicing import slice
 from .starter import starter
 from .terminal import Progress, figure, put_json, say, settle, warned
 from .texts import counted
-from .volumes import check_case, check_order, check_steps
+from .volumes import check_case, check_order, check_solver, check_steps
 
 # fmt: off
 __all__ = [
@@ -134,6 +134,8 @@ def volume(args) -> None:
     """``trabecula volume``."""
     (check_case if kind_of(args.output) == "foam" else check_place)(args.output)
     keep_file(args.design, args.output)
+    if args.order is None:
+        args.order = 2 if args.of == "beams" and kind_of(args.output) != "bdf" else 1
     check_elements(args)
     check_sets(args)
     solid = build(args.design, tell=not args.json)
@@ -150,6 +152,8 @@ def volume(args) -> None:
             made = solid.voxel_elements(args.voxels, threads=args.threads, progress=progress, **share)
         elif carried:
             made = solid.carrier(args.order, args.threads)
+        elif args.of == "beams":
+            made = solid.beam_mesh(args.edge, args.order, args.islands, args.threads)
         elif args.of == "shell":
             made = solid.shell_mesh(args.edge, args.per_cell, args.order, args.threads, progress)
         else:
@@ -163,13 +167,16 @@ def volume(args) -> None:
         with Progress("stiffness", args.progress) as progress:
             fields |= made.moduli(args.nu, threads=args.threads, progress=progress)
     settle()
-    made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()), fields)
+    solver = {"solver": args.solver or "calculix"} if args.of == "beams" else {}
+    made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()), fields, **solver)
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
     if args.json:
         return put_json(figures | {"warnings": warned()})
     what, quality = "hexahedra", ""
     if args.of == "shell":
         what, quality = "triangles", f", thickness {figures['thinnest']:.4g} to {figures['thickest']:.4g} mm"
+    elif args.of == "beams":
+        what, quality = "elements", f", radius {figures['thinnest']:.4g} to {figures['thickest']:.4g} mm"
     elif args.voxels is None:
         what = "tetrahedra"
         quality = f", dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees"
@@ -187,11 +194,13 @@ def check_elements(args) -> None:
     check_steps(kind, args.hold or (), dict(args.load or ()))
     if args.hold and args.periodic:
         raise WrongUsage("a periodic mesh has steps of its own; leave out --hold and --load")
-    if args.hold and args.of not in ("solid", "shell", "carrier"):
-        raise WrongUsage(f"--hold and --load are for --of solid, shell or carrier, not {args.of}")
-    tets = args.voxels is None and args.of not in ("shell", "carrier")
-    if args.islands != "keep" and (not tets or args.periodic or args.of == "all"):
-        raise WrongUsage("--islands is for tetrahedra of one domain that is not periodic; leave it out")
+    if args.hold and args.of not in ("solid", "shell", "beams", "carrier"):
+        raise WrongUsage(f"--hold and --load are for --of solid, shell, beams or carrier, not {args.of}")
+    if args.solver and args.of != "beams":
+        raise WrongUsage("--solver belongs to --of beams; other .inp files are the same for both")
+    whole = args.voxels is not None or args.of in ("shell", "carrier")
+    if args.islands != "keep" and (whole or args.periodic or args.of == "all"):
+        raise WrongUsage("--islands is for beams, and tetrahedra of one domain that is not periodic; leave it out")
     if args.voxels is None:
         if args.least is not None:
             raise WrongUsage("--least belongs to --voxels; add it")
@@ -200,11 +209,19 @@ def check_elements(args) -> None:
             sized = {"--edge": args.edge, "--per-cell": args.per_cell, "--wall": args.wall, "--periodic": args.periodic}
             for name in (name for name, given in sized.items() if given):
                 raise WrongUsage(f"{name} is for other meshes than --of carrier, of the design's own tetrahedra; leave it out")
-        if args.of == "shell":
-            for name in (name for name, given in {"--wall": args.wall, "--periodic": args.periodic}.items() if given):
-                raise WrongUsage(f"{name} is for tetrahedra; leave it out, or --of shell")
-            if kind_of(args.output) not in SHELL_WRITES:
-                raise Refused(f"{args.output}: the name of shells must end in {dotted(SHELL_WRITES)}")
+        if args.of in ("shell", "beams"):
+            sized = {"--wall": args.wall, "--periodic": args.periodic}
+            sized |= {"--per-cell": args.per_cell} if args.of == "beams" else {}
+            for name in (name for name, given in sized.items() if given):
+                raise WrongUsage(f"{name} is for other meshes than --of {args.of}; leave it out")
+            writes = SHELL_WRITES if args.of == "shell" else BEAM_ELEMENT_WRITES
+            if kind not in writes:
+                raise Refused(f"{args.output}: the name of {args.of.removesuffix('s')}s must end in {dotted(writes)}")
+        if args.of == "beams":
+            try:
+                check_solver(kind, args.solver, args.order)
+            except ValueError as error:
+                raise Refused(f"{args.output}: {error}") from None
         return
     given = {"--order": args.order != 1, "--of": args.of != "solid", "--periodic": args.periodic}
     for name in (name for name, is_given in given.items() if is_given):
@@ -220,9 +237,9 @@ def check_sets(args) -> None:
         return
     design = design_of(args.design)
     surface = args.voxels is not None or args.of == "carrier"
-    own = ("SURFACE",) if surface else ("BORDER",) if args.of == "shell" else ("CUT", "LATTICE")
+    own = ("SURFACE",) if surface else {"shell": ("BORDER",), "beams": ()}.get(args.of, ("CUT", "LATTICE"))
     known = [*own, "X0", "X1", "Y0", "Y1", "Z0", "Z1", *(design.set or ())]
-    if not surface and args.of != "shell":
+    if not surface and args.of not in ("shell", "beams"):
         known += ["SKIN"] if design.skin else []
         known += ["NET"] if any("tets" in (it.map or {}) for it in (design.lattice or {}).values()) else []
         known += [f"KEEP_{name}" for name in design.keep or ()]

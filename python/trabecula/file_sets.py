@@ -123,7 +123,7 @@ def referenced(mesh: meshio.Mesh, key: str, dimension: int, names: dict[int, str
 
 
 def of_vtu(path: str) -> Sets:
-    """Domains and sets of nodes in a VTU whose arrays follow as they are, as Trabecula writes it; none of other files."""
+    """Domains and sets in a VTU whose arrays follow as they are, as Trabecula writes it; none of other files."""
     import numpy as np
 
     with open(path, "rb") as file:
@@ -147,9 +147,10 @@ def of_vtu(path: str) -> Sets:
             tags = re.findall(r'<DataArray type="UInt8" Name="([^"]*)" NumberOfComponents="1"([^>]*)>', within)
             return {name: array(tag) for name, tag in tags}
 
-        found = flagged(bytes_of("PointData"))
+        cells = bytes_of("CellData")
+        domain = cells.pop("domain", None)
+        found = merged(flagged(bytes_of("PointData")), flagged(cells, "elements"))
         comment = re.search(r"<!-- domains, from 0: (.*?) -->", text)
-        domain = bytes_of("CellData").get("domain")
     if comment is None or domain is None:
         return found
     names = dict(enumerate(comment[1].split(", ")))

@@ -8,7 +8,16 @@ from typing import NamedTuple
 from . import _core
 
 __all__ = [
-    *("BEAMS", "BEAM_READS", "BEAM_WRITES", "CONDUCTIVITY_WRITES", "LAW_WRITES", "PERMEABILITY_WRITES", "STIFFNESS_WRITES"),
+    *(
+        "BEAMS",
+        "BEAM_ELEMENT_WRITES",
+        "BEAM_READS",
+        "BEAM_WRITES",
+        "CONDUCTIVITY_WRITES",
+        "LAW_WRITES",
+        "PERMEABILITY_WRITES",
+        "STIFFNESS_WRITES",
+    ),
     *("CAD_READS", "DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS"),
     *(
         "MESH_WRITES",
@@ -73,7 +82,8 @@ LAYER_WRITES = tuple(LAYERS)
 #: The formats of volume meshes: suffix, what it is.
 VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, next to the folder constant/polyMesh"}
 VOLUME_WRITES = tuple(VOLUMES)
-#: The formats of shells, and those of voxels as finite elements.
+#: The formats of beams, of shells, and of voxels as finite elements.
+BEAM_ELEMENT_WRITES = tuple(suffix for suffix, _ in _core.beam_element_formats())
 SHELL_WRITES = tuple(suffix for suffix, _ in _core.shell_formats())
 VOXEL_ELEMENT_WRITES = (*dict(_core.voxel_element_formats()), "xdmf")
 #: Those that are read back.

@@ -131,9 +131,12 @@ def measure_tets(args) -> None:
         )
     volume = quality.volume if full is None or full.volume is None else full.volume
     zones = np.asarray(made.zones)
-    counts = {name: int(np.isin(zones, numbers).sum()) for name, numbers in made.zone_names.items()}
-    own = {name: {"elements": count} for name, count in counts.items() if count}
-    sets = merged(json.loads(str(arrays[-1])) if arrays else of_vtu(args.file), own)
+    # A number beside the name of the same zones is no set.
+    named = [numbers for name, numbers in made.zone_names.items() if not name.isdigit()]
+    own = {name: it for name, it in made.zone_names.items() if not (name.isdigit() and it in named)}
+    counts = {name: int(np.isin(zones, numbers).sum()) for name, numbers in own.items()}
+    elements_of = {name: {"elements": count} for name, count in counts.items() if count}
+    sets = merged(json.loads(str(arrays[-1])) if arrays else of_vtu(args.file), elements_of)
     figures = {
         "elements": quality.tets,
         "order": 1 if full is None else 2,

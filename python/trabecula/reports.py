@@ -7,6 +7,7 @@ from .record import Report
 # ruff: noqa: RUF012  the parts of a class are declared by its base
 
 __all__ = [
+    "BeamMeshReport",
     "BeamsFileReport",
     "BeamsReport",
     "BlendReport",
@@ -68,6 +69,42 @@ __all__ = [
     "ZoneJoin",
     "ZoneReport",
 ]
+
+
+class BeamMeshReport(Report):
+    """The figures of beams as finite elements."""
+
+    _parts = {
+        "sets": "SetReport",
+    }
+    _by_name = frozenset(["sets"])
+
+    beams: int
+    """Number of beams of which some length is in the region."""
+    cut: int
+    """Number of those that the region cuts."""
+    elements: int
+    """Number of elements."""
+    length: float
+    """Length of all axes, mm."""
+    loose: float
+    """Length of components that were left out, mm."""
+    nodes: int
+    """Number of nodes."""
+    order: int
+    """1 for linear elements, 2 for quadratic ones."""
+    pieces: int
+    """Number of connected components."""
+    sections: int
+    """Number of sections: radii to five digits, each with one or two directions of its first axis."""
+    sets: dict[str, SetReport]
+    """The named sets; faces are ends of elements."""
+    thickest: float
+    """Greatest radius of an element, mm."""
+    thinnest: float
+    """Smallest radius of an element, mm."""
+    volume: float
+    """Area times length of all elements, mm³: more than the solid's volume, since beams overlap in hubs."""
 
 
 class BeamsFileReport(Report):

@@ -12,7 +12,7 @@ from . import _core
 from .errors import DesignWarning
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .volumes import OF, TET_BYTES, VOXEL_BYTES, Carrier, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, Carrier, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -183,6 +183,42 @@ class Simulated:
         order = _order(order, "triangles")
         size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
         made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
+        if found := made._core.warning:
+            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+        return made
+
+    def beam_mesh(
+        self,
+        edge: float | None = None,
+        order: int = 2,
+        islands: Literal["keep", "drop", "error"] = "keep",
+        threads: int | None = None,
+    ) -> BeamMesh:
+        """Beams alone as line elements along their axes, as far as these are in the region: a model with few unknowns of a
+        lattice of slender beams.
+
+        Elements are at most ``edge`` (mm) long; without it each beam has four. ``order`` 2 gives quadratic ones. Each has a
+        circular section, the mean of the beam's along it; hubs are joints without size, and fillets are left out. Beams are
+        cut where the region's boundary crosses their axes; those that lie in it have whole sections.
+
+        ``islands`` says what becomes of connected components other than the longest: ``"keep"``, with a warning, ``"drop"`` or
+        ``"error"``. Raises ValueError for a design that is more or other than one graph of beams.
+        """
+        order = _order(order, "beams")
+        if islands not in ("keep", "drop", "error"):
+            raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+        size = None if edge is None else positive("edge", edge)
+        made = BeamMesh(_core.BeamElements.make(self._core, size, order == 2, islands == "drop", thread_count(threads)))
+        pieces = made.report().pieces
+        if pieces > 1 and islands == "error":
+            raise ValueError(f"the beams have {pieces} components that do not touch; drop or keep those other than the longest")
+        if pieces > 1:
+            warnings.warn(
+                f"the beams have {pieces} components that do not touch: loose ones are not held by supports on another; "
+                'islands = "drop" (--islands drop) leaves all but the longest out',
+                DesignWarning,
+                stacklevel=2,
+            )
         if found := made._core.warning:
             warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
         return made

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, whole_file
-from .formats import SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
+from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive, thread_count, whole
 from .mesh import Mesh
 from .texts import counted
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .reports import ShellReport, VolumeReport, VoxelElementsReport
+    from .reports import BeamMeshReport, ShellReport, VolumeReport, VoxelElementsReport
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["Carrier", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
+__all__ = ["BeamMesh", "Carrier", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
@@ -62,7 +62,7 @@ class FiniteElements:
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
     _of_sets = "faces"
-    _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells
+    _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
 
     @cached_property
     def _figures(self) -> Any:
@@ -102,8 +102,9 @@ class FiniteElements:
         elastic: tuple[float, float],
         steps: tuple[Iterable[str], Mapping[str, Sequence[float]] | None],
         fields: Mapping[str, ArrayLike] | None,
+        *more: Any,
     ) -> None:
-        """Writes a file; ``steps`` is what is held and what is loaded."""
+        """Writes a file; ``steps`` is what is held and what is loaded, ``more`` what files of this mesh alone have."""
         E, nu = positive("E", elastic[0]), poisson("nu", elastic[1])
         hold, load = ([steps[0]] if isinstance(steps[0], str) else list(steps[0])), steps[1]
         check_steps(kind, hold, load)
@@ -128,7 +129,7 @@ class FiniteElements:
         moduli = self._materials(kind, E, nu)
         title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
         with whole_file(path) as temporary:
-            self._core.write((temporary, kind, title), moduli, held, loads, arrays)
+            self._core.write((temporary, kind, title), moduli, held, loads, arrays, *more)
 
     def _of_elements(self) -> dict[str, NDArray]:
         """What each element has."""
@@ -457,6 +458,80 @@ class ShellMesh(FiniteElements):
         of ``VolumeMesh.write``, for .vtu.
         """
         self._write(path, extension(path, SHELL_WRITES), (E, nu), (hold, load), fields)
+
+
+class BeamMesh(FiniteElements):
+    """Beams as line elements along their axes, each with a circular section. Made by ``Solid.beam_mesh``."""
+
+    _of_sets = "ends"
+
+    def __init__(self, core: _core.BeamElements):
+        self._core = core
+
+    def __repr__(self) -> str:
+        figures = self._figures
+        return f"<trabecula.BeamMesh of {figures.elements} elements, {figures.nodes} nodes>"
+
+    @cached_property
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes (n, 3), mm: ends of elements first, then their middles."""
+        return fixed(self._core.nodes)
+
+    @cached_property
+    def elements(self) -> NDArray[np.uint32]:
+        """Nodes of each element (m, 2) or (m, 3): both ends, then the middle."""
+        return fixed(self._core.elements)
+
+    @cached_property
+    def radii(self) -> NDArray[np.float64]:
+        """The radius (m,) of each element, mm, whose section is the mean of those of its beam along it."""
+        return fixed(self._core.radii)
+
+    @cached_property
+    def sets(self) -> Mapping[str, VolumeSet]:
+        """The named sets that are not empty: X0 X1 Y0 Y1 Z0 Z1, the nodes least and farthest along each axis, and those of the
+        design, all nodes within their region. Elements are those between these nodes. Faces (n, 2) are ends of the elements
+        that come to them from elsewhere: an element, and 0 or 1.
+        """
+        return self._named_sets()
+
+    def report(self) -> BeamMeshReport:
+        """The figures: numbers of elements, nodes and beams, length, volume, radii, sets."""
+        return copy.deepcopy(self._figures)
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+        solver: str = "calculix",
+    ) -> None:
+        """Writes .inp (B32R of CalculiX, B31 or B32 of Abaqus), .bdf (Nastran: CBAR) or .vtu (VTK, with radii), with
+        sections, material and sets.
+
+        ``solver`` is whose .inp it is, ``"calculix"`` or ``"abaqus"``: of a circular section the one takes the diameter, the
+        other the radius. With ``hold`` and ``load``, as of ``VolumeMesh.write``, it runs as it is: the nodes of the sets
+        ``hold`` neither move nor turn, and each resultant is shared by the areas of the ends in its set. ``fields`` are those
+        of ``VolumeMesh.write``, for .vtu.
+        """
+        kind = extension(path, BEAM_ELEMENT_WRITES)
+        check_solver(kind, solver, self._figures.order)
+        self._write(path, kind, (E, nu), (hold, load), fields, solver == "abaqus")
+
+
+def check_solver(kind: str, solver: str | None, order: int) -> None:
+    """Refuses a solver that is not known, and an order that a format or CalculiX has not."""
+    if solver not in (None, "calculix", "abaqus"):
+        raise ValueError(f'solver is {solver!r}; it must be "calculix" or "abaqus"')
+    if solver == "abaqus" and kind != "inp":
+        raise ValueError(f"solver is of .inp, not .{kind}; leave it out")
+    if kind == "inp" and solver != "abaqus" and order == 1:
+        raise ValueError("CalculiX takes circular sections of quadratic beams alone; make the mesh with order 2, or for abaqus")
+    if kind == "bdf" and order == 2:
+        raise ValueError(".bdf takes linear beams (CBAR); make the mesh with order 1")
 
 
 def check_order(kind: str, order: int) -> None:

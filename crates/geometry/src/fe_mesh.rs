@@ -5,12 +5,14 @@ use rayon::prelude::*;
 use crate::math::{Mat3, Vec3, determinant, sub};
 use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
 
+mod beam_mesh;
 mod fraction_classes;
 mod hex_mesh;
 mod poly_faces;
 mod shell_mesh;
 mod surface_load;
 
+pub use beam_mesh::{BeamMesh, Section};
 pub use fraction_classes::fraction_classes;
 pub use hex_mesh::{HEX_FACES, HexMesh};
 pub use poly_faces::{Patch, PolyFaces};
@@ -50,6 +52,8 @@ pub struct FeSet {
     pub elements: Vec<u32>,
     /// Faces: tetrahedron, and the number of the corner opposite to it; ascending.
     pub faces: Vec<(u32, u8)>,
+    /// Whether it is a part of the solid, such as a skin, with all its nodes and elements; else a surface, with those of its faces.
+    pub bulk: bool,
 }
 
 /// A node of a periodic cell and its image on lower bounding planes.

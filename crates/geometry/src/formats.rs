@@ -32,7 +32,8 @@ mod vtu;
 mod xml;
 
 pub use element_files::{
-    FE_FORMATS, FeField, FeFormat, FeText, HEX_FORMATS, HexFormat, POLY_FILES, PolyFile, SHELL_FORMATS, ShellFormat,
+    BEAM_FORMATS, BeamFormat, FE_FORMATS, FeField, FeFormat, FeText, HEX_FORMATS, HexFormat, POLY_FILES, PolyFile,
+    SHELL_FORMATS, ShellFormat,
 };
 pub use elements::Elements;
 pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};

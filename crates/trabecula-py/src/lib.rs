@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod beam_files;
+mod beam_mesh;
 mod design;
 mod effective;
 mod error;
@@ -66,6 +67,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::beam_files::{graph_formats, read_graph, write_beam_lattice, write_graph};
+    #[pymodule_export]
+    use crate::beam_mesh::BeamElements;
     #[pymodule_export]
     use crate::design::Design;
     #[pymodule_export]
@@ -149,6 +152,12 @@ mod _core {
     #[pyfunction]
     fn shell_formats() -> Vec<(&'static str, &'static str)> {
         crate::shells::formats()
+    }
+
+    /// The formats of beams as finite elements: suffix, what it is.
+    #[pyfunction]
+    fn beam_element_formats() -> Vec<(&'static str, &'static str)> {
+        crate::beam_mesh::formats()
     }
 
     /// The formats of voxels as finite elements: suffix, what it is.

@@ -174,7 +174,7 @@ impl VolumeMesh {
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
         let fields = fields.into_iter().map(field).collect();
-        let text = FeText { title, elastic, held, loads, fields };
+        let text = FeText { title, elastic, held, loads, fields, ..FeText::default() };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

@@ -42,6 +42,7 @@ use std::sync::{Arc, OnceLock};
 
 use serde_json::Value as Json;
 
+use crate::beam_mesh;
 use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
 use crate::effective::UnitCell;
@@ -464,6 +465,15 @@ impl Built {
         progress: &dyn Progress,
     ) -> Result<shell_mesh::Made, Stopped> {
         shell_mesh::shell_mesh(&self.solid, &self.sets, options, progress)
+    }
+
+    /// Its beams as finite elements, with the design's own sets.
+    ///
+    /// # Errors
+    /// What else the design has; as `beam_mesh::beam_mesh`.
+    pub fn beam_mesh(&self, options: &beam_mesh::Options) -> Result<beam_mesh::Made, Fault> {
+        let quadors = beam_files::written(self)?.quadors;
+        beam_mesh::beam_mesh(&quadors, &self.solid.region, &self.sets, options)
     }
 
     /// Its voxels as finite elements: edge of a voxel (mm), and the least solid fraction of one; with sets of the grid's sides and of the

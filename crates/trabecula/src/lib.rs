@@ -35,6 +35,7 @@
 //! The layers of the modules, lowest first, stand in ARCHITECTURE.md and are kept by `tests/tidy.rs`.
 
 pub mod analysis;
+pub mod beam_mesh;
 pub mod beam_surface;
 pub mod blend;
 pub mod cell;

@@ -31,7 +31,7 @@ pub use tets_report::{
     Creases, DihedralReport, FitReport, LayersMade, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport,
     WallSpread, ZoneJoin, ZoneReport,
 };
-pub use volume_report::{DomainReport, SetReport, ShellReport, VolumeReport, VoxelElementsReport};
+pub use volume_report::{BeamMeshReport, DomainReport, SetReport, ShellReport, VolumeReport, VoxelElementsReport};
 
 /// A number, or its least and greatest value over the region where it varies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -77,6 +77,7 @@ struct Reports {
     volume: VolumeReport,
     voxel_elements: VoxelElementsReport,
     shells: ShellReport,
+    beam_elements: BeamMeshReport,
 }
 
 /// The JSON Schema of all reports, by the names of their types under `$defs`.

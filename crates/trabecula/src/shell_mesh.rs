@@ -172,7 +172,7 @@ fn add_sets(mesh: &mut ShellMesh, border: &[(u32, u8)], bounds: &Aabb, sets: &[(
     let of_edges = |mesh: &ShellMesh, name: &str, edges: Vec<(u32, u8)>| {
         let elements = ascending(edges.iter().map(|e| e.0));
         let nodes = ascending(edges.iter().flat_map(|e| mesh.edge(*e)));
-        FeSet { name: name.into(), nodes, elements, faces: edges }
+        FeSet { name: name.into(), nodes, elements, faces: edges, bulk: false }
     };
     let on: Vec<u8> = mesh.nodes.iter().map(|p| planes(*p, bounds)).collect();
     for (k, name) in PLANES.iter().flatten().enumerate() {
@@ -204,7 +204,7 @@ fn add_sets(mesh: &mut ShellMesh, border: &[(u32, u8)], bounds: &Aabb, sets: &[(
         }
         let edges = border.iter().filter(|e| depth[e.0 as usize] <= near).copied().collect();
         let nodes = ascending(elements.iter().flat_map(|t| mesh.nodes_of(*t as usize)));
-        mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: edges });
+        mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: edges, bulk: true });
     }
     empty
 }

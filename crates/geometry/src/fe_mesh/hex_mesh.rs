@@ -94,7 +94,7 @@ impl HexMesh {
         let mut nodes: Vec<u32> = faces.iter().flat_map(|f| self.face(*f)).collect();
         nodes.sort_unstable();
         nodes.dedup();
-        self.sets.push(FeSet { name, nodes, elements, faces });
+        self.sets.push(FeSet { name, nodes, elements, faces, bulk: false });
     }
 
     /// The nodes of a face, counter-clockwise seen from outside.

@@ -82,7 +82,8 @@ mod tests {
 
     #[test]
     fn forces_add_up_and_follow_the_thickness() {
-        let set = FeSet { name: "X0".into(), nodes: vec![0, 2, 5], elements: vec![0], faces: vec![(0, 2)] };
+        let set =
+            FeSet { name: "X0".into(), nodes: vec![0, 2, 5], elements: vec![0], faces: vec![(0, 2)], bulk: false };
         let linear = ShellMesh {
             nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 3.0, 0.0]],
             triangles: vec![[0, 1, 2]],

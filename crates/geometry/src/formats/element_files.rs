@@ -8,8 +8,10 @@ use crate::fe_mesh::FeMesh;
 use crate::math::Vec3;
 
 mod abaqus;
+mod beam_elements;
 mod gmsh22;
 mod gmsh41;
+mod gmsh_entities;
 mod medit;
 mod nastran;
 mod openfoam;
@@ -17,6 +19,7 @@ mod shells;
 mod voxel_elements;
 mod vtk_cells;
 
+pub use beam_elements::{BEAM_FORMATS, BeamFormat};
 pub use openfoam::{POLY_FILES, PolyFile};
 pub use shells::{SHELL_FORMATS, ShellFormat};
 pub use voxel_elements::{HEX_FORMATS, HexFormat};
@@ -32,6 +35,8 @@ pub struct FeText {
     pub held: Vec<String>,
     /// Names of sets and the resultant (N) of a uniform traction on their faces.
     pub loads: Vec<(String, Vec3)>,
+    /// Whether an `.inp` is for Abaqus where CalculiX takes the same words otherwise: sections of beams.
+    pub abaqus: bool,
     /// Further numbers of nodes and elements, in formats that have them.
     pub fields: Vec<FeField>,
 }
@@ -134,7 +139,8 @@ mod tests {
     use crate::fe_mesh::FeSet;
 
     fn two() -> FeMesh {
-        let set = FeSet { name: "X0".into(), nodes: vec![0, 2, 3], elements: vec![0], faces: vec![(0, 1)] };
+        let set =
+            FeSet { name: "X0".into(), nodes: vec![0, 2, 3], elements: vec![0], faces: vec![(0, 1)], bulk: false };
         FeMesh {
             nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1], [1.0; 3]],
             tets: vec![[0, 1, 2, 3], [1, 4, 2, 3]],

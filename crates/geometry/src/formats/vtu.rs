@@ -15,7 +15,7 @@ pub(crate) struct Cells<'a> {
     pub note: &'a str,
     /// Positions of nodes.
     pub nodes: &'a [Vec3],
-    /// Sets, of which nodes are written.
+    /// Sets: nodes of all, cells of those that are parts of the solid.
     pub sets: &'a [FeSet],
     /// VTK's number of the kind.
     pub kind: u8,
@@ -93,6 +93,10 @@ impl Cells<'_> {
             head += &header("Float64", &f.name, f.components, 8 * f.values.len());
         }
         head += "</PointData>\n<CellData>\n";
+        let bulk = || self.sets.iter().filter(|s| s.bulk);
+        for set in bulk() {
+            head += &header("UInt8", &set.name, 1, count);
+        }
         for (name, array) in self.data {
             head += &match array {
                 Array::Labels(_) => header("UInt8", name, 1, count),
@@ -116,13 +120,15 @@ impl Cells<'_> {
             out.write_all(&(bytes.len() as u64).to_le_bytes())?;
             out.write_all(&bytes)
         };
-        for set in self.sets {
-            let mut flags = vec![0; nodes];
-            set.nodes.iter().for_each(|n| flags[*n as usize] = 1);
-            block(flags)?;
-        }
+        let flags = |of: &[u32], count: usize| {
+            let mut flags = vec![0; count];
+            of.iter().for_each(|i| flags[*i as usize] = 1);
+            flags
+        };
+        self.sets.iter().try_for_each(|set| block(flags(&set.nodes, nodes)))?;
         let bytes = |of: &[f64]| -> Vec<u8> { of.iter().flat_map(|v| v.to_le_bytes()).collect() };
         of(true).try_for_each(|f| block(bytes(&f.values)))?;
+        bulk().try_for_each(|set| block(flags(&set.elements, count)))?;
         for (_, array) in self.data {
             block(match array {
                 Array::Labels(of) => of.to_vec(),

@@ -15,10 +15,10 @@ use geometry::formats::{Aside, BeamGraph, Companions, GraphFormat, Lost, Metadat
 use geometry::progress::{Stopped, checkpoint};
 
 /// The only beams of a design, and whether its region cuts some.
-struct Written<'a> {
+pub(super) struct Written<'a> {
     name: &'a str,
     graph: Cow<'a, Graph>,
-    quadors: Arc<Quadors>,
+    pub(super) quadors: Arc<Quadors>,
     cut: bool,
 }
 
@@ -26,7 +26,7 @@ struct Written<'a> {
 ///
 /// # Errors
 /// What else the design has: lattices, a blend, a skin or kept zones.
-fn written(built: &Built) -> Result<Written<'_>, Fault> {
+pub(super) fn written(built: &Built) -> Result<Written<'_>, Fault> {
     let refuse = |why: &str| {
         let message =
             format!("a file of beams has beams alone, and {why}; write a mesh (3mf, stl) without --beams instead");

@@ -80,7 +80,8 @@ pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxel
     let count = grid.count();
     if count > (1u64 << 33) as f64 {
         let message = format!(
-            "{step} mm makes {count:.2e} voxels; at most 8.6e9 are possible: use a step above {:.3} mm",
+            "{step} mm makes {count:.2e} voxels, and at most 8.6e9 are held in memory: use a step above {:.3} mm, or write them in layers \
+             (--resume, Solid.save_voxels)",
             step * (count / 8e9).cbrt()
         );
         return Err(Stopped::Refused(Fault::new("step", message)));

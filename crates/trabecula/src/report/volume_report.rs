@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::beam_mesh;
 use crate::shell_mesh;
 use crate::volume_mesh::Made;
 use geometry::fe_mesh::{FeSet, HexMesh};
@@ -112,6 +113,60 @@ pub struct ShellReport {
     pub straight: usize,
     /// The named sets; faces are edges on the border.
     pub sets: BTreeMap<String, SetReport>,
+}
+
+/// The figures of beams as finite elements.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct BeamMeshReport {
+    /// Number of elements.
+    pub elements: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// 1 for linear elements, 2 for quadratic ones.
+    pub order: usize,
+    /// Number of beams of which some length is in the region.
+    pub beams: usize,
+    /// Number of those that the region cuts.
+    pub cut: usize,
+    /// Number of connected components.
+    pub pieces: usize,
+    /// Length of all axes, mm.
+    pub length: f64,
+    /// Length of components that were left out, mm.
+    pub loose: f64,
+    /// Area times length of all elements, mm³: more than the solid's volume, since beams overlap in hubs.
+    pub volume: f64,
+    /// Smallest radius of an element, mm.
+    pub thinnest: f64,
+    /// Greatest radius of an element, mm.
+    pub thickest: f64,
+    /// Number of sections: radii to five digits, each with one or two directions of its first axis.
+    pub sections: usize,
+    /// The named sets; faces are ends of elements.
+    pub sets: BTreeMap<String, SetReport>,
+}
+
+impl From<&beam_mesh::Made> for BeamMeshReport {
+    fn from(made: &beam_mesh::Made) -> BeamMeshReport {
+        let mesh = &made.mesh;
+        let (length, volume) = mesh.size();
+        let range = |least: fn(f64, f64) -> f64| mesh.radii.iter().copied().reduce(least).unwrap_or(0.0);
+        BeamMeshReport {
+            elements: mesh.elements.len(),
+            nodes: mesh.nodes.len(),
+            order: if mesh.middles.is_empty() { 1 } else { 2 },
+            beams: made.beams[0],
+            cut: made.beams[1],
+            pieces: made.pieces,
+            length,
+            loose: made.loose,
+            volume,
+            thinnest: range(f64::min),
+            thickest: range(f64::max),
+            sections: mesh.sections().len(),
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
 }
 
 impl ShellReport {

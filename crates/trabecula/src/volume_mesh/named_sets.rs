@@ -67,7 +67,7 @@ pub(super) fn add_sets(
                 let middles = mesh.middles.get(*t as usize).copied();
                 mesh.tets[*t as usize].into_iter().chain(middles.into_iter().flatten())
             }));
-            mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: of });
+            mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: of, bulk: true });
         } else {
             // Of a fluid the body is a wall.
             let wall = faces.iter().filter(|(_, set, _)| set & region == 0 && set & own != 0).map(|f| f.0).collect();
@@ -136,7 +136,7 @@ pub(super) fn push(mesh: &mut FeMesh, name: String, mut faces: Vec<(u32, u8)>) {
     let nodes = nodes_of(
         faces.iter().flat_map(|f| mesh.face(*f).into_iter().chain(mesh.face_middles(*f).into_iter().flatten())),
     );
-    mesh.sets.push(FeSet { name, nodes, elements, faces });
+    mesh.sets.push(FeSet { name, nodes, elements, faces, bulk: false });
 }
 
 fn nodes_of(nodes: impl Iterator<Item = u32>) -> Vec<u32> {

@@ -1,12 +1,13 @@
 //! Gmsh's MSH 4.1, ASCII, with physical names.
 //!
-//! Source: Gmsh reference manual, section MSH file format. Each domain is a volume; the faces of sets make up surfaces, one for
-//! each combination of sets that faces belong to, with the physical tags of all of them.
+//! Source: Gmsh reference manual, section MSH file format. Elements make up entities, one for each combination of groups that they belong
+//! to: volumes of a domain and the skins and keep zones that they are part of, surfaces of the sets of faces.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use super::gmsh_entities::{Surface, surfaces, write_periodic};
 use super::{FeText, lines, push};
 use crate::fe_mesh::FeMesh;
 use crate::math::Aabb;
@@ -18,34 +19,36 @@ pub(super) const MIDDLES: [usize; 6] = [0, 3, 1, 2, 5, 4];
 pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Result<()> {
     debug_assert_eq!(EDGES[5], [2, 3]);
     let domains = mesh.domains.len();
-    let mut memberships: BTreeMap<(u32, u8), Vec<usize>> = BTreeMap::new();
+    let mut of_faces: BTreeMap<(u32, u8), Vec<usize>> = BTreeMap::new();
     for (s, set) in mesh.sets.iter().enumerate() {
-        set.faces.iter().for_each(|f| memberships.entry(*f).or_default().push(s));
+        set.faces.iter().for_each(|f| of_faces.entry(*f).or_default().push(s));
     }
-    let mut surfaces: BTreeMap<Vec<usize>, Vec<(u32, u8)>> = BTreeMap::new();
-    memberships.into_iter().for_each(|(f, of)| surfaces.entry(of).or_default().push(f));
+    let surfaces = surfaces(mesh, &of_faces);
+    let volumes = volumes(mesh);
     let named: Vec<usize> = (0..mesh.sets.len()).filter(|s| !mesh.sets[*s].faces.is_empty()).collect();
-    writeln!(out, "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{}", domains + named.len())?;
+    let bulk: Vec<usize> = (0..mesh.sets.len()).filter(|s| mesh.sets[*s].bulk).collect();
+    writeln!(out, "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{}", domains + named.len() + bulk.len())?;
     for s in &named {
         writeln!(out, "2 {} \"{}\"", s + 1, mesh.sets[*s].name)?;
     }
     for (d, name) in mesh.domains.iter().enumerate() {
         writeln!(out, "3 {} \"{name}\"", d + 1)?;
     }
-    writeln!(out, "$EndPhysicalNames\n$Entities\n0 0 {} {domains}", surfaces.len())?;
-    let all = mesh.nodes.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-    let extent = |b: &Aabb| {
-        let [a, c] = [b.min, b.max];
-        format!("{:?} {:?} {:?} {:?} {:?} {:?}", a[0], a[1], a[2], c[0], c[1], c[2])
-    };
-    for (i, (of, faces)) in surfaces.iter().enumerate() {
-        let nodes = faces.iter().flat_map(|f| mesh.face(*f));
-        let bounds = nodes.fold(Aabb::EMPTY, |b, n| b.with(mesh.nodes[n as usize]));
-        let tags: String = of.iter().map(|s| format!(" {}", s + 1)).collect();
-        writeln!(out, "{} {} {}{tags} 0", i + 1, extent(&bounds), of.len())?;
+    for s in &bulk {
+        writeln!(out, "3 {} \"{}\"", domains + s + 1, mesh.sets[*s].name)?;
     }
-    for d in 1..=domains {
-        writeln!(out, "{d} {} 1 {d} 0", extent(&all))?;
+    writeln!(out, "$EndPhysicalNames\n$Entities\n0 0 {} {}", surfaces.len(), volumes.len())?;
+    let mut entity = |number: usize, groups: &[usize], nodes: &mut dyn Iterator<Item = u32>| {
+        let Aabb { min: a, max: b } = nodes.fold(Aabb::EMPTY, |b, n| b.with(mesh.nodes[n as usize]));
+        let groups: String = groups.iter().map(|g| format!(" {}", g + 1)).collect();
+        let count = groups.split_whitespace().count();
+        writeln!(out, "{number} {:?} {:?} {:?} {:?} {:?} {:?} {count}{groups} 0", a[0], a[1], a[2], b[0], b[1], b[2])
+    };
+    for (i, s) in (1..).zip(&surfaces) {
+        entity(i, &s.sets, &mut s.faces.iter().flat_map(|f| mesh.face(*f)))?;
+    }
+    for (i, (groups, tets)) in (1..).zip(&volumes) {
+        entity(i, groups, &mut tets.iter().flat_map(|t| mesh.tets[*t as usize]))?;
     }
     let count = mesh.nodes.len();
     writeln!(out, "$EndEntities\n$Nodes\n1 {count} 1 {count}\n3 1 0 {count}")?;
@@ -57,51 +60,67 @@ pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Resul
         let [x, y, z] = mesh.nodes[i];
         let _ = writeln!(text, "{x:?} {y:?} {z:?}");
     })?;
-    let faces: usize = surfaces.values().map(Vec::len).sum();
-    let total = faces + mesh.tets.len();
-    writeln!(out, "$EndNodes\n$Elements\n{} {total} 1 {total}", surfaces.len() + domains)?;
-    let quadratic = !mesh.middles.is_empty();
+    elements(mesh, &surfaces, &volumes, out)?;
+    write_periodic(mesh, &surfaces, "16", out)?;
+    if mesh.fraction.is_empty() { Ok(()) } else { fractions(mesh, &surfaces, &volumes, out) }
+}
+
+/// Groups, and the tetrahedra that have them all: the domain's number, and after those of domains those of sets.
+type Volume = (Vec<usize>, Vec<u32>);
+
+fn volumes(mesh: &FeMesh) -> Vec<Volume> {
+    let mut groups: Vec<Vec<usize>> = mesh.domain.iter().map(|d| vec![*d as usize]).collect();
+    for (s, set) in mesh.sets.iter().enumerate().filter(|(_, set)| set.bulk) {
+        set.elements.iter().for_each(|t| groups[*t as usize].push(mesh.domains.len() + s));
+    }
+    let mut volumes: BTreeMap<Vec<usize>, Vec<u32>> = BTreeMap::new();
+    (0..).zip(groups).for_each(|(t, of)| volumes.entry(of).or_default().push(t));
+    volumes.into_iter().collect()
+}
+
+fn elements(mesh: &FeMesh, surfaces: &[Surface], volumes: &[Volume], out: &mut dyn Write) -> io::Result<()> {
+    let total = surfaces.iter().map(|s| s.faces.len()).sum::<usize>() + mesh.tets.len();
+    writeln!(out, "$EndNodes\n$Elements\n{} {total} 1 {total}", surfaces.len() + volumes.len())?;
+    let element = |text: &mut String, number: usize, nodes: &mut dyn Iterator<Item = u32>| {
+        push(text, number);
+        for n in nodes {
+            text.push(' ');
+            push(text, n as usize + 1);
+        }
+        text.push('\n');
+    };
+    let (triangle, tetrahedron) = if mesh.middles.is_empty() { (2, 4) } else { (9, 11) };
     let mut next = mesh.tets.len() + 1;
-    for (i, of) in surfaces.values().enumerate() {
-        writeln!(out, "2 {} {} {}", i + 1, if quadratic { 9 } else { 2 }, of.len())?;
-        lines(out, of.len(), |k, text| {
-            push(text, next + k);
-            for n in mesh.face(of[k]).into_iter().chain(mesh.face_middles(of[k]).into_iter().flatten()) {
-                text.push(' ');
-                push(text, n as usize + 1);
-            }
-            text.push('\n');
+    for (i, Surface { faces, .. }) in (1..).zip(surfaces) {
+        writeln!(out, "2 {i} {triangle} {}", faces.len())?;
+        lines(out, faces.len(), |k, text| {
+            let middles = mesh.face_middles(faces[k]).into_iter().flatten();
+            element(text, next + k, &mut mesh.face(faces[k]).into_iter().chain(middles));
         })?;
-        next += of.len();
+        next += faces.len();
     }
-    for d in 0..domains {
-        let of: Vec<usize> = (0..mesh.tets.len()).filter(|i| mesh.domain[*i] as usize == d).collect();
-        writeln!(out, "3 {} {} {}", d + 1, if quadratic { 11 } else { 4 }, of.len())?;
-        lines(out, of.len(), |k, text| {
-            let i = of[k];
-            push(text, i + 1);
-            let middles = mesh.middles.get(i);
-            for n in mesh.tets[i].into_iter().chain(middles.into_iter().flat_map(|m| MIDDLES.map(|k| m[k]))) {
-                text.push(' ');
-                push(text, n as usize + 1);
-            }
-            text.push('\n');
+    for (i, (_, tets)) in (1..).zip(volumes) {
+        writeln!(out, "3 {i} {tetrahedron} {}", tets.len())?;
+        lines(out, tets.len(), |k, text| {
+            let t = tets[k] as usize;
+            let middles = mesh.middles.get(t).into_iter().flat_map(|m| MIDDLES.map(|k| m[k]));
+            element(text, t + 1, &mut mesh.tets[t].into_iter().chain(middles));
         })?;
     }
-    writeln!(out, "$EndElements")?;
-    if mesh.fraction.is_empty() {
-        return Ok(());
-    }
-    // In the order of the elements above, by which some readers go. Some take no data of a part of the elements: faces have the fraction
-    // of their tetrahedron.
-    writeln!(out, "$ElementData\n1\n\"fraction\"\n1\n0.0\n3\n0\n1\n{total}")?;
-    let of_faces: Vec<u32> = surfaces.values().flatten().map(|f| f.0).collect();
-    lines(out, total, |i, text| {
-        let (number, tet) = match of_faces.get(i) {
-            Some(tet) => (mesh.tets.len() + i, *tet as usize),
-            None => (i - of_faces.len(), i - of_faces.len()),
-        };
-        let _ = writeln!(text, "{} {:?}", number + 1, mesh.fraction[tet]);
+    writeln!(out, "$EndElements")
+}
+
+/// The solid fraction of each element, in the order of the elements, by which some readers go. Some take no data of a part of the elements:
+/// faces have the fraction of their tetrahedron.
+fn fractions(mesh: &FeMesh, surfaces: &[Surface], volumes: &[Volume], out: &mut dyn Write) -> io::Result<()> {
+    let faces = surfaces.iter().flat_map(|s| &s.faces).map(|f| f.0);
+    let faces = (mesh.tets.len()..).zip(faces);
+    let tets = volumes.iter().flat_map(|v| &v.1).map(|t| (*t as usize, *t));
+    let all: Vec<(usize, u32)> = faces.chain(tets).collect();
+    writeln!(out, "$ElementData\n1\n\"fraction\"\n1\n0.0\n3\n0\n1\n{}", all.len())?;
+    lines(out, all.len(), |i, text| {
+        let (number, tet) = all[i];
+        let _ = writeln!(text, "{} {:?}", number + 1, mesh.fraction[tet as usize]);
     })?;
     writeln!(out, "$EndElementData")
 }

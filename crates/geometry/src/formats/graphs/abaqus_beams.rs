@@ -18,7 +18,7 @@ const FIRST_AXES: [Vec3; 4] = [[0.0, 0.0, -1.0], [0.31, 0.59, 0.75], [0.75, -0.3
 
 /// Writes a set and a section for each radius; a beam has the mean of the radii at its ends. The material is left to the reader.
 pub fn write(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
-    out.write_all(b"** Lengths in mm. Give the material SOLID.\n*NODE\n")?;
+    out.write_all(b"** Lengths in mm. Give the material SOLID. Sections have radii, as Abaqus takes them; CalculiX takes diameters.\n*NODE\n")?;
     for (i, [x, y, z]) in graph.nodes.iter().enumerate() {
         writeln!(out, "{}, {x}, {y}, {z}", i + 1)?;
     }
