@@ -163,7 +163,7 @@ def test_a_transition_narrower_than_an_estimate_is_meshed():
     lattices = {"a": lt.Lattice("primitive", "upper", lt.map.affine(12), lt.level.fraction(0.25))}
     lattices["b"] = lt.Lattice("gyroid", "upper", lt.map.affine(3), lt.level.fraction(0.5))
     blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {0: 0, 0.15: 1}))
-    with pytest.warns(lt.DesignWarning, match=r"a transition is 0\.15 mm wide"):
+    with pytest.warns(lt.DesignWarning, match=r"the transition between .* is 0\.15 mm wide"):
         solid = lt.Design(region=lt.region.box(size=[6, 6, 6]), lattice=lattices, blend=blend).build()
     assert solid.mesh(edge=0.1, islands="keep").closed
 

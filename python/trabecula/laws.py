@@ -222,6 +222,11 @@ def law(
 
 def _part_of(cell: str, part: str | None, tet: bool) -> str:
     """What is solid. A ValueError for a part that the cell has not, and for a name that is none."""
+    if not isinstance(cell, str):
+        raise ValueError(
+            "a law is of a cell with a name; of one's own take a sweep over its level.fraction with properties "
+            '(lt.sweep(…, properties=["stiffness"]))'
+        )
     if tet:
         if cell not in tet_names():
             raise ValueError(f"no tetrahedral cell is named {cell!r}; there are {', '.join(tet_names())}")

@@ -87,7 +87,8 @@ def _lattice(it: Report) -> Iterator[str]:
     yield f"  porosity   {span(it.porosity)}"
     yield f"  thickness  {span(it.thickness)}{'' if it.thickness is None else f' mm ({neck})'}"
     if it.pore is not None:
-        yield f"  pore       {span(it.pore)} mm (largest ball that passes)"
+        side = " on the narrower side" if it.part == "sheet" else ""
+        yield f"  pore       {span(it.pore)} mm (largest ball that passes{side})"
     if not (it.tets and it.tets.zones):
         whole = intervals(it.connected_fraction)
         yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"

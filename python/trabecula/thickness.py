@@ -53,8 +53,9 @@ class Thickness:
         from .chart import Chart, svg
 
         def chart(title: str, of: str, it: ThicknessSpread) -> Chart:
-            facts = f"mean {it.mean:.3g} ± {it.sd:.2g} mm, from {it.min:.3g} to {it.max:.3g} mm; accuracy {it.accuracy:.2g} mm"
-            marks = [("minimum", it.min), ("5th percentile", it.p05), ("mean", it.mean)]
+            # Toward sharp edges local thickness falls to zero, which is no wall: the least one may be above the percentile.
+            facts = f"mean {it.mean:.3g} ± {it.sd:.2g} mm, at most {it.max:.3g} mm; accuracy {it.accuracy:.2g} mm"
+            marks = [("thinnest but for sharp edges", it.min), ("5th percentile", it.p05), ("mean", it.mean)]
             named = [(f"{name} {at:.3g} mm", at) for name, at in marks]
             across, up = f"{title.lower()}, mm", f"share of the {of} volume, %"
             return Chart(title, facts, across, up, it.histogram.edges, it.histogram.share, named)

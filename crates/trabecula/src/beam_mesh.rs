@@ -102,13 +102,15 @@ fn within(quadors: &Quadors, b: usize, region: &Region, near: f64) -> Vec<[f64; 
     // An axis in the boundary is in the region, whichever way its values are rounded; one that crosses it ends there.
     let is_in = |v: f64| v <= near;
     let crossing = |mut inner: f64, mut outer: f64| {
-        let level = if region.value(at(inner)) < -near { 0.0 } else { near };
+        if region.value(at(inner)) >= -near {
+            return inner;
+        }
         while (outer - inner).abs() > 1e-12 * length {
             let middle = 0.5 * (inner + outer);
             if middle == inner || middle == outer {
                 break;
             }
-            *(if region.value(at(middle)) <= level { &mut inner } else { &mut outer }) = middle;
+            *(if region.value(at(middle)) <= 0.0 { &mut inner } else { &mut outer }) = middle;
         }
         inner
     };

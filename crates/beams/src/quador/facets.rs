@@ -45,6 +45,8 @@ pub(super) struct Facets<'a> {
     changed: Vec<u32>,
     /// Chord error, mm.
     chord: f64,
+    /// Chord error by which end circles are divided, mm: triangles at their edges are no nearer to the surface.
+    at_circles: f64,
 }
 
 /// Orientation of a triangle seen from the centre, and six times the volume below it.
@@ -72,22 +74,22 @@ pub(super) const SEAM_SHARE: f64 = 0.75;
 const SAMPLES: usize = 32;
 
 impl<'a> Facets<'a> {
-    /// A coarse triangulation of a hub's faces, given the vertices of its end circles by half-beam; to be refined to a
-    /// chord error. `None` if a boundary polygon intersects itself.
+    /// A coarse triangulation of a hub's faces, given the vertices of its end circles by half-beam; to be refined to the first of two chord
+    /// errors, those of end circles being divided by the second. `None` if a boundary polygon intersects itself.
     pub(super) fn new(
         hub: &'a Hub<'a>,
         complex: &'a Complex,
         end_circles: &[Vec<Vec3>],
-        chord: f64,
+        chords: [f64; 2],
     ) -> Option<Facets<'a>> {
-        MAX_TURNING.iter().find_map(|&turn| Facets::coarse(hub, complex, end_circles, (chord, turn)))
+        MAX_TURNING.iter().find_map(|&turn| Facets::coarse(hub, complex, end_circles, (chords, turn)))
     }
 
     fn coarse(
         hub: &'a Hub<'a>,
         complex: &'a Complex,
         end_circles: &[Vec<Vec3>],
-        (chord, turns): (f64, f64),
+        ([chord, at_circles], turns): ([f64; 2], f64),
     ) -> Option<Facets<'a>> {
         let mut out = Facets {
             hub,
@@ -99,6 +101,7 @@ impl<'a> Facets<'a> {
             left_of: HashMap::new(),
             changed: Vec::new(),
             chord,
+            at_circles,
         };
         let mut firsts = Vec::with_capacity(end_circles.len());
         let mut first = 0u32;

@@ -228,7 +228,7 @@ impl HubMesh {
         let circles: Vec<(usize, f64)> = circle_sizes.iter().map(|&n| (n, equal_area(n))).collect();
         // Where vertices are moved as others are, triangles may be farther from the surface than before.
         let (facets, error) = SHARES.iter().find_map(|share| {
-            let mut facets = Facets::new(hub, complex, &end_circles, share * chord)?;
+            let mut facets = Facets::new(hub, complex, &end_circles, [share * chord, chord])?;
             facets.refine()?;
             let error = facets.balance(&circles, below_circles(hub), volume)?;
             (error <= chord).then_some((facets, error))

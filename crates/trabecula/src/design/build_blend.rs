@@ -144,22 +144,26 @@ pub(super) fn blend(
     };
     let bounds = environment.region.bounds();
     let equal = equal(&weights, environment.points);
-    let width = narrowest(&weights, &equal);
-    let longest = members.iter().map(|m| m.of.longest()).fold(0.0, f64::max);
+    let cells: Vec<f64> = of.iter().map(|m| m.longest()).collect();
+    let narrow = narrow(&weights, &equal, &cells);
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
     unused(&blend, &names, members, environment, warnings);
     cancelling(&blend, &names, &equal, environment, warnings);
     // But for rounding: exactly two cells are wide enough.
-    if let Some(width) = width.filter(|w| *w < 2.0 * longest * (1.0 - 1e-9)) {
+    if let Some(Transition { width, between: [a, b], cell }) = narrow.filter(|t| t.cells() < 2.0 * (1.0 - 1e-9)) {
         let lost = if by == By::Fraction { ", and the fraction is not held" } else { "" };
         let message = format!(
-            "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
-             growing into each other{lost}",
+            "the transition between \"{}\" and \"{}\" is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet \
+             there without growing into each other{lost}",
+            names[a],
+            names[b],
             figure(width),
-            number(longest)
+            number(cell)
         );
-        warnings.push(Warning { path: spec.weights()[0].0.clone(), message });
+        let paths = spec.weights();
+        warnings.push(Warning { path: paths[a.min(paths.len() - 1)].0.clone(), message });
     }
+    let width = narrow.map(|t| t.width);
     Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
 
@@ -294,20 +298,42 @@ fn equal(weights: &Weights, points: &[Vec3]) -> Vec<[Vec3; 2]> {
     each.collect()
 }
 
-/// The width of the narrowest transition (mm): 1/|∇w| where two lattices have the same weight, to either side of it.
-fn narrowest(weights: &Weights, equal: &[[Vec3; 2]]) -> Option<f64> {
+/// A place of a transition.
+#[derive(Clone, Copy)]
+struct Transition {
+    /// Its width, mm.
+    width: f64,
+    /// The lattices that have the greatest weights there.
+    between: [usize; 2],
+    /// The longer of their wavelengths, mm.
+    cell: f64,
+}
+
+impl Transition {
+    fn cells(&self) -> f64 {
+        self.width / self.cell
+    }
+}
+
+/// Where a transition is narrowest for the cells that meet in it, `cells` long (mm): its width is 1/|∇w| where two lattices have the same
+/// weight, to either side of it.
+fn narrow(weights: &Weights, equal: &[[Vec3; 2]], cells: &[f64]) -> Option<Transition> {
     let n = weights.len();
     let each = equal.iter().map(|[a, b]| {
         let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
         weights.gradients(&[*a], &mut v, &mut g);
         let (mut u, mut h) = (vec![0.0; n], vec![[0.0; 3]; n]);
         weights.gradients(&[*b], &mut u, &mut h);
-        let steep = g.iter().chain(&h).map(|g| norm(*g)).fold(0.0, f64::max);
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|i, j| (v[*j] + u[*j]).total_cmp(&(v[*i] + u[*i])));
+        let between = [order[0].min(order[1]), order[0].max(order[1])];
+        let steep = between.iter().flat_map(|i| [norm(g[*i]), norm(h[*i])]).fold(0.0, f64::max);
         // A jump has no slope on either side of it.
         let jump = v.iter().zip(&u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) > 0.1;
-        if jump { 0.0 } else { 1.0 / steep }
+        let width = if jump { 0.0 } else { 1.0 / steep };
+        Transition { width, between, cell: between.iter().map(|i| cells[*i]).fold(0.0, f64::max) }
     });
-    each.reduce(f64::min)
+    each.min_by(|a, b| a.cells().total_cmp(&b.cells()))
 }
 
 fn figure(v: f64) -> String {

@@ -5,6 +5,7 @@
 //! the surface.
 
 use geometry::math::{Vec3, add, cross, dot, norm, root, scale, sub};
+use geometry::progress::checkpoint;
 
 use super::super::complex::Face;
 use super::{EdgeCurve, Facets, edge_key, orientation};
@@ -79,6 +80,7 @@ impl Facets<'_> {
         let chord = self.chord;
         let mut error = 0.0f64;
         for _ in 0..MAX_ROUNDS {
+            checkpoint();
             // Unchanged triangles have been checked.
             let mut changed = core::mem::take(&mut self.changed);
             changed.sort_unstable();
@@ -87,11 +89,12 @@ impl Facets<'_> {
             let mut todo: Vec<(f64, [u32; 2])> = Vec::new();
             for &n in &changed {
                 let t = self.triangles[n as usize];
-                let mut far = false;
+                let (mut far, mut within) = (false, chord);
                 let mut worst = (-1.0, [0, 0]);
                 for k in 0..3 {
                     let (i, j) = (t[k], t[(k + 1) % 3]);
                     if self.boundary.get(&edge_key(i, j)) == Some(&EdgeCurve::Rim) {
+                        within = self.at_circles.max(chord);
                         continue;
                     }
                     let off = self.edge_distance(i, j);
@@ -111,7 +114,7 @@ impl Facets<'_> {
                     continue;
                 }
                 let off = self.centroid_distance(t);
-                if off <= chord {
+                if off <= within {
                     error = error.max(off);
                 } else if worst.0 >= 0.0 {
                     todo.push((off, worst.1));

@@ -177,3 +177,24 @@ fn beams_that_nearly_touch_without_a_common_hub_do_not_cross() {
         }
     }
 }
+
+#[test]
+fn shares_of_the_chord_error_ask_nothing_of_end_circles() {
+    // End circles are divided by the chord error itself: hubs that are refined to a share of it, since their vertices could not be moved,
+    // took more and more triangles there, without end.
+    let hub = |center, radius| crate::graph::Hub { center, radius };
+    let hubs = vec![
+        hub([0.0; 3], 0.5),
+        hub([10.0, 0.0, 0.0], 0.5),
+        hub([10.0, 10.0, 0.0], 0.6),
+        hub([0.0, 10.0, 0.0], 0.5),
+        hub([5.0, 5.0, 8.0], 0.8),
+    ];
+    let ends = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
+    let beams = ends.map(|ends| Beam { ends, profile: Profile::Mid(0.4) }).to_vec();
+    let lattice = Quadors::new(&Graph { hubs, beams }, Fillet::Auto).expect("a lattice");
+    for chord in [0.142, 0.071, 0.036, 0.0355, 0.034, 0.02] {
+        let (mesh, error) = lattice.mesh(chord).expect("a mesh");
+        assert!(error <= chord && mesh.triangles.len() < 6000, "{chord}: {}", mesh.triangles.len());
+    }
+}
