@@ -20,7 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from trabecula import cli, workers
 from trabecula.conditions import condition
-from trabecula.rows import Job, row_of
+from trabecula.rows import PROPERTIES, Job, columns_of_job, row_of
 from trabecula.sampling import DIMENSIONS, latin, sobol
 from trabecula.scatter import front_of
 from trabecula.sent import digests
@@ -37,6 +37,8 @@ part = "sheet"
 map.affine.wavelength = 4
 level.fraction = 0.3
 """
+#: Two designs.
+TWO = '"lattice.a.level.fraction" = [0.2, 0.3]'
 
 
 def written(folder: Path, sweep: str, name: str = "study.toml") -> Path:
@@ -232,6 +234,30 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path):
     assert read.schema.field("volume_mm3").metadata == {b"unit": "mm³".encode()}
 
 
+def test_each_figure_has_its_error_and_each_row_what_reports_warn_of(tmp_path: Path):
+    path, settings = written(tmp_path, '"lattice.a.level.fraction" = [0.2]'), {"n": 16}
+    names = ("stiffness", "conductivity", "permeability")
+    columns = lt.sweep(path, per_cell=8, properties={name: settings for name in names})
+    data = lt.load(path).to_dict()
+    del data["sweep"]
+    data["lattice"]["a"]["level"]["fraction"] = 0.2
+    solid = lt.Design(**data).build()
+    stiffness, conductivity, permeability = (getattr(solid, name)(**settings) for name in names)
+    for i, (axis, plane) in enumerate((("1", "23"), ("2", "13"), ("3", "12"))):
+        assert columns[f"E{axis}"] == [stiffness.E[i]] and columns[f"E{axis}_error"] == [stiffness.E_error[i]]
+        assert columns[f"G{plane}"] == [stiffness.G[i]] and columns[f"G{plane}_error"] == [stiffness.G_error[i]]
+        assert columns[f"k{axis}{axis}_error"] == [conductivity.axis_errors[i]]
+    assert columns["permeability_error"] == [permeability.error]
+    said = columns["warnings"][0].split(" | ")
+    reports = zip(names, (stiffness, conductivity, permeability), strict=True)
+    wanted = [f"{name}: {warning.message}" for name, found in reports for warning in found.warnings]
+    assert len(wanted) > 2 and [words for words in said if words.partition(":")[0] in names] == wanted
+    assert any("grid steps" in words for words in said), said  # of the mesh
+    # Those that are known before are those that are made.
+    job = Job(lt.load(path), per_cell=8, properties={name: settings for name in names})
+    assert list(columns) == columns_of_job(job, ["lattice.a.level.fraction"])
+
+
 # --- stopped and started again ---------------------------------------------------------------------------------------
 
 
@@ -360,10 +386,10 @@ def test_an_objective_is_a_plain_function():
     with pytest.raises(ValueError, match=r"fraction is 1\.5"):
         of({path: 1.5})
     other = "lattice.c.level.fraction"
-    with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; the design has lattice\.a$"):
-        lt.objective(design, [other], ["fraction"])({other: 0.25})
+    with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; did you mean lattice\.a\?"):
+        lt.objective(design, [other], ["fraction"])
     with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
-        lt.objective(design, ["beams.b.radius"], ["fraction"])({"beams.b.radius": 0.25})
+        lt.objective(design, ["beams.b.radius"], ["fraction"])
     with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
         of({})
 
@@ -383,6 +409,12 @@ def test_an_objective_is_a_plain_function():
         ('"lattice.a.level.fraction" = [0.2, 0.3]\ncount = 1', "a grid is every combination of the values"),
         ('"region.box.size[7]" = [1]', "there is no item [7] in the list"),
         ("", "nothing varies"),
+        ('"lattice.b.level.fraction" = [0.2]', "there is no lattice.b; did you mean lattice.a?"),
+        ("lattice.b.level.fraction = [0.2]", "there is no lattice.b; did you mean lattice.a?"),
+        ('"region.box.sise[0]" = [4]', 'unknown key "sise"; did you mean "size"?'),
+        ('"lattice.a.map.affine.offset[0]" = [1]', "lattice.a.map.affine.offset is none in the design"),
+        ('"lattice.a.level.fraction" = [0.2, nan]', "value 2 is nan, which no key can have; give a finite number"),
+        ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 3 }\nsampling = "sobol"\ncount = 4', "is of a grid"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: str, said: str):
@@ -397,13 +429,41 @@ def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: st
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["lattice.a.level.fraction > 1"]', (), "no design keeps the conditions"),
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["fraction > 1"]', (), "names fraction, which is no key"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 1000001 }', (), "made with --yes only"),
-        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--meshes", "one.stl"), "write {design} where the number goes"),
-        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--properties", "colour"), 'unknown property "colour"'),
+        (TWO, ("--plot", "fraction", "area"), '--plot: there is no column "area"; did you mean "area_mm2"?'),
+        (TWO, ("--plot", "fraction", "error"), '--plot: the column "error" holds texts'),
     ],
 )
 def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple, said: str):
     done = command("sweep", written(tmp_path, sweep), "-o", tmp_path / "out.csv", *more)
     assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--meshes", "one.stl"), "write {design} where the number goes"),
+        (("--meshes", "{design}.stp"), "the name must end in"),
+        (("--properties", "stifness"), 'unknown property "stifness"; did you mean stiffness?'),
+        (("--cluster", "nonsense"), "expected local:N or an address such as tcp://head:8786, found nonsense"),
+        (("--cluster", "local:0"), "expected local:N with N from 1 to 4096, found local:0"),
+        (("--front", "min,max"), "--front is of --plot"),
+        (("--plot", "fraction"), "--plot takes two columns, or three"),
+    ],
+)
+def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture, more: tuple, said: str):
+    words = ["sweep", str(written(tmp_path, TWO)), "-o", str(tmp_path / "out.csv"), *more]
+    try:
+        status = cli.main(words)
+    except SystemExit as left:
+        status = left.code
+    told = capsys.readouterr().err
+    assert status == 2 and said in told and told.count("\n") == 1, told
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_the_command_knows_the_properties_that_there_are():
+    assert tuple(PROPERTIES) == cli.PROPERTIES
 
 
 def test_a_design_without_a_sweep_is_refused(tmp_path: Path):

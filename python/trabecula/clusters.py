@@ -14,6 +14,7 @@ from itertools import islice
 from typing import Any
 
 from . import _core
+from .given import cluster_name
 from .rows import Job, row_of
 
 __all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
@@ -34,8 +35,8 @@ HERE = {
     "distributed.worker.memory.monitor-interval": "1s",
     "distributed.scheduler.work-stealing-interval": "1s",
 }
-#: How often a task is tried that ends with its worker.
-TRIES = 20
+#: How often a task is tried that ends with its worker, and how often a cluster here is started whose processes end at once.
+TRIES, STARTS = 20, 3
 
 
 @contextmanager
@@ -62,22 +63,29 @@ def connected(cluster: str) -> Iterator[Any]:
 
 
 def _client(dask: Any, cluster: str) -> Any:
+    cluster_name(cluster)
     if cluster.startswith("local:"):
-        count = cluster.removeprefix("local:")
-        if not count.isdigit() or not 1 <= int(count) <= 4096:
-            raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
-        with _settings(HERE):
-            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-            # Results do not go by way of the scheduler, which is in this process.
-            return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
-    if ":" not in cluster:
-        raise ValueError(f"cluster: expected local:N or an address such as tcp://head:8786, found {cluster}")
+        return _started(dask, int(cluster.removeprefix("local:")))
     try:
         client = dask.Client(cluster, timeout=PATIENCE)
         client.wait_for_workers(1, timeout=PATIENCE)
         return client
     except (OSError, TimeoutError, ValueError) as error:
         raise ValueError(f"cluster {cluster} does not answer within {PATIENCE} s: {error}") from None
+
+
+def _started(dask: Any, count: int) -> Any:
+    """A client of this many processes here. A cluster of which one ends before it has started is started again."""
+    local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+    last: Exception | None = None
+    with _settings(HERE):
+        for _ in range(STARTS):
+            try:
+                # Results do not go by way of the scheduler, which is in this process.
+                return dask.Client(n_workers=count, direct_to_workers=True, **local)
+            except (OSError, RuntimeError, TimeoutError) as error:
+                last = error
+    raise ValueError(f"cluster local:{count}: its processes ended {STARTS} times before they had started ({last}); out of memory?")
 
 
 def _settings(values: dict[str, Any]) -> Any:
@@ -95,7 +103,7 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
     """The rows of numbered points of a sweep as they are done. Files that the design reads are read by workers under the same
     names.
 
-    Raises ValueError as ``connected``.
+    Raises ValueError as ``connected``, and for a worker of another version that has joined since.
     """
     with connected(cluster) as client:
         data = client.scatter(job.to_dict() | {"threads": 1}, broadcast=True)
@@ -103,18 +111,26 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
         room = WAITING * max(sum(client.nthreads().values()), 1)
 
         def submitted(count: int) -> list:
-            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
+            return [
+                client.submit(_row, data, _core.__version__, number, values, pure=False) for number, values in islice(waiting, count)
+            ]
 
         from distributed import as_completed
 
         pending = as_completed(submitted(room), with_results=True)
         for _, row in pending:
+            if row["version"] != _core.__version__:
+                raise ValueError(
+                    f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; its "
+                    "rows are not taken. End it, and the same command goes on"
+                )
             pending.update(submitted(1))
             yield row
 
 
-def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
-    return row_of(Job.of(job), number, values)
+def _row(job: dict[str, Any], wanted: str, number: int, values: dict[str, Any]) -> dict[str, Any]:
+    """A row; a worker of another version than is ``wanted`` makes none, and says which it has."""
+    return row_of(Job.of(job), number, values) if wanted == _core.__version__ else {"version": _core.__version__}
 
 
 def in_order(

@@ -13,6 +13,7 @@ from .conditions import condition
 from .design import Design
 from .given import copied
 from .sampling import latin, sobol
+from .varying import check_values
 
 __all__ = ["Study"]
 
@@ -51,6 +52,7 @@ class Study:
                 'nothing varies: the design has no [sweep]; give it one, such as "lattice.core.level.fraction" = [0.2, 0.3]'
             )
         self.design._checked()
+        check_values(self.design.sweep)
 
     @cached_property
     def _sweep(self) -> dict[str, Any]:
