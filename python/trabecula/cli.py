@@ -283,7 +283,12 @@ APART = (
         action="store_true",
         help="keep what is done in a folder beside the output, with checksums; after any end the same command goes on",
     ),
-    option("--cluster", type=cluster, metavar="ADDRESS", help="by a Dask cluster at this address, or local:N; needs the extra scale"),
+    option(
+        "--cluster",
+        type=cluster,
+        metavar="ADDRESS",
+        help="by a Dask cluster at this address, or local:N; needs the extra scale",
+    ),
     option("--new", action="store_true", help="begin anew: the folder of an earlier run is not taken up"),
 )
 TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the transitions of a blend to OUT.svg", "OUT.svg")

@@ -5,11 +5,12 @@ Workers run functions of this package, which they have installed in the same ver
 
 from __future__ import annotations
 
+import logging
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from typing import Any
 
@@ -54,38 +55,64 @@ def connected(cluster: str) -> Iterator[Any]:
     with warnings.catch_warnings():
         # Of Dask, on ports, slow disks and large inputs: none is about the part.
         warnings.filterwarnings("ignore", category=UserWarning, module="distributed|dask")
-        with _client(dask, cluster) as client:
-            versions = set(client.run(version).values())
-            if versions - {_core.__version__}:
-                other = ", ".join(sorted(versions - {_core.__version__}))
-                raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+        with ExitStack() as opened:
+            client = _client(dask, cluster_name(cluster), opened)
+            _same_version(client, cluster)
             yield client
 
 
-def _client(dask: Any, cluster: str) -> Any:
-    cluster_name(cluster)
+def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
+    """A client, which is closed with what has been ``opened``."""
     if cluster.startswith("local:"):
-        return _started(dask, int(cluster.removeprefix("local:")))
+        here = _started(dask, int(cluster.removeprefix("local:")), opened)
+        # Results do not go by way of the scheduler, which is in this process.
+        return opened.enter_context(dask.Client(here, direct_to_workers=True))
     try:
-        client = dask.Client(cluster, timeout=PATIENCE)
+        client = opened.enter_context(dask.Client(cluster, timeout=PATIENCE))
         client.wait_for_workers(1, timeout=PATIENCE)
         return client
     except (OSError, TimeoutError, ValueError) as error:
         raise ValueError(f"cluster {cluster} does not answer within {PATIENCE} s: {error}") from None
 
 
-def _started(dask: Any, count: int) -> Any:
-    """A client of this many processes here. A cluster of which one ends before it has started is started again."""
-    local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+def _started(dask: Any, count: int, opened: ExitStack) -> Any:
+    """This many processes here. They are started again where one ends before it has started."""
+    opened.enter_context(_settings(HERE))
+    opened.enter_context(_unlogged())
     last: Exception | None = None
-    with _settings(HERE):
-        for _ in range(STARTS):
-            try:
-                # Results do not go by way of the scheduler, which is in this process.
-                return dask.Client(n_workers=count, direct_to_workers=True, **local)
-            except (OSError, RuntimeError, TimeoutError) as error:
-                last = error
-    raise ValueError(f"cluster local:{count}: its processes ended {STARTS} times before they had started ({last}); out of memory?")
+    for _ in range(STARTS):
+        try:
+            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+            return opened.enter_context(dask.LocalCluster(n_workers=count, **local))
+        except (OSError, RuntimeError, TimeoutError) as error:
+            last = error
+    words = f"its processes ended {STARTS} times before they had started; were they killed, or is memory short?"
+    raise ValueError(f"cluster local:{count}: {words} ({last})")
+
+
+def _same_version(client: Any, cluster: str) -> None:
+    """Refuses workers of another version, or without this package."""
+    found = client.run(version, on_error="return").values()
+    wrong = [value for value in found if not isinstance(value, OSError) and value != _core.__version__]  # an OSError has ended
+    if any(isinstance(value, ImportError) for value in wrong):
+        need = f"pip install 'trabecula[scale]=={_core.__version__}'"
+        raise ValueError(f"cluster {cluster}: workers have no trabecula; there too: {need}")
+    if wrong:
+        other = ", ".join(sorted({str(value) for value in wrong}))
+        raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Without what Dask logs of processes here that end and are started again."""
+    handlers = [(handler, handler.level) for handler in logging.getLogger("distributed").handlers]
+    try:
+        for handler, _ in handlers:
+            handler.setLevel(logging.CRITICAL)
+        yield
+    finally:
+        for handler, level in handlers:
+            handler.setLevel(level)
 
 
 def _settings(values: dict[str, Any]) -> Any:
@@ -111,15 +138,13 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
         room = WAITING * max(sum(client.nthreads().values()), 1)
 
         def submitted(count: int) -> list:
-            return [
-                client.submit(_row, data, _core.__version__, number, values, pure=False) for number, values in islice(waiting, count)
-            ]
+            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
 
         from distributed import as_completed
 
         pending = as_completed(submitted(room), with_results=True)
         for _, row in pending:
-            if row["version"] != _core.__version__:
+            if row["version"] != _core.__version__:  # workers may have joined since they were asked
                 raise ValueError(
                     f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; its "
                     "rows are not taken. End it, and the same command goes on"
@@ -128,9 +153,8 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
             yield row
 
 
-def _row(job: dict[str, Any], wanted: str, number: int, values: dict[str, Any]) -> dict[str, Any]:
-    """A row; a worker of another version than is ``wanted`` makes none, and says which it has."""
-    return row_of(Job.of(job), number, values) if wanted == _core.__version__ else {"version": _core.__version__}
+def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
+    return row_of(Job.of(job), number, values)
 
 
 def in_order(

@@ -11,8 +11,17 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import DesignError, Refused, WrongUsage
 from .files import check_place, read_text, write_text
-from .formats import BEAM_ELEMENT_WRITES, DESIGNS, PART_READS, SHELL_WRITES, STDIN, SWEEP_WRITES, VOXEL_ELEMENT_WRITES
-from .formats import dotted, kind_of
+from .formats import (
+    BEAM_ELEMENT_WRITES,
+    DESIGNS,
+    PART_READS,
+    SHELL_WRITES,
+    STDIN,
+    SWEEP_WRITES,
+    VOXEL_ELEMENT_WRITES,
+    dotted,
+    kind_of,
+)
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .local_fields import fields_at
 from .measuring import draw, measure, transitions

@@ -1,4 +1,4 @@
-"""Keys of designs by their paths, such as ``region.box.size[0]``: whether there is such a key, and its unit, as the schema says."""
+"""Keys of designs by their paths, such as ``region.box.size[0]``: whether there are such, and their units, by the schema."""
 
 from __future__ import annotations
 

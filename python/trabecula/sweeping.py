@@ -66,11 +66,11 @@ def make(job: Job, points: list[dict[str, Any]], journal: Journal, add: Callable
     """Makes the rows that are not there yet; after any other end says where those are that are."""
     tasks = [(number, point) for number, point in enumerate(points) if number not in journal.rows]
     try:
-        with Progress("designs", args.progress) as progress:
-            with closing(run(job, tasks, args.jobs or os.cpu_count() or 1, args.cluster)) as rows:
-                for row in rows:
-                    add(row)
-                    progress(len(journal.rows), len(points))
+        made = run(job, tasks, args.jobs or os.cpu_count() or 1, args.cluster)
+        with Progress("designs", args.progress) as progress, closing(made) as rows:
+            for row in rows:
+                add(row)
+                progress(len(journal.rows), len(points))
     except BaseException:
         if done := len(journal.rows):
             left.append(f"{done} of {len(points)} rows stand in {journal.path}; the same command goes on from there")
@@ -107,7 +107,7 @@ def columns_of_table(name: str) -> dict[str, list]:
         except ImportError:
             raise Refused(f"{name} is read by pyarrow, which is missing: pip install 'trabecula[scale]'") from None
         except ValueError as error:  # what it says of files that are damaged
-            raise Refused(f"{name}: no table in Parquet ({str(error):.80})") from None
+            raise Refused(f"{name}: no table in Parquet ({error!s:.80})") from None
     try:
         rows = list(csv.reader(io.StringIO(read_text(name), newline="")))
     except csv.Error as error:

@@ -242,11 +242,11 @@ class Journal:
             read = json.loads(line)
         except ValueError:
             read = None
-        if isinstance(read, dict) and isinstance(read.get("design"), dict if number == 1 else int):
-            if number == 1 or "error" in read:
-                return read
-        advice = "" if number == 1 else "take it out to have its design made again, or "
-        what = "what sweep the rows are of" if number == 1 else "a row"
+        head = number == 1
+        if isinstance(read, dict) and isinstance(read.get("design"), dict if head else int) and (head or "error" in read):
+            return read
+        advice = "" if head else "take it out to have its design made again, or "
+        what = "what sweep the rows are of" if head else "a row"
         raise Refused(f"{self.path}:{number}: the line is damaged, it does not say {what}; {advice}begin anew with --new")
 
     def end(self) -> None:

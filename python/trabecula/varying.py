@@ -1,4 +1,4 @@
-"""What is wrong with the values that a sweep gives keys, and with its keys: in which line of a design file, and what is allowed."""
+"""What is wrong with the keys of a sweep and their values: in which line of a design file, and what is allowed."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _no_numbers_in(text: str, first: int) -> Iterator[tuple[int, str]]:
 
 
 def _line_of(path: str, text: str) -> int | None:
-    """The line of a text in which a sweep has this path: the first one after its head with the path's last key that is there."""
+    """The line of a text in which a sweep has this path: the first one after its head with the path, or its last key."""
     lines = text.splitlines()
     head = next((n for n, line in enumerate(lines) if re.match(r'\s*[\[{"]*\s*sweep\b', line)), 0)
     for word in (path, path.rpartition(".")[2]):
