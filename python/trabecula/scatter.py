@@ -12,7 +12,7 @@ from .rows import unit_of_column
 
 __all__ = ["front_of", "scatter", "without_place"]
 
-WIDTH, HEIGHT, RIGHT, TOP = 720, 480, 110, 40
+WIDTH, HEIGHT, RIGHT, TOP = 720, 480, 110, 56
 #: Colours from least to greatest, even in lightness (after viridis).
 COLOURS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 #: Colours of texts, which all can tell apart (M. Okabe, K. Ito, Color universal design, 2008), and that of what is left.
@@ -124,8 +124,8 @@ def _drawn(
         yield f'<path d="M{path}" fill="none" stroke="{MARK}" stroke-width="1.5"/>'
         words = f"{len(best)} of {len(rows)} designs on the Pareto front: {names[0]} {front[0]}, {names[1]} {front[1]}"
         said.insert(0, words)
-    if said:
-        yield label(LEFT, 24, "; ".join(said))
+    for i, words in enumerate(said):
+        yield label(LEFT, 24 + 18 * i, words)
     colour, legend = _key(names[2], [row[2] for row in rows]) if len(names) > 2 else (lambda _: "#c4814a", ())
     for row in rows:
         shown = (f"{value:.6g}" if _is_number(value) else value for value in row)

@@ -49,11 +49,12 @@ def sweep(
     The study is a design with ``sweep``: {path of a key: list of values, or {"from", "to", "count"}} and ``sampling``,
     ``count``, ``seed``, ``where``; or the path of its file. A row has the number of the design, the values by path,
     ``fraction_asked`` (of the cell), ``wall_mm`` and ``pore_mm`` (the least), and as measured at ``edge`` (mm) or
-    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings``, ``error`` (why there is no such
-    design, or None), ``seconds``, ``sha256`` of the design's text, ``version``. ``properties`` names what else is computed,
-    with settings: {"stiffness": {"n": 48}}. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the
-    number. ``jobs`` processes share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in
-    order, and apart from ``seconds`` the same for any number of processes.
+    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings`` (of design, mesh, properties),
+    ``error`` (why there is no such design, or None), ``seconds``, ``sha256`` of the design's text, ``version``.
+    ``properties`` names what else is computed, with settings: {"stiffness": {"n": 48}}; each figure has its relative error
+    next to it. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the number. ``jobs`` processes
+    share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in order, and apart from
+    ``seconds`` the same for any number of processes.
 
     Raises DesignError for a study that is none, ValueError where no design keeps the conditions. One that cannot be made is a
     row with its error.
