@@ -5,6 +5,7 @@ import csv
 import io
 import itertools
 import json
+import math
 import os
 import random
 import signal
@@ -631,6 +632,22 @@ def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.Ca
 
 def test_the_command_knows_the_properties_that_there_are():
     assert tuple(PROPERTIES) == cli.PROPERTIES
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "said"),
+    [
+        ("lattice.a.level.fraction", [0.2, math.nan], "value 2 is nan, which no key can have"),
+        ("lattice.a.level.fraction", [None], "value 1 is None"),
+        ("lattice.a.level.thickness", [{"linear": {"along": [0, 0, 1], "stops": [[0, 0.3], [1, math.inf]]}}], "value 1 is inf"),
+        ("lattice.b.level.fraction", [0.2], r"there is no lattice\.b; did you mean lattice\.a\?"),
+        ("region.box.sise[0]", [4], 'unknown key "sise"; did you mean "size"?'),
+    ],
+)
+def test_a_study_made_in_python_is_refused_as_its_file_is(tmp_path: Path, path: str, values: list, said: str):
+    design = lt.load(written(tmp_path, TWO)).to_dict() | {"sweep": {path: values}}
+    with pytest.raises(lt.DesignError, match=said):
+        lt.sweep(design)
 
 
 def test_a_design_without_a_sweep_is_refused(tmp_path: Path):

@@ -239,9 +239,10 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     except DesignError as error:
         if not error.path.startswith("sweep."):
             raise
+        from .keys import plain_of
         from .varying import explained
 
-        raise explained(error, text, is_json, name) from None
+        raise explained(error, plain_of(text, is_json), name) from None
     data: dict[str, Any] = json.loads(read.to_json())
     if "sweep" in data:
         from .varying import check_values

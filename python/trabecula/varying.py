@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .errors import DesignError
-from .keys import listless, missing, plain_of
+from .keys import listless, missing
 
 __all__ = ["check_values", "explained"]
 
@@ -38,11 +38,10 @@ def check_values(sweep: Mapping[str, Any] | None, text: str = "", name: str = ""
                     raise _error(f"sweep.{path}", message, line, name)
 
 
-def explained(error: DesignError, text: str, is_json: bool, name: str) -> DesignError:
-    """An error in a sweep's key; where the path leads nowhere in the design, with what is there instead."""
+def explained(error: DesignError, data: Mapping[str, Any] | None, name: str = "") -> DesignError:
+    """An error in a sweep's key; where the path leads nowhere in the design, of these data, with what is there instead."""
     path = error.path.removeprefix("sweep.")
-    data = None if "unknown " in error.message else plain_of(text, is_json)
-    if data is None or not _varies(path, data.get("sweep")):
+    if data is None or "unknown " in error.message or not _varies(path, data.get("sweep")):
         return error
     why = missing(path, data) or (listless(path, data) if "needs a list above it" in error.message else None)
     return _error(error.path, why, error.line, name) if why else error
