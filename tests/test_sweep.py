@@ -458,6 +458,35 @@ def test_rows_of_a_worker_of_another_version_are_not_taken(tmp_path: Path):
     assert 0 < len(rows) < 12 and {row["version"] for row in rows} == {lt.__version__}
 
 
+def test_workers_of_a_cluster_that_are_killed_all_at_once_cost_no_row(tmp_path: Path):
+    distributed = pytest.importorskip("distributed")
+    design = lt.load(written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'))
+    job, points, rows = Job(design, per_cell=8.0), list(enumerate(Study(design).points())), []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
+        address = made.scheduler_address
+        with distributed.Client(address) as client:
+            for row in clusters.rows_by_cluster(job, points, address):
+                rows.append(row)
+                if len(rows) == 2:
+                    for process in client.run(os.getpid).values():
+                        os.kill(process, signal.SIGKILL)
+    assert sorted(row["design"] for row in rows) == list(range(12)) and not any(row["error"] for row in rows)
+
+
+def test_a_sweep_whose_cluster_loses_all_workers_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(clusters, "PATIENCE", 3)
+    design = lt.load(written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'))
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
+        rows = clusters.rows_by_cluster(
+            Job(design, per_cell=8.0), list(enumerate(Study(design).points())), made.scheduler_address
+        )
+        next(rows)
+        made.scale(0)
+        with pytest.raises(ValueError, match="the cluster has had no workers for 3 s"):
+            list(rows)
+
+
 def test_a_cluster_whose_processes_are_killed_while_they_start_is_started_again(monkeypatch: pytest.MonkeyPatch):
     distributed = pytest.importorskip("distributed")
     begin, left = distributed.Nanny.instantiate, [2]

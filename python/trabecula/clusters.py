@@ -5,6 +5,7 @@ Workers run functions of this package, which they have installed in the same ver
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
 import warnings
@@ -130,27 +131,51 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
     """The rows of numbered points of a sweep as they are done. Files that the design reads are read by workers under the same
     names.
 
-    Raises ValueError as ``connected``, and for a worker of another version that has joined since.
+    A row whose worker dies is made by another. Raises ValueError as ``connected``, for a worker of another version that has
+    joined since, and for a cluster that has lost its workers for longer than ``PATIENCE``.
     """
     with connected(cluster) as client:
-        data = client.scatter(job.to_dict() | {"threads": 1}, broadcast=True)
+        data = job.to_dict() | {"threads": 1}
+        given = client.submit(_same, data, pure=False)
         waiting = iter(tasks)
-        room = WAITING * max(sum(client.nthreads().values()), 1)
+        #: The task of each row that is asked for, and how often it has been.
+        asked: dict[Any, tuple[tuple[int, dict[str, Any]], int]] = {}
 
-        def submitted(count: int) -> list:
-            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
+        def ask(task: tuple[int, dict[str, Any]], tries: int = 1) -> None:
+            asked[client.submit(_row, given, *task, pure=False)] = task, tries
 
-        from distributed import as_completed
+        for task in islice(waiting, WAITING * max(sum(client.nthreads().values()), 1)):
+            ask(task)
+        while asked:
+            for future in _waited(client, lambda: _done(asked)):
+                task, tries = asked.pop(future)
+                try:
+                    row = _result(client, future)
+                except _lost():
+                    if tries < TRIES:
+                        given = client.submit(_same, data, pure=False)
+                        ask(task, tries + 1)
+                        continue
+                    error = f"its worker died {TRIES} times; out of memory?"
+                    row = {"design": task[0], **task[1], "error": error, "version": _core.__version__}
+                if row["version"] != _core.__version__:  # workers may have joined since they were asked
+                    raise ValueError(
+                        f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; "
+                        "its rows are not taken. End it, and the same command goes on"
+                    )
+                for task in islice(waiting, 1):
+                    ask(task)
+                yield row
 
-        pending = as_completed(submitted(room), with_results=True)
-        for _, row in pending:
-            if row["version"] != _core.__version__:  # workers may have joined since they were asked
-                raise ValueError(
-                    f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; its "
-                    "rows are not taken. End it, and the same command goes on"
-                )
-            pending.update(submitted(1))
-            yield row
+
+def _done(asked: Iterable[Any]) -> list[Any]:
+    """Futures that are done, at least one. Raises TimeoutError where there is none for some seconds."""
+    from distributed import wait
+
+    futures = list(asked)
+    with suppress(*_lost()):
+        wait(futures, timeout=5, return_when="FIRST_COMPLETED")
+    return [future for future in futures if future.done()]
 
 
 def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
@@ -227,11 +252,16 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 def _result(client: Any, future: Any) -> Any:
     """The result of a task, waited for as long as there are workers, or may be again soon."""
+    return _waited(client, lambda: future.result(timeout=5))
+
+
+def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
+    """What an attempt gives that may raise TimeoutError, made as long as there are workers, or may be again soon."""
     last = time.monotonic()
     while True:
         try:
-            return future.result(timeout=5)
-        except TimeoutError:
+            return attempt()
+        except (TimeoutError, asyncio.TimeoutError):  # one from Python 3.11 on
             with suppress(OSError, TimeoutError):
                 if client.nthreads():
                     last = time.monotonic()
