@@ -80,7 +80,8 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", DesignWarning)
         solid = Solid(core.build(folder), folder)
-        said = [w["message"] for w in solid.warnings]
+        said: list[str] = [w["message"] for w in solid.warnings]
+        reported: list[str] = []
         figures |= _asked(solid)
         resolution = {"edge": job.edge, "per_cell": job.per_cell}
         if job.meshes or job.pictures:
@@ -96,8 +97,8 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
         for name, settings in job.properties.items():
             found = getattr(solid, name)(threads=job.threads, **settings)
             figures |= dict(zip(PROPERTIES[name].columns, PROPERTIES[name].figures(found), strict=True))
-            said += [f"{name}: {warning.message}" for warning in found.warnings]
-    said += [str(w.message) for w in heard if isinstance(w.message, DesignWarning)]
+            reported += [f"{name}: {warning.message}" for warning in found.warnings]
+    said += [*(str(w.message) for w in heard if isinstance(w.message, DesignWarning)), *reported]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     return figures
 
