@@ -627,7 +627,7 @@ def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: st
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["fraction > 1"]', (), "names fraction, which is no key"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 1000001 }', (), "made with --yes only"),
         (TWO, ("--plot", "fraction", "area"), '--plot: there is no column "area"; did you mean "area_mm2"?'),
-        (TWO, ("--plot", "fraction", "error"), '--plot: the column "error" holds texts'),
+        (TWO, ("--plot", "fraction", "error"), '--plot: the column "error" holds no numbers'),
     ],
 )
 def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple, said: str):

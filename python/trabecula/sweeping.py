@@ -84,8 +84,8 @@ def check_plot(job: Job, points: list[dict[str, Any]], wanted: Sequence[str]) ->
         if name not in known:
             raise Refused(f'--plot: there is no column "{name}"; {nearest(name, known)}')
     for name in wanted[:2]:
-        if name in TEXTS or all(isinstance(point.get(name), str) for point in points):
-            raise Refused(f'--plot: the column "{name}" holds texts, which have no place on an axis; they can be the colour')
+        if name in TEXTS or not any(isinstance(point.get(name, 0), int | float) for point in points):
+            raise Refused(f'--plot: the column "{name}" holds no numbers and has no place on an axis; it can be the colour')
 
 
 def draw(table: str, args, drawing: str) -> None:

@@ -8,7 +8,7 @@ import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 from . import _core
@@ -218,7 +218,8 @@ class Journal:
             finally:
                 if self.ended:
                     file.close()
-                    os.remove(self.path)
+                    with suppress(FileNotFoundError):
+                        os.remove(self.path)
 
     def _read(self, raw: bytes) -> int:
         """Takes up the rows of a file; the length of what is taken up, nothing of another sweep that has made no design."""
