@@ -5,6 +5,7 @@ import csv
 import io
 import itertools
 import json
+import math
 import os
 import random
 import signal
@@ -18,11 +19,11 @@ import pytest
 import trabecula as lt
 from hypothesis import given
 from hypothesis import strategies as st
-from trabecula import cli, workers
+from trabecula import cli, clusters, workers
 from trabecula.conditions import condition
-from trabecula.rows import Job, row_of
+from trabecula.rows import PROPERTIES, Job, columns_of_job, row_of
 from trabecula.sampling import DIMENSIONS, latin, sobol
-from trabecula.scatter import front_of
+from trabecula.scatter import front_of, scatter
 from trabecula.sent import digests
 from trabecula.study import Study
 from trabecula.sweeps import Journal
@@ -37,6 +38,8 @@ part = "sheet"
 map.affine.wavelength = 4
 level.fraction = 0.3
 """
+#: Two designs.
+TWO = '"lattice.a.level.fraction" = [0.2, 0.3]'
 
 
 def written(folder: Path, sweep: str, name: str = "study.toml") -> Path:
@@ -230,6 +233,36 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path):
     texts = [row["volume_mm3"] for row in table(tmp_path / "out.csv")]
     assert [None if t == "" else float(t) for t in texts] == read["volume_mm3"].to_pylist()
     assert read.schema.field("volume_mm3").metadata == {b"unit": "mm³".encode()}
+    study = written(tmp_path, '"lattice.a.map.affine.wavelength" = [4, 5]\n"lattice.a.map.affine.rotate" = [[0, 0, 0]]')
+    assert command("sweep", study, "-o", tmp_path / "units.parquet", "--per-cell", 8).returncode == 0
+    schema = parquet.read_schema(tmp_path / "units.parquet")
+    assert schema.field("lattice.a.map.affine.wavelength").metadata == {b"unit": b"mm"}
+    assert schema.field("lattice.a.map.affine.rotate").metadata == {b"unit": "°".encode()}
+    assert [str(schema.field(name).type) for name in ("error", "warnings", "version")] == ["string"] * 3
+
+
+def test_each_figure_has_its_error_and_each_row_what_reports_warn_of(tmp_path: Path):
+    path, settings = written(tmp_path, '"lattice.a.level.fraction" = [0.2]'), {"n": 16}
+    names = ("stiffness", "conductivity", "permeability")
+    columns = lt.sweep(path, per_cell=8, properties=dict.fromkeys(names, settings))
+    data = lt.load(path).to_dict()
+    del data["sweep"]
+    data["lattice"]["a"]["level"]["fraction"] = 0.2
+    solid = lt.Design(**data).build()
+    stiffness, conductivity, permeability = (getattr(solid, name)(**settings) for name in names)
+    for i, (axis, plane) in enumerate((("1", "23"), ("2", "13"), ("3", "12"))):
+        assert columns[f"E{axis}"] == [stiffness.E[i]] and columns[f"E{axis}_error"] == [stiffness.E_error[i]]
+        assert columns[f"G{plane}"] == [stiffness.G[i]] and columns[f"G{plane}_error"] == [stiffness.G_error[i]]
+        assert columns[f"k{axis}{axis}_error"] == [conductivity.axis_errors[i]]
+    assert columns["permeability_error"] == [permeability.error]
+    said = columns["warnings"][0].split(" | ")
+    reports = zip(names, (stiffness, conductivity, permeability), strict=True)
+    wanted = [f"{name}: {warning.message}" for name, found in reports for warning in found.warnings]
+    assert len(wanted) > 2 and [words for words in said if words.partition(":")[0] in names] == wanted
+    assert any("grid steps" in words for words in said), said  # of the mesh
+    # Those that are known before are those that are made.
+    job = Job(lt.load(path), per_cell=8, properties=dict.fromkeys(names, settings))
+    assert list(columns) == columns_of_job(job, ["lattice.a.level.fraction"])
 
 
 # --- stopped and started again ---------------------------------------------------------------------------------------
@@ -277,6 +310,74 @@ def test_rows_that_are_there_are_taken_up_unless_the_study_has_changed(tmp_path:
     assert [row["pieces"] for row in table(out)] == ["1", "1"]
 
 
+def journal_of(study: Path, out: Path, *rows: dict) -> Path:
+    """The rows so far of a sweep, as the command leaves them when it is killed."""
+    journal = Journal(str(out), Job(lt.load(study), per_cell=8.0))
+    with journal.writing() as add:
+        for row in rows:
+            add(row)
+    return Path(journal.path)
+
+
+def test_what_has_made_no_design_leaves_nothing_and_stops_no_other_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study, out = written(tmp_path, '"lattice.a.level.fraction" = [1.5, 2]'), tmp_path / "out.csv"
+    words = ("sweep", study, "-o", out, "--per-cell", 8, "--jobs", 1)
+    assert command(*words).returncode == 1 and os.listdir(tmp_path) == ["study.toml"]
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "distributed", None)
+        done = command(*words, "--cluster", "local:1")
+    assert done.returncode == 1 and "needs the extra scale" in done.stderr and os.listdir(tmp_path) == ["study.toml"]
+    # Killed when it had failures only: the corrected study begins.
+    left = journal_of(study, out, {"design": 0, "error": "fraction is 1.5"})
+    assert left.exists()
+    written(tmp_path, TWO)
+    done = command(*words)
+    assert done.returncode == 0 and len(table(out)) == 2 and not left.exists()
+
+
+@pytest.mark.parametrize(
+    ("number", "damage", "said"),
+    [
+        (1, b"{", "does not say what sweep the rows are of; begin anew with --new"),
+        (2, b'{"design": 0, "lattice', "does not say a row; take it out to have its design made again, or begin anew"),
+        (2, b"\xff\xfe", "does not say a row"),
+        (2, b"[]", "does not say a row"),
+    ],
+)
+def test_a_damaged_line_is_named(tmp_path: Path, number: int, damage: bytes, said: str):
+    study, out = written(tmp_path, TWO), tmp_path / "out.csv"
+    job = Job(lt.load(study), per_cell=8.0)
+    path = journal_of(study, out, *(row_of(job, i, {"lattice.a.level.fraction": v}) for i, v in enumerate((0.2, 0.3))))
+    lines = path.read_bytes().split(b"\n")
+    lines[number - 1] = damage
+    path.write_bytes(b"\n".join(lines))
+    words = ("sweep", study, "-o", out, "--per-cell", 8, "--jobs", 1)
+    done = command(*words)
+    assert done.returncode == 1 and f"{path}:{number}: the line is damaged, it {said}" in done.stderr, done.stderr
+    assert done.stderr.count("\n") == 1 and path.read_bytes() == b"\n".join(lines)
+    if number > 1:
+        path.write_bytes(b"\n".join(lines[:1] + lines[2:]))
+        assert json.loads(command(*words, "--json").stdout)["resumed"] == 1
+    else:
+        assert command(*words, "--new").returncode == 0
+    assert len(table(out)) == 2
+
+
+def test_two_sweeps_on_one_output_at_a_time_are_refused(tmp_path: Path):
+    pytest.importorskip("fcntl")
+    study, out = written(tmp_path, TWO), tmp_path / "out.csv"
+    job = Job(lt.load(study), per_cell=8.0)
+    with Journal(str(out), job).writing() as add:
+        add(row_of(job, 0, {"lattice.a.level.fraction": 0.2}))
+        before = Path(f"{out}.rows").read_bytes()
+        for more in ((), ("--new",)):
+            done = command("sweep", study, "-o", out, "--per-cell", 8, *more)
+            assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+            assert f"another process works in {out}.rows; wait for it, or end it" in done.stderr
+        assert Path(f"{out}.rows").read_bytes() == before
+    assert command("sweep", study, "-o", out, "--per-cell", 8).returncode == 0
+
+
 def test_files_are_known_by_their_own_paths_and_folders_by_all_they_hold(tmp_path: Path):
     for name in ("a/x.csv", "b/x.csv", "scan/1.png", "scan/2.png"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -312,6 +413,16 @@ def test_a_row_whose_process_dies_each_time_is_a_row_with_that(tmp_path: Path, m
     assert row["design"] == 0 and "its process died 3 times" in row["error"]
 
 
+def test_workers_of_a_killed_sweep_end_without_a_word(tmp_path: Path):
+    study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 200 }')
+    process = started(study, tmp_path / "out.csv", 2, stderr=subprocess.PIPE, text=True)
+    rows = tmp_path / "out.csv.rows"
+    while process.poll() is None and (not rows.exists() or rows.read_text().count("\n") < 3):
+        time.sleep(0.05)
+    process.kill()
+    assert process.communicate(timeout=60)[1] == ""  # its workers have the same stderr: it ends with the last of them
+
+
 def test_an_interrupt_says_where_the_rows_are(tmp_path: Path):
     study = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 200 }')
     process = started(study, tmp_path / "out.csv", 2, stderr=subprocess.PIPE, text=True)
@@ -332,6 +443,72 @@ def test_a_dask_cluster_gives_the_same_table(tmp_path: Path):
     assert table(tmp_path / "here.csv") == table(tmp_path / "there.csv")
 
 
+def test_rows_of_a_worker_of_another_version_are_not_taken(tmp_path: Path):
+    distributed = pytest.importorskip("distributed")
+    study, rows = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'), []
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
+        address = made.scheduler_address
+        job, points = Job(lt.load(study), per_cell=8.0), list(enumerate(Study(lt.load(study)).points()))
+        said = r"a worker of version 9\.9\.9 has joined, here it is .*; its rows are not taken"
+        with distributed.Client(address) as client, pytest.raises(ValueError, match=said):
+            for row in clusters.rows_by_cluster(job, points, address):
+                rows.append(row)
+                # The worker goes, and one with another version comes.
+                client.run(exec, "import trabecula._core as it; it.__version__ = '9.9.9'", {})
+    assert 0 < len(rows) < 12 and {row["version"] for row in rows} == {lt.__version__}
+
+
+def test_workers_of_a_cluster_that_are_killed_all_at_once_cost_no_row(tmp_path: Path):
+    distributed = pytest.importorskip("distributed")
+    design = lt.load(written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'))
+    job, points, rows = Job(design, per_cell=8.0), list(enumerate(Study(design).points())), []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
+        address = made.scheduler_address
+        with distributed.Client(address) as client:
+            for row in clusters.rows_by_cluster(job, points, address):
+                rows.append(row)
+                if len(rows) == 2:
+                    for process in client.run(os.getpid).values():
+                        os.kill(process, signal.SIGKILL)
+    assert sorted(row["design"] for row in rows) == list(range(12)) and not any(row["error"] for row in rows)
+
+
+def test_a_sweep_whose_cluster_loses_all_workers_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(clusters, "PATIENCE", 3)
+    design = lt.load(written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'))
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
+        rows = clusters.rows_by_cluster(
+            Job(design, per_cell=8.0), list(enumerate(Study(design).points())), made.scheduler_address
+        )
+        next(rows)
+        made.scale(0)
+        with pytest.raises(ValueError, match="the cluster has had no workers for 3 s"):
+            list(rows)
+
+
+def test_a_cluster_whose_processes_are_killed_while_they_start_is_started_again(monkeypatch: pytest.MonkeyPatch):
+    distributed = pytest.importorskip("distributed")
+    begin, left = distributed.Nanny.instantiate, [2]
+
+    async def killed(self):
+        if left[0]:
+            left[0] -= 1
+            self.auto_restart = False
+            raise RuntimeError("Nanny failed to start.")
+        return await begin(self)
+
+    monkeypatch.setattr(distributed.Nanny, "instantiate", killed)
+    with clusters.connected("local:1") as client:
+        assert client.submit(sum, [1, 2]).result() == 3
+    left[0] = 99
+    with (
+        pytest.raises(ValueError, match=r"cluster local:1: its processes ended 3 times before they had started"),
+        clusters.connected("local:1"),
+    ):
+        pass
+
+
 # --- drawings, objectives, mistakes -----------------------------------------------------------------------------------
 
 
@@ -348,6 +525,48 @@ def test_the_table_is_drawn_with_its_pareto_front(tmp_path: Path):
     assert wrong.returncode == 1 and 'there is no column "colour"; with numbers there are design, ' in wrong.stderr
 
 
+def test_texts_are_colours_and_units_stand_at_the_axes(tmp_path: Path):
+    pytest.importorskip("pyarrow")
+    study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3, 1.5]\n"lattice.a.cell" = ["gyroid", "diamond"]')
+    plot = ("--plot", "pore_mm", "area_mm2", "lattice.a.cell")
+    done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8, *plot)
+    assert done.returncode == 0 and "out.svg: written; 2 of 6 designs left out, which lack a number" in done.stderr
+    drawing = (tmp_path / "out.svg").read_text()
+    marks = [line for line in drawing.splitlines() if line.startswith("<circle")]
+    colours = {text: {line.split('fill="')[1][:7] for line in marks if text in line} for text in ("gyroid", "diamond")}
+    assert (
+        len(marks) == 4 + 2 and all(len(found) == 1 for found in colours.values()) and colours["gyroid"] != colours["diamond"]
+    )
+    for words in ("pore (mm)", "area (mm²)", "gyroid", "diamond", "lattice.a.cell", "2 of 6 designs left out"):
+        assert f">{words}" in drawing, words
+    assert command("sweep", study, "-o", tmp_path / "out.parquet", "--per-cell", 8).returncode == 0
+    assert command("sweep", tmp_path / "out.parquet", "-o", tmp_path / "two.svg", *plot).returncode == 0
+    assert (tmp_path / "two.svg").read_text() == drawing
+
+
+def test_more_texts_than_colours_are_others():
+    texts = [f"kind {i}" for i in range(11)]
+    drawing = scatter({"x": list(range(11)), "y": list(range(11)), "of": texts}, "x", "y", "of")
+    assert "3 others" in drawing and drawing.count("<circle") == 11 + 9
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.csv", b"PK\x03\x04\xff\xfe", "a.csv:1: not text in UTF-8"),
+        ("a.csv", b"x,y\n1,\0\n", "a.csv: "),
+        ("a.csv", b"", "a.csv is empty"),
+        ("a.parquet", b"x,y\n1,2\n", "a.parquet: no table in Parquet"),
+    ],
+)
+def test_what_is_no_table_is_named(tmp_path: Path, name: str, content: bytes, said: str):
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow")
+    (tmp_path / name).write_bytes(content)
+    done = command("sweep", tmp_path / name, "-o", tmp_path / "out.svg", "--plot", "x", "y")
+    assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
 def test_an_objective_is_a_plain_function():
     design = {
         "region": lt.region.box(size=[4, 4, 4]),
@@ -360,10 +579,14 @@ def test_an_objective_is_a_plain_function():
     with pytest.raises(ValueError, match=r"fraction is 1\.5"):
         of({path: 1.5})
     other = "lattice.c.level.fraction"
-    with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; the design has lattice\.a$"):
-        lt.objective(design, [other], ["fraction"])({other: 0.25})
+    with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; did you mean lattice\.a\?"):
+        lt.objective(design, [other], ["fraction"])
     with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
-        lt.objective(design, ["beams.b.radius"], ["fraction"])({"beams.b.radius": 0.25})
+        lt.objective(design, ["beams.b.radius"], ["fraction"])
+    with pytest.raises(ValueError, match=r'unknown output "volume"; did you mean "volume_mm3"\?'):
+        lt.objective(design, [path], ["volume"])
+    with pytest.raises(ValueError, match=r'unknown property "stifness"; did you mean "stiffness"\?'):
+        lt.objective(design, [path], ["E1"], properties=["stifness"])
     with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
         of({})
 
@@ -383,6 +606,12 @@ def test_an_objective_is_a_plain_function():
         ('"lattice.a.level.fraction" = [0.2, 0.3]\ncount = 1', "a grid is every combination of the values"),
         ('"region.box.size[7]" = [1]', "there is no item [7] in the list"),
         ("", "nothing varies"),
+        ('"lattice.b.level.fraction" = [0.2]', "there is no lattice.b; did you mean lattice.a?"),
+        ("lattice.b.level.fraction = [0.2]", "there is no lattice.b; did you mean lattice.a?"),
+        ('"region.box.sise[0]" = [4]', 'unknown key "sise"; did you mean "size"?'),
+        ('"lattice.a.map.affine.offset[0]" = [1]', "lattice.a.map.affine.offset is none in the design"),
+        ('"lattice.a.level.fraction" = [0.2, nan]', "value 2 is nan, which no key can have; give a finite number"),
+        ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 3 }\nsampling = "sobol"\ncount = 4', "is of a grid"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: str, said: str):
@@ -397,13 +626,57 @@ def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: st
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["lattice.a.level.fraction > 1"]', (), "no design keeps the conditions"),
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["fraction > 1"]', (), "names fraction, which is no key"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 1000001 }', (), "made with --yes only"),
-        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--meshes", "one.stl"), "write {design} where the number goes"),
-        ('"lattice.a.level.fraction" = [0.2, 0.3]', ("--properties", "colour"), 'unknown property "colour"'),
+        (TWO, ("--plot", "fraction", "area"), '--plot: there is no column "area"; did you mean "area_mm2"?'),
+        (TWO, ("--plot", "fraction", "error"), '--plot: the column "error" holds no numbers'),
     ],
 )
 def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple, said: str):
     done = command("sweep", written(tmp_path, sweep), "-o", tmp_path / "out.csv", *more)
     assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--meshes", "one.stl"), "write {design} where the number goes"),
+        (("--meshes", "{design}.stp"), "the name must end in"),
+        (("--properties", "stifness"), 'unknown property "stifness"; did you mean stiffness?'),
+        (("--cluster", "nonsense"), "expected local:N or an address such as tcp://head:8786, found nonsense"),
+        (("--cluster", "local:0"), "expected local:N with N from 1 to 4096, found local:0"),
+        (("--front", "min,max"), "--front is of --plot"),
+        (("--plot", "fraction"), "--plot takes two columns, or three"),
+    ],
+)
+def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture, more: tuple, said: str):
+    words = ["sweep", str(written(tmp_path, TWO)), "-o", str(tmp_path / "out.csv"), *more]
+    try:
+        status = cli.main(words)
+    except SystemExit as left:
+        status = left.code
+    told = capsys.readouterr().err
+    assert status == 2 and said in told and told.count("\n") == 1, told
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_the_command_knows_the_properties_that_there_are():
+    assert tuple(PROPERTIES) == cli.PROPERTIES
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "said"),
+    [
+        ("lattice.a.level.fraction", [0.2, math.nan], "value 2 is nan, which no key can have"),
+        ("lattice.a.level.fraction", [None], "value 1 is None"),
+        ("lattice.a.level.thickness", [{"linear": {"along": [0, 0, 1], "stops": [[0, 0.3], [1, math.inf]]}}], "value 1 is inf"),
+        ("lattice.b.level.fraction", [0.2], r"there is no lattice\.b; did you mean lattice\.a\?"),
+        ("region.box.sise[0]", [4], 'unknown key "sise"; did you mean "size"?'),
+    ],
+)
+def test_a_study_made_in_python_is_refused_as_its_file_is(tmp_path: Path, path: str, values: list, said: str):
+    design = lt.load(written(tmp_path, TWO)).to_dict() | {"sweep": {path: values}}
+    with pytest.raises(lt.DesignError, match=said):
+        lt.sweep(design)
 
 
 def test_a_design_without_a_sweep_is_refused(tmp_path: Path):

@@ -34,6 +34,7 @@ from .formats import (
     dotted,
     kind_of,
 )
+from .given import cluster_name
 from .islands import ISLANDS
 from .parts import check_parts
 from .shown import SHOWN
@@ -53,6 +54,8 @@ exit status: 0 done, 1 the design or a file is wrong, 2 wrong usage,
 or options that do not go together.
 Set TRABECULA_DEBUG=1 for the traceback of an internal error.
 """
+#: What a sweep computes besides.
+PROPERTIES = ("conductivity", "permeability", "stiffness")
 UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
 
 
@@ -165,6 +168,27 @@ def names(text: str) -> list[str]:
     return found
 
 
+def properties(text: str) -> list[str]:
+    """Names of properties by commas."""
+    found = names(text)
+    for name in found:
+        if name not in PROPERTIES:
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, PROPERTIES, 1)
+            hint = f"; did you mean {near[0]}?" if near else "."
+            raise argparse.ArgumentTypeError(f'unknown property "{name}"{hint} There are {", ".join(PROPERTIES)}')
+    return found
+
+
+def cluster(text: str) -> str:
+    """A Dask cluster."""
+    try:
+        return cluster_name(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix("cluster: ")) from None
+
+
 def front(text: str) -> tuple[str, str]:
     """Which of two columns is better where it is small, and which where it is large."""
     ways = tuple(text.split(","))
@@ -259,7 +283,12 @@ APART = (
         action="store_true",
         help="keep what is done in a folder beside the output, with checksums; after any end the same command goes on",
     ),
-    option("--cluster", metavar="ADDRESS", help="by a Dask cluster at this address, or local:N; needs the extra scale"),
+    option(
+        "--cluster",
+        type=cluster,
+        metavar="ADDRESS",
+        help="by a Dask cluster at this address, or local:N; needs the extra scale",
+    ),
     option("--new", action="store_true", help="begin anew: the folder of an earlier run is not taken up"),
 )
 TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the transitions of a blend to OUT.svg", "OUT.svg")
@@ -477,8 +506,8 @@ COMMANDS = {
         "  trabecula sweep study.csv --plot fraction area_mm2 wall_mm -o study.svg --front min,max",
         file(
             "study",
-            (*DESIGNS, "csv"),
-            "a design with [sweep] (.toml or .json), or - for standard input; or rows (.csv) to plot",
+            (*DESIGNS, *SWEEP_WRITES),
+            "a design with [sweep] (.toml or .json), or - for standard input; or a table (.csv or .parquet) to plot",
             "STUDY",
             True,
         ),
@@ -496,11 +525,21 @@ COMMANDS = {
             metavar="N",
             help="processes (default: one a processor); any number gives the same table",
         ),
-        option("--cluster", metavar="ADDRESS", help="a Dask cluster at this address, or local:N; needs the extra scale"),
-        option("--properties", metavar="NAMES", help="what else is computed of each design, by commas"),
+        option(
+            "--cluster",
+            type=cluster,
+            metavar="ADDRESS",
+            help="a Dask cluster at this address, or local:N; needs the extra scale",
+        ),
+        option(
+            "--properties",
+            type=properties,
+            metavar="NAMES",
+            help=f"what else is computed of each design, by commas: {', '.join(PROPERTIES)}",
+        ),
         option("--n", type=VOXELS, metavar="N", help="voxels along a cell for these properties"),
-        option("--meshes", metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
-        option("--pictures", metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
+        option("--meshes", type=ending(MESH_WRITES), metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
+        option("--pictures", type=ending(("png",)), metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
         option("--plot", nargs="+", metavar=("X", "Y"), help="draw column Y against X, a third as colour, to OUT with .svg"),
         option(
             "--front", type=front, metavar="BETTER", help="with the Pareto front: min or max of X and of Y, such as min,max"

@@ -5,15 +5,18 @@ Workers run functions of this package, which they have installed in the same ver
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from typing import Any
 
 from . import _core
+from .given import cluster_name
 from .rows import Job, row_of
 
 __all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
@@ -34,8 +37,8 @@ HERE = {
     "distributed.worker.memory.monitor-interval": "1s",
     "distributed.scheduler.work-stealing-interval": "1s",
 }
-#: How often a task is tried that ends with its worker.
-TRIES = 20
+#: How often a task is tried that ends with its worker, and how often a cluster here is started whose processes end at once.
+TRIES, STARTS = 20, 3
 
 
 @contextmanager
@@ -53,31 +56,64 @@ def connected(cluster: str) -> Iterator[Any]:
     with warnings.catch_warnings():
         # Of Dask, on ports, slow disks and large inputs: none is about the part.
         warnings.filterwarnings("ignore", category=UserWarning, module="distributed|dask")
-        with _client(dask, cluster) as client:
-            versions = set(client.run(version).values())
-            if versions - {_core.__version__}:
-                other = ", ".join(sorted(versions - {_core.__version__}))
-                raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+        with ExitStack() as opened:
+            client = _client(dask, cluster_name(cluster), opened)
+            _same_version(client, cluster)
             yield client
 
 
-def _client(dask: Any, cluster: str) -> Any:
+def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
+    """A client, which is closed with what has been ``opened``."""
     if cluster.startswith("local:"):
-        count = cluster.removeprefix("local:")
-        if not count.isdigit() or not 1 <= int(count) <= 4096:
-            raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {cluster}")
-        with _settings(HERE):
-            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-            # Results do not go by way of the scheduler, which is in this process.
-            return dask.Client(n_workers=int(count), direct_to_workers=True, **local)
-    if ":" not in cluster:
-        raise ValueError(f"cluster: expected local:N or an address such as tcp://head:8786, found {cluster}")
+        here = _started(dask, int(cluster.removeprefix("local:")), opened)
+        # Results do not go by way of the scheduler, which is in this process.
+        return opened.enter_context(dask.Client(here, direct_to_workers=True))
     try:
-        client = dask.Client(cluster, timeout=PATIENCE)
+        client = opened.enter_context(dask.Client(cluster, timeout=PATIENCE))
         client.wait_for_workers(1, timeout=PATIENCE)
         return client
     except (OSError, TimeoutError, ValueError) as error:
         raise ValueError(f"cluster {cluster} does not answer within {PATIENCE} s: {error}") from None
+
+
+def _started(dask: Any, count: int, opened: ExitStack) -> Any:
+    """This many processes here. They are started again where one ends before it has started."""
+    opened.enter_context(_settings(HERE))
+    opened.enter_context(_unlogged())
+    last: Exception | None = None
+    for _ in range(STARTS):
+        try:
+            local = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+            return opened.enter_context(dask.LocalCluster(n_workers=count, **local))
+        except (OSError, RuntimeError, TimeoutError) as error:
+            last = error
+    words = f"its processes ended {STARTS} times before they had started; were they killed, or is memory short?"
+    raise ValueError(f"cluster local:{count}: {words} ({last})")
+
+
+def _same_version(client: Any, cluster: str) -> None:
+    """Refuses workers of another version, or without this package."""
+    found = client.run(version, on_error="return").values()
+    wrong = [value for value in found if not isinstance(value, OSError) and value != _core.__version__]  # an OSError has ended
+    if any(isinstance(value, ImportError) for value in wrong):
+        need = f"pip install 'trabecula[scale]=={_core.__version__}'"
+        raise ValueError(f"cluster {cluster}: workers have no trabecula; there too: {need}")
+    if wrong:
+        other = ", ".join(sorted({str(value) for value in wrong}))
+        raise ValueError(f"cluster {cluster}: workers have version {other}, here it is {_core.__version__}")
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Without what Dask logs of processes here that end and are started again."""
+    handlers = [(handler, handler.level) for handler in logging.getLogger("distributed").handlers]
+    try:
+        for handler, _ in handlers:
+            handler.setLevel(logging.CRITICAL)
+        yield
+    finally:
+        for handler, level in handlers:
+            handler.setLevel(level)
 
 
 def _settings(values: dict[str, Any]) -> Any:
@@ -95,22 +131,51 @@ def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], clust
     """The rows of numbered points of a sweep as they are done. Files that the design reads are read by workers under the same
     names.
 
-    Raises ValueError as ``connected``.
+    A row whose worker dies is made by another. Raises ValueError as ``connected``, for a worker of another version that has
+    joined since, and for a cluster that has lost its workers for longer than ``PATIENCE``.
     """
     with connected(cluster) as client:
-        data = client.scatter(job.to_dict() | {"threads": 1}, broadcast=True)
+        data = job.to_dict() | {"threads": 1}
+        given = client.submit(_same, data, pure=False)
         waiting = iter(tasks)
-        room = WAITING * max(sum(client.nthreads().values()), 1)
+        #: The task of each row that is asked for, and how often it has been.
+        asked: dict[Any, tuple[tuple[int, dict[str, Any]], int]] = {}
 
-        def submitted(count: int) -> list:
-            return [client.submit(_row, data, number, values, pure=False) for number, values in islice(waiting, count)]
+        def ask(task: tuple[int, dict[str, Any]], tries: int = 1) -> None:
+            asked[client.submit(_row, given, *task, pure=False)] = task, tries
 
-        from distributed import as_completed
+        for task in islice(waiting, WAITING * max(sum(client.nthreads().values()), 1)):
+            ask(task)
+        while asked:
+            for future in _waited(client, lambda: _done(asked)):
+                task, tries = asked.pop(future)
+                try:
+                    row = _result(client, future)
+                except _lost():
+                    if tries < TRIES:
+                        given = client.submit(_same, data, pure=False)
+                        ask(task, tries + 1)
+                        continue
+                    error = f"its worker died {TRIES} times; out of memory?"
+                    row = {"design": task[0], **task[1], "error": error, "version": _core.__version__}
+                if row["version"] != _core.__version__:  # workers may have joined since they were asked
+                    raise ValueError(
+                        f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; "
+                        "its rows are not taken. End it, and the same command goes on"
+                    )
+                for task in islice(waiting, 1):
+                    ask(task)
+                yield row
 
-        pending = as_completed(submitted(room), with_results=True)
-        for _, row in pending:
-            pending.update(submitted(1))
-            yield row
+
+def _done(asked: Iterable[Any]) -> list[Any]:
+    """Futures that are done, at least one. Raises TimeoutError where there is none for some seconds."""
+    from distributed import wait
+
+    futures = list(asked)
+    with suppress(*_lost()):
+        wait(futures, timeout=5, return_when="FIRST_COMPLETED")
+    return [future for future in futures if future.done()]
 
 
 def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
@@ -187,11 +252,16 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 def _result(client: Any, future: Any) -> Any:
     """The result of a task, waited for as long as there are workers, or may be again soon."""
+    return _waited(client, lambda: future.result(timeout=5))
+
+
+def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
+    """What an attempt gives that may raise TimeoutError, made as long as there are workers, or may be again soon."""
     last = time.monotonic()
     while True:
         try:
-            return future.result(timeout=5)
-        except TimeoutError:
+            return attempt()
+        except (TimeoutError, asyncio.TimeoutError):  # one from Python 3.11 on
             with suppress(OSError, TimeoutError):
                 if client.nthreads():
                     last = time.monotonic()

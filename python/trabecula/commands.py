@@ -11,7 +11,17 @@ from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import DesignError, Refused, WrongUsage
 from .files import check_place, read_text, write_text
-from .formats import BEAM_ELEMENT_WRITES, DESIGNS, PART_READS, SHELL_WRITES, STDIN, VOXEL_ELEMENT_WRITES, dotted, kind_of
+from .formats import (
+    BEAM_ELEMENT_WRITES,
+    DESIGNS,
+    PART_READS,
+    SHELL_WRITES,
+    STDIN,
+    SWEEP_WRITES,
+    VOXEL_ELEMENT_WRITES,
+    dotted,
+    kind_of,
+)
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .local_fields import fields_at
 from .measuring import draw, measure, transitions
@@ -254,15 +264,18 @@ def sweep(args) -> None:
     """``trabecula sweep``."""
     from .sweeping import draw, table_of
 
+    if args.plot and not 2 <= len(args.plot) <= 3:
+        raise WrongUsage(f"--plot takes two columns, or three: X Y COLOUR; found {len(args.plot)}")
+    if args.front and not args.plot:
+        raise WrongUsage("--front is of --plot; name columns, or leave it out")
     drawing = os.path.splitext(args.output)[0] + ".svg" if args.plot else None
     for name in filter(None, (args.output, drawing)):
         check_place(name)
         keep_file(args.study, name)
-    if kind_of(args.study) == "csv":
+    if kind_of(args.study) in SWEEP_WRITES:
         if not args.plot:
             raise Refused(f"{args.study} is a table already; say with --plot X Y what to draw of it")
-        draw(args.study, args, drawing)
-        return say(f"{drawing}: written")
+        return draw(args.study, args, drawing)
     start = time.perf_counter()
     figures = table_of(design_of(args.study), args)
     if args.plot:

@@ -234,8 +234,20 @@ def load(path: str | os.PathLike[str]) -> Design:
 
 def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     """The design of a text; ``name`` stands in messages, relative paths start from ``folder``."""
-    read = _core.Design.from_text(text, is_json, name)
+    try:
+        read = _core.Design.from_text(text, is_json, name)
+    except DesignError as error:
+        if not error.path.startswith("sweep."):
+            raise
+        from .keys import plain_of
+        from .varying import explained
+
+        raise explained(error, plain_of(text, is_json), name) from None
     data: dict[str, Any] = json.loads(read.to_json())
+    if "sweep" in data:
+        from .varying import check_values
+
+        check_values(data["sweep"], text, name)
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None
     beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
     more = {key: data.get(key) for key in ("skin", "keep", "set", "blend", "sweep")}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Points",
     "Stops",
+    "cluster_name",
     "control",
     "copied",
     "fixed",
@@ -209,6 +210,17 @@ def control(points: Points) -> dict:
     if isinstance(points, (str, os.PathLike)):
         return {"path": os.fspath(points)}
     return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
+
+
+def cluster_name(text: str) -> str:
+    """The name of a Dask cluster: local:N, N from 1 to 4096, or an address such as tcp://head:8786. ValueError for others."""
+    if text.startswith("local:"):
+        count = text.removeprefix("local:")
+        if not (count.isascii() and count.isdigit()) or not 1 <= int(count[:5]) <= 4096 or len(count) > 4:
+            raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {text:.80}")
+    elif ":" not in text:
+        raise ValueError(f"cluster: expected local:N or an address such as tcp://head:8786, found {text:.80}")
+    return text
 
 
 def thread_count(threads: int | None) -> int | None:

@@ -6,22 +6,33 @@ import hashlib
 import os
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from . import _core
 from .design import Design
 from .errors import DesignWarning
+from .keys import listless, missing, unit_of
 from .solid import Solid
 
-__all__ = ["PROPERTIES", "UNITS", "Job", "named", "row_of"]
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
+
+__all__ = ["LAST", "PROPERTIES", "TEXTS", "Job", "check_paths", "columns_of_job", "named", "row_of", "unit_of_column"]
 
 #: Units of the columns of figures; those of parameters are the design's: mm and degrees.
 UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm²", "seconds": "s"} | {
     **{f"permeability{i + 1}{j + 1}_mm2": "mm²" for i in range(3) for j in range(i, 3)},
     "hydraulic_diameter_mm": "mm",
 }
+#: Columns of each lattice, and those that are measured.
+ASKED, MEASURED = ("fraction_asked", "wall_mm", "pore_mm"), ("fraction", "volume_mm3", "area_mm2", "pieces")
+#: Columns that come last, in this order.
+LAST = ("warnings", "error", "seconds", "sha256", "version")
+#: Columns of text.
+TEXTS = ("warnings", "error", "sha256", "version")
 
 
 @dataclass(frozen=True)
@@ -69,7 +80,8 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", DesignWarning)
         solid = Solid(core.build(folder), folder)
-        said = [w["message"] for w in solid.warnings]
+        said: list[str] = [w["message"] for w in solid.warnings]
+        reported: list[str] = []
         figures |= _asked(solid)
         resolution = {"edge": job.edge, "per_cell": job.per_cell}
         if job.meshes or job.pictures:
@@ -80,29 +92,32 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
                     write(named(pattern, number))
         else:
             measured = solid.measure(**resolution, threads=job.threads)
-        figures |= {"fraction": measured.solid_fraction, "volume_mm3": measured.volume, "area_mm2": measured.area}
-        figures |= {"pieces": measured.pieces}
+        whole = (measured.solid_fraction, measured.volume, measured.area, measured.pieces)
+        figures |= dict(zip(MEASURED, whole, strict=True))
         for name, settings in job.properties.items():
-            figures |= PROPERTIES[name](solid, settings)
-    said += [str(w.message) for w in heard if isinstance(w.message, DesignWarning)]
+            found = getattr(solid, name)(threads=job.threads, **settings)
+            figures |= dict(zip(PROPERTIES[name].columns, PROPERTIES[name].figures(found), strict=True))
+            reported += [f"{name}: {warning.message}" for warning in found.warnings]
+    said += [*(str(w.message) for w in heard if isinstance(w.message, DesignWarning)), *reported]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     return figures
 
 
 def _varied(design: Design, values: Mapping[str, Any]) -> _core.Design:
-    """The design with these values. Where that is none, a lattice or the like that only a path names is said to be missing."""
+    """The design with these values. Where that is none, a path that leads nowhere is said to."""
     try:
         return design._checked().varied(list(values.items()))
     except ValueError:
-        given = design.to_dict()
-        for path in values:
-            table, _, rest = path.partition(".")
-            name, below, _ = rest.partition(".")
-            there = list(given.get(table) or ()) if table in ("lattice", "beams", "keep", "set") else [name]
-            if below and name not in there:
-                has = f"the design has {', '.join(f'{table}.{it}' for it in there)}" if there else f"the design has no {table}"
-                raise ValueError(f"{path}: there is no {table}.{name}; {has}") from None
+        check_paths(design, values)
         raise
+
+
+def check_paths(design: Design, paths: Iterable[str]) -> None:
+    """Refuses paths that are those of no key of the design."""
+    data = design.to_dict()
+    for path in paths:
+        if why := missing(path, data) or listless(path, data):
+            raise ValueError(f"{path}: {why}")
 
 
 def _asked(solid: Solid) -> dict[str, Any]:
@@ -111,7 +126,7 @@ def _asked(solid: Solid) -> dict[str, Any]:
     made: dict[str, Any] = {}
     for name, it in lattices.items():
         before = f"{name}." if len(lattices) > 1 else ""
-        figures = {"fraction_asked": it.fraction, "wall_mm": it.thickness, "pore_mm": it.pore}
+        figures = dict(zip(ASKED, (it.fraction, it.thickness, it.pore), strict=True))
         # Of a range the least, which decides whether it can be made; a fraction that varies is no one number.
         least = {key: min(v) if isinstance(v, list | tuple) and v else v for key, v in figures.items()}
         if isinstance(it.fraction, list | tuple):
@@ -125,31 +140,64 @@ def named(pattern: str, number: int) -> str:
     return pattern.replace("{design}", f"{number:06d}")
 
 
-def _stiffness(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The 21 constants, Young's moduli, Zener's ratio and the relative error."""
-    found = solid.stiffness(**settings)
-    made = {f"C{i + 1}{j + 1}": found.C[i][j] for i in range(6) for j in range(i, 6)}
-    made |= {f"E{i + 1}": None if found.E is None else found.E[i] for i in range(3)}
-    return made | {"zener": found.zener, "C_error": found.error}
+def _upper(size: int) -> list[tuple[int, int]]:
+    """The entries of a symmetric matrix: those of its upper triangle, row by row."""
+    return [(i, j) for i in range(size) for j in range(i, size)]
 
 
-def _conductivity(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The six entries and their relative error."""
-    found = solid.conductivity(**settings)
-    return {f"k{i + 1}{j + 1}": found.k[i][j] for i in range(3) for j in range(i, 3)} | {"k_error": found.error}
+def _entries(name: str, size: int, end: str = "") -> tuple[str, ...]:
+    return tuple(f"{name}{i + 1}{j + 1}{end}" for i, j in _upper(size))
 
 
-def _permeability(solid: Solid, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The six entries in mm², their relative error, hydraulic diameter and tortuosity."""
-    found = solid.permeability(**settings)
-    made = {f"permeability{i + 1}{j + 1}_mm2": found.k[i][j] for i in range(3) for j in range(i, 3)}
-    made |= {"permeability_error": found.error, "hydraulic_diameter_mm": found.hydraulic_diameter}
-    return made | {"tortuosity": found.tortuosity}
+@dataclass(frozen=True)
+class Property:
+    """What can be computed of a solid besides: its columns, and their figures of a report. Errors are relative ones."""
+
+    columns: tuple[str, ...]
+    figures: Callable[[Any], Iterable[float | None]]
 
 
-#: Properties that can be asked for: functions of a solid and their settings, to columns.
-PROPERTIES: dict[str, Any] = {
-    "conductivity": _conductivity,
-    "permeability": _permeability,
-    "stiffness": _stiffness,
+def _stiffness(found: StiffnessReport) -> Iterator[float | None]:
+    yield from (found.C[i][j] for i, j in _upper(6))
+    yield found.error
+    for three in (found.E, found.E_error, found.G, found.G_error):
+        yield from three or (None,) * 3
+    yield found.zener
+
+
+def _conductivity(found: ConductivityReport) -> Iterator[float | None]:
+    yield from (found.k[i][j] for i, j in _upper(3))
+    yield found.error
+    yield from found.axis_errors
+
+
+def _permeability(found: PermeabilityReport) -> Iterator[float | None]:
+    yield from (found.k[i][j] for i, j in _upper(3))
+    yield from (found.error, found.hydraulic_diameter, found.tortuosity)
+
+
+AXES, PLANES = ("1", "2", "3"), ("23", "13", "12")
+MODULI = tuple(f"{name}{of}{end}" for name, each in (("E", AXES), ("G", PLANES)) for end in ("", "_error") for of in each)
+
+#: Properties that can be asked for; each is a function of solids by this name.
+PROPERTIES: dict[str, Property] = {
+    "conductivity": Property((*_entries("k", 3), "k_error", *(f"k{a}{a}_error" for a in AXES)), _conductivity),
+    "permeability": Property(
+        (*_entries("permeability", 3, "_mm2"), "permeability_error", "hydraulic_diameter_mm", "tortuosity"), _permeability
+    ),
+    "stiffness": Property((*_entries("C", 6), "C_error", *MODULI, "zener"), _stiffness),
 }
+
+
+def columns_of_job(job: Job, paths: Iterable[str]) -> list[str]:
+    """The columns that rows of designs without an error have."""
+    lattices = list(job.design.to_dict().get("lattice") or ())
+    before = [f"{name}." for name in lattices] if len(lattices) > 1 else [""] * len(lattices)
+    found = [column for name in job.properties for column in PROPERTIES[name].columns]
+    asked = [start + column for start in before for column in ASKED]
+    return ["design", *paths, *asked, *MEASURED, *found, *LAST]
+
+
+def unit_of_column(name: str) -> str:
+    """The unit of a column: that of a figure, or of the key of a design that varies."""
+    return next((unit for end, unit in UNITS.items() if name == end or name.endswith(f".{end}")), "") or unit_of(name)

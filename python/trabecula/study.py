@@ -11,8 +11,10 @@ from typing import Any
 
 from .conditions import condition
 from .design import Design
+from .errors import DesignError
 from .given import copied
 from .sampling import latin, sobol
+from .varying import check_values, explained
 
 __all__ = ["Study"]
 
@@ -50,7 +52,11 @@ class Study:
             raise ValueError(
                 'nothing varies: the design has no [sweep]; give it one, such as "lattice.core.level.fraction" = [0.2, 0.3]'
             )
-        self.design._checked()
+        check_values(self._sweep)
+        try:
+            self.design._checked()
+        except DesignError as error:
+            raise explained(error, self.design.to_dict()) from None
 
     @cached_property
     def _sweep(self) -> dict[str, Any]:

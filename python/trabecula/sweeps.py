@@ -8,7 +8,7 @@ import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 from . import _core
@@ -19,18 +19,18 @@ from .errors import Refused
 from .files import check_place, extension, whole_file
 from .formats import MESH_WRITES, SWEEP_WRITES
 from .given import whole
-from .rows import PROPERTIES, UNITS, Job, named
+from .keys import nearest
+from .rows import LAST, PROPERTIES, TEXTS, Job, check_paths, columns_of_job, named, row_of, unit_of_column
 from .sent import digests
 from .simulated import Simulated
 from .study import Study
+from .unfinished import alone
 from .workers import rows_by_processes, rows_here
 
 __all__ = ["FEW", "Journal", "columns_of", "objective", "run", "sweep", "write_table"]
 
 #: More designs than these are asked about.
 FEW = 1_000_000
-#: Columns that come last, in this order.
-LAST = ("warnings", "error", "seconds", "sha256", "version")
 
 
 def sweep(
@@ -49,11 +49,12 @@ def sweep(
     The study is a design with ``sweep``: {path of a key: list of values, or {"from", "to", "count"}} and ``sampling``,
     ``count``, ``seed``, ``where``; or the path of its file. A row has the number of the design, the values by path,
     ``fraction_asked`` (of the cell), ``wall_mm`` and ``pore_mm`` (the least), and as measured at ``edge`` (mm) or
-    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings``, ``error`` (why there is no such
-    design, or None), ``seconds``, ``sha256`` of the design's text, ``version``. ``properties`` names what else is computed,
-    with settings: {"stiffness": {"n": 48}}. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the
-    number. ``jobs`` processes share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in
-    order, and apart from ``seconds`` the same for any number of processes.
+    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings`` (of design, mesh, properties),
+    ``error`` (why there is no such design, or None), ``seconds``, ``sha256`` of the design's text, ``version``.
+    ``properties`` names what else is computed, with settings: {"stiffness": {"n": 48}}; each figure has its relative error
+    next to it. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the number. ``jobs`` processes
+    share the work, or the workers of a Dask ``cluster`` ("local:N" or an address). Rows are in order, and apart from
+    ``seconds`` the same for any number of processes.
 
     Raises DesignError for a study that is none, ValueError where no design keeps the conditions. One that cannot be made is a
     row with its error.
@@ -78,6 +79,8 @@ def objective(
 ) -> Callable[[Mapping[str, Any]], dict[str, float]]:
     """A function of {path: value} that gives {column: value}, for optimisers: of the design with these values the ``outputs``,
     names of columns of ``sweep``. It raises ValueError where there is no such design.
+
+    Raises ValueError for parameters that are no keys of the design, and outputs that are no columns.
     """
     paths, wanted = _names("parameters", parameters), _names("outputs", outputs)
     design = design_of(template)
@@ -85,20 +88,20 @@ def objective(
     for path in paths:
         if not isinstance(path, str):
             raise TypeError(f"expected paths of keys as text, found {path!r}")
+    check_paths(design, paths)
+    known = columns_of_job(job, paths)
+    for name in wanted:
+        if name not in known:
+            raise ValueError(f'unknown output "{name}"; {nearest(name, known)}')
 
     def of(values: Mapping[str, Any]) -> dict[str, float]:
         if not isinstance(values, Mapping):
             raise TypeError(f"expected {{path: value}}, found {values!r:.80}")
         if set(values) != set(paths):
             raise ValueError(f"expected values of {', '.join(paths)}, found {', '.join(values) or 'none'}")
-        from .rows import row_of
-
         row = row_of(job, 0, {path: values[path] for path in paths})
         if row["error"]:
             raise ValueError(row["error"])
-        unknown = [name for name in wanted if name not in row]
-        if unknown:
-            raise ValueError(f"unknown output {unknown[0]}; there are {', '.join(row)}")
         return {name: row[name] for name in wanted}
 
     return of
@@ -116,12 +119,12 @@ def settings_of(properties: Mapping[str, Mapping[str, Any]] | Iterable[str]) -> 
     given = dict(properties) if isinstance(properties, Mapping) else {name: {} for name in _names("properties", properties)}
     for name in given:
         if name not in PROPERTIES:
-            raise ValueError(f'unknown property "{name}"; there are {", ".join(PROPERTIES) or "none"}')
+            raise ValueError(f'unknown property "{name}"; {nearest(str(name), PROPERTIES)}')
         taken = list(inspect.signature(getattr(Simulated, name)).parameters)[1:]
         known = [setting for setting in taken if setting not in ("threads", "progress")]
         for setting in given[name]:
             if setting not in known:
-                raise ValueError(f'{name} has no setting "{setting}"; it has {", ".join(known)}')
+                raise ValueError(f'{name} has no setting "{setting}"; {nearest(str(setting), known)}')
     return {name: dict(settings) for name, settings in given.items()}
 
 
@@ -178,51 +181,79 @@ class Journal:
     def __init__(self, output: str, job: Job):
         self.path = f"{output}.rows"
         inputs = digests(job.design.to_dict(), job.design.folder or os.getcwd())
-        self.head = job.to_dict() | {"version": _core.__version__, "inputs": inputs}
+        head = job.to_dict() | {"version": _core.__version__, "inputs": inputs}
         for changing in ("folder", "threads"):
-            self.head.pop(changing)
+            head.pop(changing)
+        self.head = json.loads(json.dumps(head))
         self.rows: dict[int, dict[str, Any]] = {}
+        self.ended = False
 
-    def resume(self, new: bool = False) -> int:
-        """Takes up the rows of an earlier run, unless a ``new`` one is wanted; their number.
+    @contextmanager
+    def writing(self, new: bool = False) -> Iterator[Callable[[dict[str, Any]], None]]:
+        """Takes up the rows of an earlier run, unless a ``new`` one is wanted, and gives a function that adds one.
 
-        Raises Refused if they are of another sweep, with the keys that differ.
+        Raises Refused if they are of another sweep, with the keys that differ, if one is damaged, and while another process
+        writes to them. A file without a row goes at the end.
         """
-        if new or not os.path.exists(self.path):
-            return 0
-        with open(self.path, encoding="utf-8") as file:
-            lines = [line for line in file.read().split("\n")[:-1] if line]
-        read = [json.loads(line) for line in lines]
+        with open(self.path, "a+b", 0) as file:
+            alone(file, self.path)
+            file.seek(0)
+            begun = 0 if new else self._read(file.read())
+            file.truncate(begun)
+
+            def write(line: dict[str, Any]) -> None:
+                file.write(json.dumps(line).encode() + b"\n")
+
+            def add(row: dict[str, Any]) -> None:
+                self.rows[row["design"]] = row
+                write(row)
+
+            if not begun:
+                write(self.head)
+            try:
+                yield add
+            except BaseException:
+                self.ended = self.ended or not self.rows
+                raise
+            finally:
+                if self.ended:
+                    file.close()
+                    with suppress(FileNotFoundError):
+                        os.remove(self.path)
+
+    def _read(self, raw: bytes) -> int:
+        """Takes up the rows of a file; the length of what is taken up, nothing of another sweep that has made no design."""
+        whole = raw[: raw.rfind(b"\n") + 1]
+        read = [self._line(n, line) for n, line in enumerate(whole.split(b"\n"), 1) if line.strip()]
         if not read:
             return 0
-        changed = differences(read[0], json.loads(json.dumps(self.head)))
-        if changed:
+        changed = differences(read[0], self.head)
+        if changed and any(row["error"] is None for row in read[1:]):
             raise Refused(
                 f"{self.path} holds {len(read) - 1} rows of another sweep: changed since are {', '.join(changed[:6])}; "
                 "take that back, or begin anew with --new"
             )
+        if changed:
+            return 0
         self.rows = {row["design"]: row for row in read[1:]}
-        return len(self.rows)
+        return len(whole)
 
-    @contextmanager
-    def writing(self) -> Iterator[Callable[[dict[str, Any]], None]]:
-        """Gives a function that adds a row."""
-        # Written anew, so that half a line at the end is gone.
-        with whole_file(self.path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
-            for line in (self.head, *self.rows.values()):
-                file.write(json.dumps(line) + "\n")
-        with open(self.path, "a", encoding="utf-8", newline="\n") as file:
-
-            def add(row: dict[str, Any]) -> None:
-                self.rows[row["design"]] = row
-                file.write(json.dumps(row) + "\n")
-                file.flush()
-
-            yield add
+    def _line(self, number: int, line: bytes) -> dict[str, Any]:
+        """What a line says: the first one what sweep it is of, the others a row each."""
+        try:
+            read = json.loads(line)
+        except ValueError:
+            read = None
+        head = number == 1
+        if isinstance(read, dict) and isinstance(read.get("design"), dict if head else int) and (head or "error" in read):
+            return read
+        advice = "" if head else "take it out to have its design made again, or "
+        what = "what sweep the rows are of" if head else "a row"
+        raise Refused(f"{self.path}:{number}: the line is damaged, it does not say {what}; {advice}begin anew with --new")
 
     def end(self) -> None:
-        """Takes the file away: its rows stand in the output."""
-        os.remove(self.path)
+        """Lets the file go: its rows stand in the output, or are good for nothing."""
+        self.ended = True
 
 
 def differences(old: Any, new: Any, path: str = "") -> list[str]:
@@ -248,10 +279,11 @@ def write_table(path: str, columns: dict[str, list]) -> None:
     for name, column in columns.items():
         plain = [json.dumps(v) if isinstance(v, list | dict) else v for v in column]
         kinds = {type(v) for v in plain if v is not None}
-        if len(kinds - {int, float}) and len(kinds) > 1:  # texts and numbers in one column
-            plain = [None if v is None else str(v) for v in plain]
-        array = arrow.array([float(v) for v in plain] if kinds == {int, float} and None not in plain else plain)
-        unit = next((unit for end, unit in UNITS.items() if name == end or name.endswith(f".{end}")), "")
+        if name in TEXTS or (len(kinds - {int, float}) and len(kinds) > 1):  # texts and numbers in one column
+            plain, kinds = [None if v is None else str(v) for v in plain], {str}
+        numbers = not kinds or kinds == {int, float}
+        array = arrow.array(plain, arrow.float64() if numbers else arrow.string() if kinds == {str} else None)
+        unit = unit_of_column(name)
         fields.append(arrow.field(name, array.type, metadata={"unit": unit} if unit else None))
         arrays.append(array)
     with whole_file(path) as temporary:

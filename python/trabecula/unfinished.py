@@ -17,7 +17,7 @@ from .errors import Refused
 from .files import replace_file
 from .shared_file import Written, shared, withdraw, write
 
-__all__ = ["Range", "Unfinished"]
+__all__ = ["Range", "Unfinished", "alone"]
 
 #: Bytes of which the disk holds two copies while the output is put together and has no room for more.
 CHUNK = 1 << 26
@@ -67,7 +67,7 @@ class Unfinished:
         os.makedirs(self.folder, exist_ok=True)
         name = self.name("lines")
         with open(name, "a+b") as self._lines:
-            _alone(self._lines, self.folder)
+            alone(self._lines, self.folder)
             withdraw(self.name("data"))
             self._lines.seek(0)
             raw = self._lines.read()
@@ -315,8 +315,8 @@ def _chunks(file: Any, place: int, length: int) -> Iterator[bytes]:
         length -= len(chunk)
 
 
-def _alone(file: Any, folder: str) -> None:
-    """Refuses a folder that another process works in."""
+def alone(file: Any, place: str) -> None:
+    """Refuses a file, or the folder that it is of, in which another process works."""
     try:
         import fcntl
     except ImportError:  # no such locks on this system
@@ -324,4 +324,4 @@ def _alone(file: Any, folder: str) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        raise Refused(f"another process works in {folder}; wait for it, or end it") from None
+        raise Refused(f"another process works in {place}; wait for it, or end it") from None

@@ -34,8 +34,11 @@ def serve() -> None:
     job = Job.of(json.loads(sys.stdin.readline()))
     for line in sys.stdin:
         number, values = json.loads(line)
-        answers.write(json.dumps(row_of(job, number, values)) + "\n")
-        answers.flush()
+        try:
+            answers.write(json.dumps(row_of(job, number, values)) + "\n")
+            answers.flush()
+        except BrokenPipeError:
+            os._exit(0)  # whoever asked is gone, and there is nobody to tell
 
 
 class _Worker:
