@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::interface::{Modal, largest_eigenvalue, nodal};
+use crate::interface::{Modal, largest_eigenvalue, nodal, sign};
 use crate::lanes::{LANES, Real};
 
 /// A voxel and its element.
@@ -76,7 +76,7 @@ impl<T: Real> CutVoxels<T> {
                 let at = corners(shape, cut.voxel);
                 let mut modes = uniform(own);
                 for i in 1..8 {
-                    modes[i] += (0..8).map(|p| signed(i, p, u[at[p]].wide())).sum::<f64>();
+                    modes[i] += (0..8).map(|p| sign(i, p) * u[at[p]].wide()).sum::<f64>();
                 }
                 let forces = forces(&cut.form, &modes);
                 (0..3).for_each(|a| sum[a] += forces[1 << a]);
@@ -92,7 +92,7 @@ impl<T: Real> CutVoxels<T> {
         let modes = uniform(own);
         self.add(shape, z, out, &|form| {
             let forces = forces(form, &modes);
-            std::array::from_fn(|p| (1..8).map(|i| signed(i, p, forces[i])).sum())
+            std::array::from_fn(|p| (1..8).map(|i| sign(i, p) * forces[i]).sum())
         });
     }
 
@@ -139,11 +139,6 @@ fn uniform(own: &[f64; 9]) -> [f64; 8] {
     let mut modes = [0.0; 8];
     (0..3).for_each(|a| modes[1 << a] = own[a]);
     modes
-}
-
-/// A value at a corner with the sign that a monomial has there.
-fn signed(monomial: usize, corner: usize, value: f64) -> f64 {
-    if (monomial & !corner).count_ones() % 2 == 0 { value } else { -value }
 }
 
 fn forces<T: Real>(form: &Modal<T>, modes: &[f64; 8]) -> [f64; 8] {

@@ -119,8 +119,8 @@ const fn place(monomial: usize) -> usize {
 }
 
 /// The value of a monomial at a corner of the cube.
-fn sign(monomial: usize, corner: usize) -> f64 {
-    if (monomial & !corner).count_ones() % 2 == 0 { 1.0 } else { -1.0 }
+pub fn sign(monomial: usize, corner: usize) -> f64 {
+    if (monomial & !corner).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
 fn corner(p: usize) -> Vec3 {
