@@ -218,8 +218,8 @@ def test_each_direction_of_a_laminate_has_its_error():
 
 
 def by_volumes(field: np.ndarray, pore: float) -> float:
-    """k along x of a cube by finite volumes about points of a grid, where the field is negative in the solid: the flux from point to
-    point is that of the piece of line in each phase, in series."""
+    """k along x of a cube by finite volumes about points of a grid, where the field is negative in the solid: the flux from
+    point to point is that of the piece of line in each phase, in series."""
     sparse = pytest.importorskip("scipy.sparse")
     from scipy.sparse.linalg import cg
 
