@@ -37,6 +37,17 @@ def test_beams_have_a_permeability_that_two_grids_agree_on():
     assert coarse.k[0][0] == pytest.approx(coarse.k[2][2], rel=1e-6)
 
 
+def test_each_direction_of_a_stretched_cell_has_its_error():
+    """Nodes twice as fine stay within about the errors stated; of two grids alone no direction is surer than the whole."""
+    coarse, fine = (solid(wavelength=[4, 5, 6]).permeability(n=n) for n in (16, 32))
+    for axis in range(3):
+        k = fine.k[axis][axis]
+        assert abs(coarse.k[axis][axis] - k) < 2 * coarse.axis_errors[axis] * k and coarse.axis_errors[axis] >= coarse.error
+    assert max(fine.axis_errors) > 1.5 * min(fine.axis_errors)
+    slab = solid(lt.cell.series(terms=[{"hkl": [0, 0, 1]}]), "lower").permeability(n=16)
+    assert slab.k[2][2] == 0 == slab.axis_errors[2] and slab.axis_errors[0] > 0
+
+
 def test_the_sides_of_a_sheet_add_up_and_are_apart():
     both, lower, upper = (solid().permeability(n=24, side=side) for side in (None, "lower", "upper"))
     assert np.allclose(np.add(lower.k, upper.k), both.k, rtol=1e-5, atol=1e-9)

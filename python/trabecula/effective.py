@@ -133,7 +133,7 @@ def accuracy(found: Found, size: str) -> list[str]:
     single = ""
     if isinstance(found, StiffnessReport) and found.E_error and found.G_error:
         single = f", E up to {100 * max(found.E_error):.2g} %, G up to {100 * max(found.G_error):.2g} %"
-    elif isinstance(found, ConductivityReport):
+    elif isinstance(found, ConductivityReport | PermeabilityReport):
         single = f", along an axis up to {100 * max(found.axis_errors):.2g} %"
     return [
         f"fraction   {found.fraction:.6f}",

@@ -743,14 +743,16 @@ class PermeabilityReport(Report):
 
     area_per_volume: float
     """Area of the wall of the pore over the volume of the cell, 1/mm."""
+    axis_errors: list[float]
+    """Estimated relative errors of k along the axes; 0 where nothing flows."""
     conductivity: list[list[float]]
     """Conductivity of the pore, 1 where it is open: 3 x 3."""
     edges: list[list[float]]
     """Edges of the cell, mm, one row each."""
     error: float
     """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not
-    whole numbers of steps adds; where the grids differ too much for an extrapolation k is k_n, and this the distance of
-    the extrapolated one."""
+    whole numbers of steps adds. Each eigenvalue of k is extrapolated by an order of its own, and changed by half at
+    most."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]
@@ -771,7 +773,7 @@ class PermeabilityReport(Report):
     n: int
     """Nodes along the edge of the cell, or of a cube of its volume."""
     order: float
-    """Exponent of the grid's step with which the error was taken to fall."""
+    """Exponent of the grid's step with which the error was taken to fall, of the eigenvalue that changes most."""
     pore_nodes: float | None
     """Steps of the grid across the hydraulic diameter; None without a wall."""
     porosity: float

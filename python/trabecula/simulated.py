@@ -28,6 +28,8 @@ __all__ = ["Simulated"]
 
 #: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
 STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
+#: Memory of voxels cut by the interface of two conductors, for each face of a voxel on the faces of the cell.
+CUT_BYTES = 10_000
 #: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
 PERMEABILITY_BYTES = 1300
 #: Short edges of a volume mesh's tetrahedra as a fraction of the long ones.
@@ -299,7 +301,7 @@ class Simulated:
         """The effective conductivity of the periodic cell, (3, 3) relative to the solid's, where the ``pore`` conducts this
         many times as well as the solid; for heat, electricity and diffusion alike. Else as ``stiffness``.
         """
-        grid = _voxels(n, CONDUCTIVITY_BYTES), voxels
+        grid = _voxels(n, CONDUCTIVITY_BYTES, 0 if pore == 0 or voxels else CUT_BYTES), voxels
         return self._cell.conductivity(grid, number("pore", pore), (thread_count(threads), progress))
 
     def permeability(
@@ -326,8 +328,8 @@ class Simulated:
         return self._cell.permeability(n, None if side is None else side == "upper", (thread_count(threads), progress))
 
 
-def _voxels(n: int, each: float) -> int:
-    """A number of voxels along an edge that fits the memory, at ``each`` bytes a voxel."""
+def _voxels(n: int, each: float, cut: float = 0) -> int:
+    """A number of voxels along an edge that fits the memory, at ``each`` bytes a voxel and ``cut`` a square of the grid."""
     n = whole("n", n, 8, 4096)
-    fits(each * n**3, f"{n} x {n} x {n} voxels")
+    fits(each * n**3 + cut * n**2, f"{n} x {n} x {n} voxels")
     return n

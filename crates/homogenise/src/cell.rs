@@ -3,8 +3,11 @@
 use geometry::fault::Fault;
 use geometry::math::{Mat3, Vec3, determinant, dot, norm, product, scale, sub, transpose, unit};
 use geometry::progress::{Progress, Stage, Stopped};
+use rayon::prelude::*;
 
+use crate::cut_voxels::{CutVoxel, CutVoxels};
 use crate::element::Element;
+use crate::interface::{Interface, cut_element};
 use crate::material::{AXES, Material, Voigt, scalar_law, turned};
 use crate::solve::System;
 
@@ -17,6 +20,8 @@ pub struct VoxelCell {
     pub edges: Mat3,
     /// Solid fraction of each voxel, that along the first edge fastest.
     pub fractions: Vec<f64>,
+    /// Interfaces through voxels, ascending; where none is known a voxel conducts as the mean of its phases.
+    pub interfaces: Vec<Interface>,
 }
 
 /// An effective tensor and how it was found.
@@ -62,7 +67,19 @@ impl VoxelCell {
         if size.is_nan() || size <= 1e-9 * columns(&edges).map(norm).iter().product::<f64>() {
             return Err(Fault::new("edges", "the edges of the cell span no volume; give three independent ones"));
         }
-        Ok(VoxelCell { shape, edges, fractions })
+        Ok(VoxelCell { shape, edges, fractions, interfaces: Vec::new() })
+    }
+
+    /// The same cell with interfaces through its voxels.
+    ///
+    /// # Errors
+    /// Voxels that there are none of, or that do not ascend.
+    pub fn with_interfaces(self, interfaces: Vec<Interface>) -> Result<VoxelCell, Fault> {
+        let ascend = interfaces.windows(2).all(|w| w[0].voxel < w[1].voxel);
+        if !ascend || interfaces.last().is_some_and(|i| i.voxel >= self.fractions.len()) {
+            return Err(Fault::new("interfaces", "give at most one for each voxel, in the order of the voxels"));
+        }
+        Ok(VoxelCell { interfaces, ..self })
     }
 
     /// Mean of the fractions.
@@ -76,6 +93,33 @@ impl VoxelCell {
         let [n, b, c] = self.shape;
         let at = |x: usize, y: usize, z: usize| self.fractions[(z * n + y) * n + x];
         n == b && n == c && (0..n).all(|z| (0..n).all(|y| (0..n).all(|x| (at(x, y, z) - at(y, z, x)).abs() <= SAME)))
+    }
+
+    /// Whether a cyclic change of the edges changes nothing in the interfaces of a cell whose fractions it does not change.
+    fn has_cyclic_interfaces(&self) -> bool {
+        let n = self.shape[0];
+        self.interfaces.iter().all(|a| {
+            let [x, y, z] = [a.voxel % n, a.voxel / n % n, a.voxel / n / n];
+            let Ok(other) = self.interfaces.binary_search_by_key(&((x * n + z) * n + y), |b| b.voxel) else {
+                return false;
+            };
+            let b = &self.interfaces[other];
+            let [p, q] = [[a.slope[1], a.slope[2], a.slope[0]], b.slope].map(unit);
+            a.alone == b.alone && (0..3).all(|i| (p[i] - q[i]).abs() <= SAME)
+        })
+    }
+
+    /// The voxels that an interface cuts, where the pore conducts. Where it does not, a voxel conducts by its share alone: there is nothing to
+    /// be conducted across, and the nodes in the pore are to be held by something.
+    fn cut_voxels(&self, element: &Element, pore: f64) -> CutVoxels<f64> {
+        if pore == 0.0 {
+            return CutVoxels::none();
+        }
+        let of = |i: &Interface| {
+            let form = cut_element(element, self.fractions[i.voxel], i, pore)?;
+            Some(CutVoxel { voxel: i.voxel, form })
+        };
+        CutVoxels::new(self.interfaces.par_iter().filter_map(of).collect(), self.shape)
     }
 
     /// Axes in which the first edge is along x and the second in the plane of x and y, as columns; and the edges of a voxel there.
@@ -112,7 +156,8 @@ impl VoxelCell {
             gradient_modes(&product(&strain, &voxel))
         };
         let cases: &[usize] = if cyclic { &[0, 3] } else { &[0, 1, 2, 3, 4, 5] };
-        let made = self.solve::<3>(&element, &self.fractions, cases, &modes, tolerance, progress)?;
+        let system = System::new(self.shape, &self.fractions, &element, CutVoxels::none());
+        let made = self.solve::<3>(system, &element, cases, &modes, tolerance, progress)?;
         let mut c = [[0.0; 6]; 6];
         for (case, column) in cases.iter().zip(&made.tensor) {
             for i in 0..6 {
@@ -149,14 +194,16 @@ impl VoxelCell {
         let (frame, voxel) = self.frame();
         let weights: Vec<f64> = self.fractions.iter().map(|w| w + (1.0 - w) * pore).collect();
         let element = Element::new(&scalar_law(1.0), 1, &voxel);
-        let cyclic = is_cube(&voxel) && self.is_cyclic();
+        let cut = self.cut_voxels(&element, pore);
+        let cyclic = is_cube(&voxel) && self.is_cyclic() && (pore == 0.0 || self.has_cyclic_interfaces());
         let modes = |case: usize| {
             let mut row = [[0.0; 3]; 3];
             row[0] = voxel[case];
             gradient_modes(&row)
         };
         let cases: &[usize] = if cyclic { &[0] } else { &[0, 1, 2] };
-        let made = self.solve::<1>(&element, &weights, cases, &modes, tolerance, progress)?;
+        let system = System::new(self.shape, &weights, &element, cut);
+        let made = self.solve::<1>(system, &element, cases, &modes, tolerance, progress)?;
         let mut k = [[0.0; 3]; 3];
         for (case, column) in cases.iter().zip(&made.tensor) {
             for i in 0..3 {
@@ -174,18 +221,17 @@ impl VoxelCell {
     /// The column of the effective tensor of each load case: energies of its field with the uniform field of each case.
     fn solve<const NC: usize>(
         &self,
+        mut system: System<NC>,
         element: &Element,
-        weights: &[f64],
         cases: &[usize],
         modes: &dyn Fn(usize) -> [f64; 9],
         tolerance: f64,
         progress: &dyn Progress,
     ) -> Result<Homogenised<Vec<[f64; 6]>>, Stopped> {
-        let mut system = System::<NC>::new(self.shape, weights, element);
         let mut field = vec![0.0; system.operator.len()];
-        let rows = weights.chunks(self.shape[0]).map(|row| row.iter().sum::<f64>());
+        let rows = system.operator.weights.chunks(self.shape[0]).map(|row| row.iter().sum::<f64>());
         let total = rows.sum::<f64>();
-        let count = weights.len() as f64;
+        let count = self.fractions.len() as f64;
         let mut made = Homogenised { tensor: Vec::new(), residual: 0.0, iterations: 0, cases: cases.len() };
         for (n, &case) in cases.iter().enumerate() {
             let share = |n: usize| n as f64 / cases.len() as f64;
@@ -194,13 +240,15 @@ impl VoxelCell {
             let solved = system.solve(&own, &mut field, tolerance, &stage)?;
             let mean = system.operator.mean_gradient(&field);
             let whole: [f64; 9] = std::array::from_fn(|i| mean[i] + total * own[i]);
+            let cut = if NC == 1 { system.operator.cut_flux(&own, &field) } else { [0.0; 3] };
             let column = std::array::from_fn(|other| {
                 if other >= 3 && NC == 1 {
                     return 0.0;
                 }
                 let test = modes(other);
                 let pairs = (0..3 * NC).flat_map(|i| (0..3 * NC).map(move |j| (i, j)));
-                pairs.map(|(i, j)| test[i] * element.linear[i][j] * whole[j]).sum::<f64>() / count
+                let common: f64 = pairs.map(|(i, j)| test[i] * element.linear[i][j] * whole[j]).sum();
+                (common + (0..3).map(|a| test[a] * cut[a]).sum::<f64>()) / count
             });
             made.tensor.push(column);
             made.residual = made.residual.max(solved.residual);

@@ -50,6 +50,12 @@ impl Element {
             }
             inner[i][j] = sum / 64.0;
         }
+        Element::of_modes(inner, components)
+    }
+
+    /// The element of a law for the gradient by ξ, over 64.
+    pub fn of_modes(inner: Law, components: usize) -> Element {
+        let size = 3 * components;
         let mut made =
             Element { linear: inner, bilinear: [[0.0; 9]; 9], trilinear: [[0.0; 3]; 3], components, orthotropic: true };
         for (i, j) in pairs(size) {
@@ -78,6 +84,17 @@ impl Element {
             trilinear: self.trilinear.map(|row| row.map(|v| 2.0 * v)),
             ..*self
         }
+    }
+
+    /// The whole form of a scalar, by the bits of its monomials (`interface.rs`).
+    pub fn modal(&self) -> [[f64; 8]; 8] {
+        let mut out = [[0.0; 8]; 8];
+        for (a, b) in pairs(3) {
+            out[1 << a][1 << b] = self.linear[a][b];
+            out[7 ^ 1 << a][7 ^ 1 << b] = self.bilinear[a][b];
+        }
+        out[7][7] = self.trilinear[0][0];
+        out
     }
 
     /// The matrix over the values at the corners: dof `corner * components + c`, corners with x fastest.

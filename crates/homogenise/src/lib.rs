@@ -24,10 +24,12 @@
 
 mod boltzmann;
 mod cell;
+mod cut_voxels;
 mod dense;
 pub mod element;
 mod fields;
 mod flow;
+mod interface;
 mod lanes;
 mod material;
 mod moduli;
@@ -40,6 +42,7 @@ mod solve;
 
 pub use cell::{Homogenised, VoxelCell, upper_edges};
 pub use dense::eigen;
+pub use interface::Interface;
 pub use material::{AXES, Material, Voigt, turned, voigt};
 pub use moduli::{Moduli, bounds, conductivity_bounds};
 pub use pore::{PoreGrid, VELOCITIES, WallLink, opposite};

@@ -7,6 +7,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use crate::cut_voxels::CutVoxels;
 use crate::element::Element;
 use crate::fields::{combine, in_pieces};
 use crate::operator::Operator;
@@ -27,24 +28,27 @@ struct Level<const NC: usize> {
     step: Vec<f32>,
     /// The step that is being made while `step` is read.
     next: Vec<f32>,
+    /// An upper bound of the eigenvalues of D⁻¹A.
+    largest: f64,
 }
 
 /// A hierarchy of grids.
 pub struct Multigrid<const NC: usize> {
     levels: Vec<Level<NC>>,
-    largest: f64,
 }
 
 impl<const NC: usize> Multigrid<NC> {
-    /// The hierarchy of a grid of weights.
-    pub fn new(mut shape: [usize; 3], weights: &[f64], element: &Element) -> Self {
+    /// The hierarchy of a grid of weights, on whose finest grid some voxels have elements of their own: coarser ones have their weights.
+    pub fn new(mut shape: [usize; 3], weights: &[f64], element: &Element, cut: &CutVoxels<f64>) -> Self {
         let mut weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
         let mut element = element.clone();
-        let largest = element.largest_eigenvalue();
+        let common = element.largest_eigenvalue();
+        let mut largest = cut.largest_eigenvalue(common);
+        let mut cut = cut.single();
         let mut levels = Vec::new();
         loop {
             let next = coarsened(shape, &weights);
-            let operator = Operator::new(shape, weights, &element);
+            let operator = Operator::new(shape, weights, &element, cut);
             let field = || vec![0f32; operator.len()];
             levels.push(Level {
                 inverse_diagonal: operator.inverse_diagonal(&element),
@@ -53,11 +57,13 @@ impl<const NC: usize> Multigrid<NC> {
                 step: field(),
                 next: field(),
                 operator,
+                largest,
             });
             let Some((coarse, means)) = next else { break };
             (shape, weights, element) = (coarse, means, element.doubled());
+            (cut, largest) = (CutVoxels::none(), common);
         }
-        Multigrid { levels, largest }
+        Multigrid { levels }
     }
 
     /// An approximate solution of A x = r, zero at nodes without solid.
@@ -69,9 +75,9 @@ impl<const NC: usize> Multigrid<NC> {
 
     /// One V-cycle from zero for the residual of a level.
     fn cycle(&mut self, at: usize) {
-        let largest = self.largest;
         let (fine, coarse) = self.levels.split_at_mut(at + 1);
         let level = &mut fine[at];
+        let largest = level.largest;
         let Some(next) = coarse.first_mut() else {
             let mut rates = Chebyshev::new(largest, COARSEST.0);
             level.begin(rates.first());
@@ -166,7 +172,7 @@ impl<const NC: usize> Level<NC> {
 
     /// Takes the last step off the residual and makes the next one: its shares are of the last step and of the preconditioned residual.
     fn smooth(&mut self, becomes: Solution, shares: [f32; 2]) {
-        let Level { operator, inverse_diagonal, solution, residual, step, next } = self;
+        let Level { operator, inverse_diagonal, solution, residual, step, next, .. } = self;
         let plane = operator.plane();
         let fields = inverse_diagonal.chunks(plane).zip(step.chunks(plane));
         let fields = fields.zip(residual.chunks_mut(plane)).zip(solution.chunks_mut(plane)).zip(next.chunks_mut(plane));

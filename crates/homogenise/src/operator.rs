@@ -10,6 +10,7 @@
 
 use rayon::prelude::*;
 
+use crate::cut_voxels::CutVoxels;
 use crate::element::Element;
 use crate::fields::SMALL;
 use crate::lanes::{LANES, Real};
@@ -25,16 +26,21 @@ pub struct Operator<T, const NC: usize> {
     active: Vec<bool>,
     blocks: Blocks<T>,
     orthotropic: bool,
+    /// Voxels of weight zero with elements of their own; of a scalar alone.
+    cut: CutVoxels<T>,
 }
 
 impl<T: Real, const NC: usize> Operator<T, NC> {
-    /// The operator of these weights.
-    pub fn new(shape: [usize; 3], weights: Vec<T>, element: &Element) -> Self {
+    /// The operator of these weights, but for voxels with elements of their own.
+    pub fn new(shape: [usize; 3], mut weights: Vec<T>, element: &Element, cut: CutVoxels<T>) -> Self {
         let nine = |m: &[[f64; 9]; 9]| m.map(|row| row.map(T::of));
         let active = weights.chunks(shape[0]).flat_map(|row| row.chunks(LANES));
+        let active = active.map(|run| run.iter().any(|w| *w != T::default())).collect();
+        cut.iter().for_each(|cut| weights[cut.voxel] = T::default());
         Operator {
             shape,
-            active: active.map(|run| run.iter().any(|w| *w != T::default())).collect(),
+            active,
+            cut,
             weights,
             blocks: Blocks {
                 linear: nine(&element.linear),
@@ -87,6 +93,8 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
             weights: &self.weights[z * nx * ny..(z + 1) * nx * ny],
             active: &self.active[z * runs * ny..(z + 1) * runs * ny],
             blocks: &self.blocks,
+            cut: &self.cut,
+            first: z * runs * ny,
         };
         if self.orthotropic {
             slab::<U, T, NC, true>(&of, u, out, rows);
@@ -133,6 +141,11 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
         each.into_iter().fold([0.0; 9], |s, v| std::array::from_fn(|i| s[i] + v[i]))
     }
 
+    /// The sums over cut voxels of the forces of the linear modes, where `u` has the gradient `modes` in addition to its own.
+    pub fn cut_flux(&self, modes: &[f64; 9], u: &[T]) -> [f64; 3] {
+        self.cut.flux(self.shape, modes, u)
+    }
+
     /// `out` = A applied to a field with the gradient `modes` (times eight, by ξ) in every voxel.
     pub fn uniform(&self, modes: &[f64; 9], out: &mut [T]) {
         let forces: [f64; 9] =
@@ -160,6 +173,7 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
                     }
                 }
             }
+            self.cut.add_uniform(self.shape, z, modes, out);
         });
     }
 
@@ -171,6 +185,7 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
         let mut out = vec![T::default(); self.len()];
         out.par_chunks_mut(NC * plane).enumerate().for_each(|(z, out)| {
             let below = (z + nz - 1) % nz;
+            let mut diagonal = vec![0.0; NC * plane];
             for i in 0..plane {
                 let (x, y) = (i % nx, i / nx);
                 let (left, before) = ((x + nx - 1) % nx, (y + ny - 1) % ny);
@@ -183,8 +198,12 @@ impl<T: Real, const NC: usize> Operator<T, NC> {
                     }
                 }
                 for (c, s) in sum.iter().enumerate() {
-                    out[c * plane + i] = if *s > 0.0 { T::of(1.0 / s) } else { T::default() };
+                    diagonal[c * plane + i] = *s;
                 }
+            }
+            self.cut.add_diagonal(self.shape, z, &mut diagonal);
+            for (out, d) in out.iter_mut().zip(diagonal) {
+                *out = if d > 0.0 { T::of(1.0 / d) } else { T::default() };
             }
         });
         out

@@ -5,6 +5,7 @@
 
 use multiversion::multiversion;
 
+use crate::cut_voxels::{CutVoxel, CutVoxels};
 use crate::lanes::{LANES, Real};
 
 /// The blocks of an element in T.
@@ -27,6 +28,10 @@ pub struct Slab<'a, T> {
     pub active: &'a [bool],
     /// The element.
     pub blocks: &'a Blocks<T>,
+    /// Voxels with elements of their own, of all planes.
+    pub cut: &'a CutVoxels<T>,
+    /// The number of the first run of the plane.
+    pub first: usize,
 }
 
 /// Rows that are worked on.
@@ -79,7 +84,9 @@ pub fn slab<U: Real, T: Real, const NC: usize, const ORTHO: bool>(
                 let mut weights = [T::default(); LANES];
                 let from = &of.weights[y * nx + at..y * nx + nx.min(at + LANES)];
                 weights[..from.len()].copy_from_slice(from);
-                run_of_voxels::<T, NC, ORTHO>(of.blocks, &weights, rows, [near, far], at);
+                let number = of.first + y * runs + run;
+                let cut = of.cut.of_runs(number, number + 1);
+                run_of_voxels::<T, NC, ORTHO>(of.blocks, &weights, cut, rows, [near, far], [at, nx]);
             }
         }
         unload::<T, NC>(rows, near, y, of.shape, lower, upper);
@@ -149,9 +156,10 @@ fn unload<T: Real, const NC: usize>(
 fn run_of_voxels<T: Real, const NC: usize, const ORTHO: bool>(
     of: &Blocks<T>,
     weights: &[T; LANES],
+    cut: &[CutVoxel<T>],
     rows: &mut Rows<T>,
     halves: [usize; 2],
-    at: usize,
+    [at, nx]: [usize; 2],
 ) {
     let width = rows.width;
     let [near, far] = halves;
@@ -164,31 +172,19 @@ fn run_of_voxels<T: Real, const NC: usize, const ORTHO: bool>(
     }
     let mut forces = [[[T::default(); LANES]; 4]; 6];
     for i in 0..LANES {
-        let mut modes = [[T::default(); 8]; NC];
-        for c in 0..NC {
-            for z in 0..2 {
-                let k = 2 * c + z;
-                let (a, a_end, b, b_end) = (values[k][0][i], values[k][1][i], values[k][2][i], values[k][3][i]);
-                let (sum, sum_end, rise, rise_end) = (a + b, a_end + b_end, b - a, b_end - a_end);
-                modes[c][4 * z] = sum + sum_end;
-                modes[c][4 * z + 1] = sum_end - sum;
-                modes[c][4 * z + 2] = rise + rise_end;
-                modes[c][4 * z + 3] = rise_end - rise;
+        let modes = modes_of::<T, NC>(&values, i);
+        spread::<T, NC>(&forces_of::<T, NC, ORTHO>(of, &modes, weights[i]), &mut forces, i);
+    }
+    for cut in cut {
+        let i = cut.voxel % nx - at;
+        let [modes] = modes_of::<T, 1>(&values, i);
+        let mut found = [T::default(); 8];
+        for (row, m) in cut.form.iter().zip(modes).skip(1) {
+            for (f, v) in found.iter_mut().zip(row) {
+                *f += m * *v;
             }
         }
-        let found = forces_of::<T, NC, ORTHO>(of, &modes, weights[i]);
-        for c in 0..NC {
-            for z in 0..2 {
-                let f = &found[c];
-                let (flat, flat_end) = (f[4 * z] - f[4 * z + 1], f[4 * z] + f[4 * z + 1]);
-                let (rise, rise_end) = (f[4 * z + 2] - f[4 * z + 3], f[4 * z + 2] + f[4 * z + 3]);
-                let k = 2 * c + z;
-                forces[k][0][i] = flat - rise;
-                forces[k][1][i] = flat_end - rise_end;
-                forces[k][2][i] = flat + rise;
-                forces[k][3][i] = flat_end + rise_end;
-            }
-        }
+        spread::<T, 1>(&[found], &mut forces, i);
     }
     for k in 0..2 * NC {
         for (row, half) in [(0, near), (1, far)] {
@@ -196,6 +192,41 @@ fn run_of_voxels<T: Real, const NC: usize, const ORTHO: bool>(
                 let to = &mut rows.forces[half][start(2 * k + end)..][..LANES];
                 to.copy_from_slice(&sum(&eight(to, 0), &forces[k][2 * row + end]));
             }
+        }
+    }
+}
+
+/// The modes of a voxel of a run.
+#[inline(always)]
+fn modes_of<T: Real, const NC: usize>(values: &[[[T; LANES]; 4]; 6], i: usize) -> [[T; 8]; NC] {
+    let mut modes = [[T::default(); 8]; NC];
+    for c in 0..NC {
+        for z in 0..2 {
+            let k = 2 * c + z;
+            let (a, a_end, b, b_end) = (values[k][0][i], values[k][1][i], values[k][2][i], values[k][3][i]);
+            let (sum, sum_end, rise, rise_end) = (a + b, a_end + b_end, b - a, b_end - a_end);
+            modes[c][4 * z] = sum + sum_end;
+            modes[c][4 * z + 1] = sum_end - sum;
+            modes[c][4 * z + 2] = rise + rise_end;
+            modes[c][4 * z + 3] = rise_end - rise;
+        }
+    }
+    modes
+}
+
+/// Adds the forces of the modes of a voxel to its ends.
+#[inline(always)]
+fn spread<T: Real, const NC: usize>(found: &[[T; 8]; NC], forces: &mut [[[T; LANES]; 4]; 6], i: usize) {
+    for c in 0..NC {
+        for z in 0..2 {
+            let f = &found[c];
+            let (flat, flat_end) = (f[4 * z] - f[4 * z + 1], f[4 * z] + f[4 * z + 1]);
+            let (rise, rise_end) = (f[4 * z + 2] - f[4 * z + 3], f[4 * z + 2] + f[4 * z + 3]);
+            let k = 2 * c + z;
+            forces[k][0][i] += flat - rise;
+            forces[k][1][i] += flat_end - rise_end;
+            forces[k][2][i] += flat + rise;
+            forces[k][3][i] += flat_end + rise_end;
         }
     }
 }

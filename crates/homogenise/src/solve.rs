@@ -5,6 +5,7 @@ use geometry::progress::{Progress, Stopped};
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use crate::cut_voxels::CutVoxels;
 use crate::element::Element;
 use crate::fields::{PIECE, combine, dot, dots, piece};
 use crate::multigrid::Multigrid;
@@ -34,17 +35,12 @@ pub struct Solved {
 }
 
 impl<const NC: usize> System<NC> {
-    /// The system of a grid of weights.
-    pub fn new(shape: [usize; 3], weights: &[f64], element: &Element) -> Self {
-        let operator = Operator::new(shape, weights.to_vec(), element);
+    /// The system of a grid of weights, in which some voxels have elements of their own.
+    pub fn new(shape: [usize; 3], weights: &[f64], element: &Element, cut: CutVoxels<f64>) -> Self {
+        let multigrid = Multigrid::new(shape, weights, element, &cut);
+        let operator = Operator::new(shape, weights.to_vec(), element, cut);
         let field = || vec![0.0; operator.len()];
-        System {
-            multigrid: Multigrid::new(shape, weights, element),
-            residual: field(),
-            direction: vec![0.0; operator.len()],
-            product: field(),
-            operator,
-        }
+        System { multigrid, residual: field(), direction: vec![0.0; operator.len()], product: field(), operator }
     }
 
     /// Solves A x = −A m for a periodic x, where m has the uniform gradient `modes` (times eight, by ξ).

@@ -15,7 +15,7 @@ use crate::csg_tree::CsgSolid;
 use crate::field::Field;
 use crate::kind::Warning;
 use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
-use fractions::fractions;
+use fractions::{fractions, interfaces};
 use limit::{Limit, modal_limit};
 pub use permeability::Side;
 
@@ -258,7 +258,12 @@ impl UnitCell {
             if pore == 0.0 && voxels.endless_directions(least) == 0 {
                 return Ok(Homogenised { tensor: [[0.0; 3]; 3], residual: 0.0, iterations: 0, cases: 0 });
             }
-            voxels.conductivity(pore, TOLERANCE, progress)
+            if pore == 0.0 || resolution.plain {
+                return voxels.conductivity(pore, TOLERANCE, progress);
+            }
+            let found = interfaces(&self.solid, &self.edges, voxels.shape, &voxels.fractions);
+            let cut = voxels.clone().with_interfaces(found).map_err(Stopped::Refused)?;
+            cut.conductivity(pore, TOLERANCE, progress)
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();

@@ -117,9 +117,11 @@ pub struct PermeabilityReport {
     /// Nodes along the edge of the cell, or of a cube of its volume.
     pub n: usize,
     /// Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not whole numbers
-    /// of steps adds; where the grids differ too much for an extrapolation k is k_n, and this the distance of the extrapolated one.
+    /// of steps adds. Each eigenvalue of k is extrapolated by an order of its own, and changed by half at most.
     pub error: f64,
-    /// Exponent of the grid's step with which the error was taken to fall.
+    /// Estimated relative errors of k along the axes; 0 where nothing flows.
+    pub axis_errors: [f64; 3],
+    /// Exponent of the grid's step with which the error was taken to fall, of the eigenvalue that changes most.
     pub order: f64,
     /// Greatest change by a step of the iteration, over that of the first.
     pub residual: f64,
