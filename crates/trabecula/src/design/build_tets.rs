@@ -61,7 +61,7 @@ pub struct TetReport {
 }
 
 impl TetReport {
-    /// Features of the region that the mesh does not keep, but for those that are small beside its tetrahedra.
+    /// Features of the region that the mesh does not keep, but for those that are small against its tetrahedra.
     pub(super) fn lost(&self) -> Vec<&LostFeature> {
         let matters = |f: &&LostFeature| {
             let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);

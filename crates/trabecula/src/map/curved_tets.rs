@@ -25,8 +25,8 @@ const MOST: f64 = 0.85;
 const FARTHEST: f64 = 0.35;
 /// |δ| below this share of the edge is rounding.
 const FLAT: f64 = 1e-9;
-/// The distance of the bent boundary from the surface, in edges, up to which it follows it, and the share of the boundary that may be
-/// farther off in a mesh of the region: where the part is finer than the tetrahedra, in some places of every scan.
+/// The distance of the bent boundary from the surface, in edges, up to which it follows it, and the share of the boundary
+/// that may be farther off in a mesh of the region: where the part is finer than the tetrahedra, in places of every scan.
 const FIT: f64 = 0.1;
 const MISFIT: f64 = 0.02;
 /// Iterations of the inverse, and the change at which it has converged.

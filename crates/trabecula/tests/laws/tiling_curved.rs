@@ -176,8 +176,8 @@ fn rippled(some: &mut Random) -> Region {
     Arc::new(MeshRegion::new(Mesh { vertices, triangles }, Repair::Refuse).expect("ball"))
 }
 
-/// Surfaces finer than the tetrahedra, as every scan has some: where the bent boundary is off the part in places, the steps along it follow the
-/// surface nevertheless, and the mesh remains one of the region.
+/// Surfaces finer than the tetrahedra, as every scan has some: where the bent boundary is off the part in places, the steps
+/// along it follow the surface nevertheless, and the mesh remains one of the region.
 #[test]
 fn a_surface_finer_than_tetrahedra_is_followed_by_steps() {
     let mut some = Random(24);

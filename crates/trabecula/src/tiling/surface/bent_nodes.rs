@@ -77,8 +77,8 @@ impl BentNodes {
         Some(out)
     }
 
-    /// Reduces moves until no small tetrahedron is turned over, each only where it is needed: of the nodes of faces first, then of
-    /// edges, after which those around them are looked at again.
+    /// Reduces moves until no small tetrahedron is turned over: of the nodes of faces first, then of edges, after which the
+    /// tetrahedra around these are checked again.
     fn make_sound(&mut self, map: &Tets, nodes: &Nodes, template: &Template) {
         let mut halvings: HashMap<[u32; 2], usize> = HashMap::new();
         let mut left = self.touched(map);
