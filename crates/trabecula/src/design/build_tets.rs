@@ -60,6 +60,17 @@ pub struct TetReport {
     pub layers: Option<MadeLayers>,
 }
 
+impl TetReport {
+    /// Features of the region that the mesh does not keep, but for those that are small against its tetrahedra.
+    pub(super) fn lost(&self) -> Vec<&LostFeature> {
+        let matters = |f: &&LostFeature| {
+            let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
+            f.depth > if one_way { FAR } else { DEEP } * self.quality.size.mean
+        };
+        self.fit.iter().flat_map(|f| &f.lost).filter(matters).collect()
+    }
+}
+
 impl From<&TetReport> for TetMeshReport {
     fn from(r: &TetReport) -> Self {
         TetMeshReport {
@@ -429,11 +440,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
         if is_made { "take a smaller size" } else { "is it a mesh of this region, in the right place and unit?" };
     // A mesh of something else has no features of the region to keep.
     let strange = !is_made && fit.to_part.max > FAR * q.size.mean;
-    let matters = |f: &&LostFeature| {
-        let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
-        f.depth > if one_way { FAR } else { DEEP } * q.size.mean
-    };
-    let lost: Vec<&LostFeature> = fit.lost.iter().filter(matters).collect();
+    let lost = report.lost();
     if !lost.is_empty() && !strange {
         let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), at(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();

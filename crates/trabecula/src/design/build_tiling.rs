@@ -55,7 +55,7 @@ impl Domain<'_> {
 enum MeshFit {
     /// It is a mesh of the region: bent, it fills it.
     Whole,
-    /// It is one but for edges and walls finer than its tetrahedra.
+    /// It is one but for features that it does not keep.
     Nearly,
     /// The region cuts it.
     Cut,
@@ -148,7 +148,7 @@ pub(super) fn domain<'a>(
         None => {
             let bent = Tets::of_region(&made.mesh, joined.overlap, region).map_err(wrong)?;
             match spec_of_mesh {
-                _ if bent.fits() => (bent, region.clone(), MeshFit::Whole),
+                _ if bent.fits() && made.report.lost().is_empty() => (bent, region.clone(), MeshFit::Whole),
                 TetsKind::Made(_) => (bent, region.clone(), MeshFit::Nearly),
                 TetsKind::File(file) => {
                     let flat = Tets::new(&made.mesh, joined.overlap).map_err(wrong)?;

@@ -25,8 +25,10 @@ const MOST: f64 = 0.85;
 const FARTHEST: f64 = 0.35;
 /// |δ| below this share of the edge is rounding.
 const FLAT: f64 = 1e-9;
-/// The distance of the bent boundary from the surface, in edges, up to which the mesh is one of the region.
+/// The distance of the bent boundary from the surface, in edges, up to which it follows it, and the share of the boundary
+/// that may be farther off in a mesh of the region: where the part is finer than the tetrahedra, in places of every scan.
 const FIT: f64 = 0.1;
+const MISFIT: f64 = 0.02;
 /// Iterations of the inverse, and the change at which it has converged.
 const ROUNDS: usize = 200;
 const NEAR: f64 = 1e-13;
@@ -50,6 +52,8 @@ pub(crate) struct Curves {
     bent: Vec<Bent>,
     /// Greatest distance of the bent boundary from the region's surface at middles of faces and quarters of edges, in edges.
     pub off: f64,
+    /// The share of these places that are farther off than `FIT`.
+    misfit: f64,
 }
 
 /// A bent tetrahedron.
@@ -166,10 +170,18 @@ impl Curves {
                 moved.insert(e.nodes, scale(by, (FARTHEST * length / far).min(1.0)));
             }
         }
-        let mut out =
-            Curves { region: region.clone(), edges, index: vec![NONE; map.len()], bent: Vec::new(), off: 0.0 };
+        let mut out = Curves {
+            region: region.clone(),
+            edges,
+            index: vec![NONE; map.len()],
+            bent: Vec::new(),
+            off: 0.0,
+            misfit: 0.0,
+        };
         out.bend(map, &mut moved);
-        out.off = out.distance(map, &moved);
+        let off = out.distances(map, &moved);
+        out.off = off.iter().copied().fold(0.0, f64::max);
+        out.misfit = off.iter().filter(|v| **v > FIT).count() as f64 / off.len().max(1) as f64;
         out
     }
 
@@ -209,8 +221,8 @@ impl Curves {
         }
     }
 
-    /// The greatest distance of the bent boundary from the surface, in edges.
-    fn distance(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> f64 {
+    /// The distances of the bent boundary from the surface, in edges: at the middles of faces and the quarters of edges.
+    fn distances(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> Vec<f64> {
         let at = |n: u32| map.nodes()[n as usize];
         let bend = |a: u32, b: u32| moved.get(&[a.min(b), a.max(b)]).copied().unwrap_or_default();
         let boundary = map.boundary_nodes();
@@ -231,12 +243,12 @@ impl Curves {
         }
         let mut off = vec![0.0; points.len()];
         self.region.values(&points, &mut off);
-        off.iter().zip(lengths).fold(0.0, |m, (v, l)| m.max(v.abs() / l))
+        off.iter().zip(lengths).map(|(v, l)| v.abs() / l).collect()
     }
 
-    /// Whether the bent boundary is the region's surface but for a small share of its edges.
+    /// Whether the bent boundary is the region's surface within a small share of its edges, in all but few places.
     pub fn fits(&self) -> bool {
-        self.off <= FIT
+        self.misfit <= MISFIT
     }
 
     fn of(&self, t: usize) -> Option<&Bent> {

@@ -160,7 +160,7 @@ impl Tets {
         self.curves.as_ref().map(|c| c.off)
     }
 
-    /// Whether its bent boundary is the surface of a region, but for a tenth of its edges.
+    /// Whether its bent boundary is the surface of a region within a tenth of its edges, in all but few places.
     pub fn fits(&self) -> bool {
         self.curves.as_ref().is_some_and(Curves::fits)
     }

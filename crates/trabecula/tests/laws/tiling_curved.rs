@@ -1,9 +1,12 @@
 //! Lattices over tetrahedra that are bent onto the region's surface: they fill it, on both roads, and end on it.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::common::{Random, ball, check, cuboid, meshed, within};
-use geometry::math::{Aabb, Vec3, cross, norm, sub};
+use crate::common::{Random, ball, cases, check, cuboid, meshed, within};
+use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
+use geometry::mesh::Mesh;
+use geometry::repair::Repair;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh;
 use trabecula::cell::Part;
@@ -14,7 +17,7 @@ use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
 use trabecula::mesher::background;
-use trabecula::region::{Cylinder, Region};
+use trabecula::region::{Cylinder, MeshRegion, Region};
 use trabecula::solid::Solid;
 use trabecula::surface_maker::Islands;
 use trabecula::tiling::{Level, Tiling, TilingSurface};
@@ -134,6 +137,64 @@ fn the_boundary_of_what_is_cut_is_the_surface() {
     let far = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     // Distances of points of a sharp edge by planes taken a hundredth of a face away.
     assert!(far < 1e-3, "{far}");
+}
+
+/// A ball of triangles, its surface in waves that are shorter than a tetrahedron.
+fn rippled(some: &mut Random) -> Region {
+    const N: usize = 40;
+    let wave = |p: Vec3| p.map(|v| 1.6 * v / norm(p));
+    let waves: Vec<(Vec3, f64)> = (0..3).map(|_| (wave(some.point(1.0)), some.between(0.0, 6.0))).collect();
+    let place = |p: Vec3| {
+        let unit = p.map(|v| v / norm(p));
+        let by = waves.iter().map(|(k, shift)| (10.0 * dot(*k, unit) + shift).sin()).sum::<f64>();
+        unit.map(|v| v * (10.0 + 0.12 * by))
+    };
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let mut known = HashMap::new();
+    for octant in 0..8 {
+        let sign = [0, 1, 2].map(|a| if octant >> a & 1 == 1 { -1i64 } else { 1 });
+        let mut node = |i: usize, j: usize| {
+            let at = [i, j, N - i - j].map(|v| v as i64);
+            let at: [i64; 3] = core::array::from_fn(|a| at[a] * sign[a]);
+            *known.entry(at).or_insert_with(|| {
+                vertices.push(place(at.map(|v| v as f64)));
+                vertices.len() as u32 - 1
+            })
+        };
+        let odd = sign.iter().product::<i64>() < 0;
+        for i in 0..N {
+            for j in 0..N - i {
+                let [a, b, c] = [node(i, j), node(i + 1, j), node(i, j + 1)];
+                triangles.push(if odd { [a, c, b] } else { [a, b, c] });
+                if i + j + 2 <= N {
+                    let d = node(i + 1, j + 1);
+                    triangles.push(if odd { [b, c, d] } else { [b, d, c] });
+                }
+            }
+        }
+    }
+    Arc::new(MeshRegion::new(Mesh { vertices, triangles }, Repair::Refuse).expect("ball"))
+}
+
+/// Surfaces finer than the tetrahedra, as every scan has some: where the bent boundary is off the part in places, the steps
+/// along it follow the surface nevertheless, and the mesh remains one of the region.
+#[test]
+fn a_surface_finer_than_tetrahedra_is_followed_by_steps() {
+    let mut some = Random(24);
+    for _ in 0..cases(2) {
+        let region = rippled(&mut some);
+        let volume = region.volume().expect("volume");
+        let map = bent(&region, 4.0, 0.0);
+        assert!(map.off_region() > Some(0.1) && map.fits(), "{:?}", map.off_region());
+        let made = explicit(&full(map.clone()), 12.0);
+        check("rippled", &made);
+        let mut off = vec![0.0; made.mesh.vertices.len()];
+        region.values(&made.mesh.vertices, &mut off);
+        let far = off.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let off = made.mesh.volume() / volume - 1.0;
+        println!("off {:?} edges, by steps {far:.4} mm, volume {off:+.5}", map.off_region());
+        assert!(off.abs() < 1e-3, "{off}");
+    }
 }
 
 #[test]

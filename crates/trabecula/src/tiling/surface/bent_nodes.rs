@@ -73,36 +73,44 @@ impl BentNodes {
             curves.edges.par_chunks(BATCH).map(|some| edge_moves(map, curves, some, n)).collect();
         let edges: HashMap<[u32; 2], Vec<Vec3>> = found.into_iter().flatten().collect();
         let mut out = BentNodes { n, edges, stiff: HashSet::new() };
-        let mut left = out.touched(map);
-        for round in 0..=HALVINGS + 1 {
+        out.make_sound(map, nodes, template);
+        Some(out)
+    }
+
+    /// Reduces moves until no small tetrahedron is turned over: of the nodes of faces first, then of edges, after which the
+    /// tetrahedra around these are checked again.
+    fn make_sound(&mut self, map: &Tets, nodes: &Nodes, template: &Template) {
+        let mut halvings: HashMap<[u32; 2], usize> = HashMap::new();
+        let mut left = self.touched(map);
+        loop {
             checkpoint();
             let sound = |t: &usize| {
-                let places = out.places(map, *t, nodes);
+                let places = self.places(map, *t, nodes);
                 places.is_none_or(|p| upright(&p.nodes, map.flipped(*t), template))
             };
             left = left.into_par_iter().filter(|t| !sound(t)).collect();
-            if left.is_empty() {
-                break;
+            let (stiff, soft): (Vec<usize>, Vec<usize>) = left.iter().partition(|t| self.stiff.contains(&(**t as u32)));
+            let wrong: HashSet<[u32; 2]> =
+                stiff.iter().flat_map(|t| keys(map, *t)).filter(|key| self.edges.contains_key(key)).collect();
+            if soft.is_empty() && wrong.is_empty() {
+                return;
             }
-            if round == 0 {
-                out.stiff.extend(left.iter().map(|t| *t as u32));
-                continue;
-            }
-            let wrong: HashSet<[u32; 2]> = left.iter().flat_map(|t| keys(map, *t)).collect();
-            for key in wrong {
-                if round > HALVINGS {
-                    out.edges.remove(&key);
-                } else if let Some(moves) = out.edges.get_mut(&key) {
+            self.stiff.extend(soft.iter().map(|t| *t as u32));
+            for key in &wrong {
+                let count = halvings.entry(*key).or_default();
+                *count += 1;
+                if *count > HALVINGS {
+                    self.edges.remove(key);
+                } else if let Some(moves) = self.edges.get_mut(key) {
                     moves.iter_mut().for_each(|m| *m = scale(*m, 0.5));
                 }
             }
-            // Those around the edges may be spoilt by what others were.
-            left = (0..map.len())
-                .filter(|t| out.edges_of(map, *t) != 0 && !out.stiff.contains(&(*t as u32)))
-                .chain(left)
-                .collect();
+            // Those around an edge may be spoilt by its shorter moves, stiff ones too.
+            let changed = (0..map.len()).filter(|t| keys(map, *t).iter().any(|key| wrong.contains(key)));
+            left = changed.chain(soft).collect();
+            left.sort_unstable();
+            left.dedup();
         }
-        Some(out)
     }
 
     /// The tetrahedra in which nodes may be moved.
