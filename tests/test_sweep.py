@@ -702,3 +702,16 @@ def test_a_parquet_table_without_pyarrow_is_refused_before_any_design(tmp_path: 
     assert done.returncode == 1
     assert "is written by pyarrow, which is missing: pip install 'trabecula[scale]'" in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_a_property_that_fails_leaves_the_rest_of_its_row():
+    """Loose balls carry nothing, but conduct through the pore."""
+    lattice = {"cell": "primitive", "part": "lower", "map": {"affine": {"wavelength": 4}}, "level": {"fraction": 0.1}}
+    study = {
+        "region": {"box": {"size": [4, 4, 4]}},
+        "lattice": {"core": lattice},
+        "sweep": {"lattice.core.level.fraction": [0.1]},
+    }
+    table = lt.sweep(study, per_cell=16, properties={"stiffness": {"n": 16}, "conductivity": {"n": 16, "pore": 0.5}})
+    assert table["volume_mm3"][0] == pytest.approx(6.4, rel=0.05) and table["k11"][0] > 0.5
+    assert table["C11"][0] is None and table["error"][0].startswith("stiffness: ")

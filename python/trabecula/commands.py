@@ -283,7 +283,7 @@ def sweep(args) -> None:
     figures["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
         return put_json(figures)
-    failed = f", {figures['failed']} of them without a solid (see the column error)" if figures["failed"] else ""
+    failed = f", {figures['failed']} of them with an error (see that column)" if figures["failed"] else ""
     taken = f"; {figures['resumed']} from an earlier run" if figures["resumed"] else ""
     say(f"{args.output}: {counted(figures['rows'], 'design')}{failed}{taken}, {figures['seconds']:g} s")
 

@@ -31,6 +31,8 @@ UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm
 ASKED, MEASURED = ("fraction_asked", "wall_mm", "pore_mm"), ("fraction", "volume_mm3", "area_mm2", "pieces")
 #: Columns that come last, in this order.
 LAST = ("warnings", "error", "seconds", "sha256", "version")
+#: What a design or a property of it may end in: its row has the message.
+FAULTS = (ValueError, OverflowError, MemoryError, OSError, ArithmeticError)
 #: Columns of text.
 TEXTS = ("warnings", "error", "sha256", "version")
 
@@ -60,17 +62,20 @@ class Job:
 
 
 def row_of(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The row of the design with these values; with a message under ``error`` if there is none."""
+    """The row of the design with these values; under ``error`` why there is none, or which property it has not."""
     start = time.perf_counter()
     row: dict[str, Any] = {"design": number, **values}
     try:
         row |= _figures(job, number, values)
-        row["error"] = None
-    except (ValueError, OverflowError, MemoryError, OSError, ArithmeticError) as error:
-        row["error"] = " ".join(str(error).split()) or type(error).__name__
+    except FAULTS as error:
+        row["error"] = _words(error)
     row["seconds"] = round(time.perf_counter() - start, 3)
     row["version"] = _core.__version__
     return row
+
+
+def _words(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,6 +87,7 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
         solid = Solid(core.build(folder), folder)
         said: list[str] = [w["message"] for w in solid.warnings]
         reported: list[str] = []
+        failed: list[str] = []
         figures |= _asked(solid)
         resolution = {"edge": job.edge, "per_cell": job.per_cell}
         if job.meshes or job.pictures:
@@ -95,11 +101,16 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
         whole = (measured.solid_fraction, measured.volume, measured.area, measured.pieces)
         figures |= dict(zip(MEASURED, whole, strict=True))
         for name, settings in job.properties.items():
-            found = getattr(solid, name)(threads=job.threads, **settings)
+            try:
+                found = getattr(solid, name)(threads=job.threads, **settings)
+            except FAULTS as error:  # what else was found of the design stays
+                failed.append(f"{name}: {_words(error)}")
+                continue
             figures |= dict(zip(PROPERTIES[name].columns, PROPERTIES[name].figures(found), strict=True))
             reported += [f"{name}: {warning.message}" for warning in found.warnings]
     said += [*(str(w.message) for w in heard if isinstance(w.message, DesignWarning)), *reported]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
+    figures["error"] = " | ".join(failed) or None
     return figures
 
 
@@ -173,7 +184,9 @@ def _conductivity(found: ConductivityReport) -> Iterator[float | None]:
 
 def _permeability(found: PermeabilityReport) -> Iterator[float | None]:
     yield from (found.k[i][j] for i, j in _upper(3))
-    yield from (found.error, found.hydraulic_diameter, found.tortuosity)
+    yield found.error
+    yield from found.axis_errors
+    yield from (found.hydraulic_diameter, found.tortuosity)
 
 
 AXES, PLANES = ("1", "2", "3"), ("23", "13", "12")
@@ -183,7 +196,14 @@ MODULI = tuple(f"{name}{of}{end}" for name, each in (("E", AXES), ("G", PLANES))
 PROPERTIES: dict[str, Property] = {
     "conductivity": Property((*_entries("k", 3), "k_error", *(f"k{a}{a}_error" for a in AXES)), _conductivity),
     "permeability": Property(
-        (*_entries("permeability", 3, "_mm2"), "permeability_error", "hydraulic_diameter_mm", "tortuosity"), _permeability
+        (
+            *_entries("permeability", 3, "_mm2"),
+            "permeability_error",
+            *(f"permeability{a}{a}_error" for a in AXES),
+            "hydraulic_diameter_mm",
+            "tortuosity",
+        ),
+        _permeability,
     ),
     "stiffness": Property((*_entries("C", 6), "C_error", *MODULI, "zener"), _stiffness),
 }
