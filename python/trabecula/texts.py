@@ -185,12 +185,12 @@ def _tiling(it: Report) -> Iterator[str]:
 
 def _distortion(it: Report) -> Iterator[str]:
     mean, most = max(a.mean for a in it.angle), max(a.max for a in it.angle)
-    yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most, each of the axis where that is greatest"
+    yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most at the points sampled, each of the axis where that is greatest"
     ratio = max((s.mean for s in it.spacing), key=lambda mean: max(mean, 1 / mean))
     farthest = max(s.max for s in it.spacing)
     yield (
         f"  spacing    cells per mm {ratio:.2f} of what was asked for on average, off by a factor of "
-        f"{farthest:.2f} at most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
+        f"{farthest:.2f} at most of these; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
     )
     yield f"  turn       {it.turn:.1f}° per cell at most"
 
