@@ -118,7 +118,7 @@ pub(super) fn spacing(
     let beams = beams.values().map(|b| b.thickness / PER_BEAM);
     let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
     let rods = built.tilings.iter().filter(|t| t.ends == Ends::Net).filter_map(|t| t.radii);
-    let beams = beams.chain(rods.map(|[least, _]| 2.0 * least / PER_BEAM));
+    let beams = beams.chain(rods.flat_map(|[least, most]| [2.0 * least / PER_WALL, 2.0 * most / PER_BEAM]));
     let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
     (smallest_repeat(built) / PER_CELL).min(waves).min(walls).min(wavelength / FEWEST)
 }

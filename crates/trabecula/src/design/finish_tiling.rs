@@ -22,8 +22,6 @@ const ROUNDS: usize = 12;
 const NEAR: f64 = 2e-4;
 /// The first change of the level, as a share of it.
 const NUDGE: f64 = 0.02;
-/// The largest radius of rods of a given radius, in sizes of the triangles that they tie.
-const THICKEST: f64 = 0.15;
 /// How far below the surface it is decided what is solid there, as a share of the way to the middle of a tetrahedron.
 const BELOW: f64 = 1e-3;
 /// By how much the finished part may have more than was asked for.
@@ -105,7 +103,7 @@ impl<'a> Finish<'a> {
         // A net of a given radius is the same at every level.
         let fixed = net.as_ref().zip(self.radius);
         if let Some((net, radius)) = fixed {
-            let rods = self.rods(net, &given_radii(&tiling, radius))?;
+            let rods = self.rods(net, &tiling.given_radii(radius))?;
             fill(&mut kept, &points, |p, out| rods.solid.values(p, out));
         }
         let share_of = |solid: &[bool]| solid.iter().filter(|s| **s).count() as f64 / points.len() as f64;
@@ -242,6 +240,11 @@ impl<'a> Finish<'a> {
     }
 
     fn rods(&self, net: &Arc<Net>, of: &[f64]) -> Result<Rods, DesignError> {
+        if of.iter().all(|r| r.is_nan() || *r <= 0.0) {
+            let message = "the cell has no ports on the surface at this level, so there is nothing for the net to tie; ask for a higher \
+                           fraction, take another cell, or give net.radius";
+            return Err(DesignError::new(format!("{}.net", self.map), message));
+        }
         net.rods(of).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))
     }
 
@@ -251,8 +254,8 @@ impl<'a> Finish<'a> {
         let plain = Finished { tiling: tiling.clone(), placed, field, net: None, radii: None, fraction: None };
         match (self.ends, net) {
             (Ends::Net, Some(net)) => {
-                let own = || tiling.rod_radii(tiling.thickness().map(|w| w.mean));
-                let rods = self.rods(net, &self.radius.map_or_else(own, |radius| given_radii(&tiling, radius)))?;
+                let of = self.radius.map_or_else(|| tiling.rod_radii(), |radius| tiling.given_radii(radius));
+                let rods = self.rods(net, &of)?;
                 Ok(Finished { radii: Some(rods.range()), net: Some(rods), ..plain })
             }
             (Ends::Rounded, _) => {
@@ -262,17 +265,6 @@ impl<'a> Finish<'a> {
             _ => Ok(plain),
         }
     }
-}
-
-/// The radii at the nodes of a mesh (mm) of rods of a given radius: thinner where they would close the openings of triangles that are
-/// smaller than the others, in proportion to their size.
-fn given_radii(tiling: &Tiling, radius: f64) -> Vec<f64> {
-    // The edge of a regular triangle of that area.
-    let sizes: Vec<f64> = tiling.least_faces().into_iter().map(|area| (4.0 * area / 3f64.sqrt()).sqrt()).collect();
-    let faces = tiling.map.boundary_nodes();
-    let mean = faces.iter().flatten().map(|n| sizes[*n as usize]).sum::<f64>() / (3 * faces.len()).max(1) as f64;
-    let enough = mean.min(radius / THICKEST);
-    sizes.into_iter().map(|size| radius * (size / enough).min(1.0)).collect()
 }
 
 /// Marks the points at which a field is not positive.

@@ -50,15 +50,18 @@ fn bary(face: [usize; 3], steps: [usize; 3]) -> [f64; 4] {
 
 impl Coverage {
     /// What the rods of a net cover.
-    pub fn new(tiling: &Tiling, rods: &Rods) -> Coverage {
+    pub(super) fn new(tiling: &Tiling, rods: &Rods) -> Coverage {
         let (ports, untied, at) = ports(tiling, rods);
         let (opening, opening_at) = opening(tiling, rods);
         Coverage { ports, untied, at, opening, opening_at }
     }
 
     /// Warns of ports that no rod reaches, and of openings wider than `most` (mm).
-    pub fn warn(&self, most: Option<f64>, path: &str, warnings: &mut Vec<Warning>) {
+    pub(super) fn warn(&self, most: Option<f64>, path: &str, warnings: &mut Vec<Warning>) {
         let mut say = |message: String| warnings.push(Warning { path: path.to_string(), message });
+        if self.ports == 0 {
+            say("the lattice has no ports on the surface, so the net ties nothing: take a higher fraction or another cell".into());
+        }
         if let Some(at) = self.at {
             say(format!(
                 "no rod of the net reaches {} of {} ports, such as that at {}: its rods follow the ports of the first cell at the mean \
@@ -166,7 +169,11 @@ fn opening(tiling: &Tiling, rods: &Rods) -> (f64, Vec3) {
     }
     let widest = |i: &usize| {
         let (t, f) = faces[*i];
-        let around: BTreeSet<usize> = f.iter().filter_map(|c| near.get(&map.tet(t)[*c])).flatten().copied().collect();
+        let mut around: BTreeSet<usize> =
+            f.iter().filter_map(|c| near.get(&map.tet(t)[*c])).flatten().copied().collect();
+        if around.is_empty() {
+            around.extend(0..net.rods.len());
+        }
         let points = grid.iter().map(|k| map.place(t, bary(f, *k)));
         let free = |p: Vec3| (around.iter().map(|i| rods.distance(*i, p)).fold(f64::INFINITY, f64::min), p);
         points.map(free).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, [0.0; 3]))

@@ -288,13 +288,13 @@ mod tests {
             let (inside, _) = crate::design::sample::inside(&region, 4000);
             let mesh = background(&region, &region.bounds(), &size, &inside, None).expect("mesh").mesh;
             let map = Arc::new(Tets::of_region(&mesh, 0.0, &region).expect("map"));
-            let named = named_tet_cell(["diamond", "primitive"][i / 2]).expect("cell");
+            let named = named_tet_cell(["diamond", "pn3m"][i / 2]).expect("cell");
             let cell = named.cell().expect("cell");
-            let iso = cell.iso(named.part, 0.35);
+            let iso = cell.iso(named.part, 0.3);
             let tiling = Tiling::new(map.clone(), Arc::new(cell), named.part, Level::Same(iso));
             let all = map.boundary_nodes();
             let net = Net::new(&map, &region, &tiling.ports(), (0..all.len()).collect());
-            let radii = net.radii(&tiling.rod_radii(None));
+            let radii = net.radii(&tiling.rod_radii());
             let mut edges: HashMap<u32, Vec<f64>> = HashMap::new();
             for f in &all {
                 for k in 0..3 {

@@ -3,8 +3,7 @@
 //! A strut crosses the faces of a tetrahedron in its ports, and is as thin as the least face makes it: in flat tetrahedra, such as those of
 //! layers of prisms, that is far smaller than the face on the surface.
 
-use super::{Level, Tiling};
-use crate::cell::Part;
+use super::{Level, Ports, Tiling};
 use geometry::math::{cross, norm, sub};
 use geometry::tetmesh::FACES;
 
@@ -12,6 +11,8 @@ use geometry::tetmesh::FACES;
 const LEVELS: usize = 9;
 /// The least share of a face that is solid, over that at the mean level: a node about which a cell has no ports has rods nevertheless.
 const LEAST: f64 = 0.05;
+/// The share of the width of an opening that rods may take from it.
+const OPEN: f64 = 0.5;
 
 impl Tiling {
     /// For each node of the mesh, the mean over its tetrahedra of the least area of their faces (mm²).
@@ -56,24 +57,49 @@ impl Tiling {
         of.iter().map(area).collect()
     }
 
+    /// For each node of the mesh, the greatest radius (mm) of rods of a net that leave half the width of an opening open: of regular
+    /// triangles with the area of the least faces.
+    fn open_radii(&self, ports: &Ports) -> Vec<f64> {
+        let open = OPEN * ports.opening();
+        self.least_faces().into_iter().map(|area| open * (4.0 * area / 3f64.sqrt()).sqrt()).collect()
+    }
+
+    /// As `rod_radii`, for rods of a given radius (mm): thinner where they would close the openings of triangles that are smaller than the
+    /// others, in proportion to their size.
+    pub fn given_radii(&self, radius: f64) -> Vec<f64> {
+        let open = self.open_radii(&self.ports());
+        let faces = self.map.boundary_nodes();
+        let mean = faces.iter().flatten().map(|n| open[*n as usize]).sum::<f64>() / (3 * faces.len()).max(1) as f64;
+        open.into_iter().map(|most| radius * (most / mean.min(radius)).min(1.0)).collect()
+    }
+
     /// For each node of the mesh, the radius (mm) of the rods of a net that tie its ports: half a rod has the area of a port on the least
-    /// face of a tetrahedron there. For a sheet the thickness of its walls, whose mean is `wall` (mm).
-    pub fn rod_radii(&self, wall: Option<f64>) -> Vec<f64> {
-        let faces = self.least_faces();
-        let (Part::Sheet, Some(wall)) = (self.part, wall) else {
-            let ports = self.port_areas(self.ports().area);
-            let radius = |(area, share): (&f64, f64)| (2.0 * area * share / core::f64::consts::PI).sqrt();
-            return faces.iter().zip(ports).map(radius).collect();
+    /// face of a tetrahedron there; for a sheet it is the thickness of its walls. At most what leaves openings open.
+    pub fn rod_radii(&self) -> Vec<f64> {
+        let ports = self.ports();
+        let own = match self.thickness() {
+            Some(wall) => self.walls_at_nodes(wall.mean),
+            None => {
+                let areas = self.port_areas(ports.area);
+                let radius = |(area, share): (f64, f64)| (2.0 * area * share / core::f64::consts::PI).sqrt();
+                self.least_faces().into_iter().zip(areas).map(radius).collect()
+            }
         };
+        own.into_iter().zip(self.open_radii(&ports)).map(|(own, most)| own.min(most)).collect()
+    }
+
+    /// For each node of the mesh, the thickness (mm) of the walls of a sheet there, the mean of all being `mean`.
+    fn walls_at_nodes(&self, mean: f64) -> Vec<f64> {
         // Walls are as thick as the level says, in units of the size.
         let level = |n: usize| match &self.level {
             Level::Same(t) => *t,
             Level::Nodes(of) => of[n],
         };
+        let faces = self.least_faces();
         let own: Vec<f64> = faces.iter().enumerate().map(|(n, area)| level(n) * area.sqrt()).collect();
         let at = |t: usize| self.map.tet(t).map(|n| own[n as usize]).iter().sum::<f64>() / 4.0;
         let volume = |t: usize| self.map.volume(t);
         let sums = (0..self.map.len()).fold((0.0, 0.0), |(s, v), t| (s + volume(t) * at(t), v + volume(t)));
-        own.into_iter().map(|v| wall * v * sums.1 / sums.0).collect()
+        own.into_iter().map(|v| mean * v * sums.1 / sums.0).collect()
     }
 }

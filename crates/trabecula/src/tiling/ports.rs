@@ -107,6 +107,21 @@ impl Ports {
     }
 }
 
+impl Ports {
+    /// The radius of the circle in an opening between its lines and edges, in edges of a regular triangle.
+    pub(super) fn opening(&self) -> f64 {
+        let (lines, edges) = self.lines();
+        match (lines.is_empty(), edges) {
+            // Triangles.
+            (true, _) => 3f64.sqrt() / 6.0,
+            // Hexagons about nodes.
+            (false, false) => 0.5,
+            // Kites from a node to the middle of a triangle.
+            (false, true) => 0.25 * (3f64.sqrt() - 1.0),
+        }
+    }
+}
+
 impl Tiling {
     /// The ports at the mean level; where cells are mixed those of the first at the fraction of the whole, tied along edges too.
     pub fn ports(&self) -> Ports {
