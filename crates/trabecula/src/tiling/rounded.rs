@@ -13,16 +13,21 @@
 
 use std::sync::Arc;
 
-use super::{Level, Tiling, steepest};
+use super::{Level, Share, Tiling};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::implicit::Implicit;
+use crate::map::Tets;
 use crate::map::curved_tets::within;
 use crate::region::Region;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
+use geometry::tetmesh::TetMesh;
 
 /// Values within this share of the cell's range are near the surface.
 const NEAR: f64 = 0.04;
+
+/// Points at which steepness is looked for.
+const SAMPLES: usize = 40_000;
 
 /// By how much a tetrahedron may be steeper than the mean of those about a node: more it is where one is much smaller or flatter than the rest.
 const SPREAD: f64 = 2.0;
@@ -60,8 +65,6 @@ enum Radius {
 struct Steepness {
     tiling: Arc<Tiling>,
     at_nodes: Arc<Vec<f64>>,
-    /// Its mean over the bound of |∇f|.
-    ratio: f64,
 }
 
 impl Steepness {
@@ -70,9 +73,10 @@ impl Steepness {
         let width = (range.hi - range.lo) / tiling.cells[0].scale;
         // The mean at points near the surface, in units of the bound of each tetrahedron.
         let step = tiling.map.len().div_ceil(200).max(1);
+        let count = SAMPLES / tiling.map.len().clamp(1, 200);
         let mut ratios = Vec::new();
         for t in (0..tiling.map.len()).step_by(step) {
-            let known = tiling.known(&tiling.points_in(t, 200));
+            let known = tiling.known(&tiling.points_in(t, count));
             let near = known.iter().filter(|k| tiling.cut.value(k.f, k.t).abs() < NEAR * width);
             ratios.extend(near.map(|k| norm(k.slope) / tiling.lipschitz[t]));
         }
@@ -87,7 +91,7 @@ impl Steepness {
             }
         }
         let mean = |(s, n, most): (f64, f64, f64)| if n > 0.0 { (s / n).max(most / SPREAD) } else { 1.0 };
-        Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()), ratio }
+        Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()) }
     }
 
     /// The steepness and the level at a node.
@@ -99,12 +103,24 @@ impl Steepness {
         [self.at_nodes[n], level]
     }
 
+    /// The steepness in a regular tetrahedron with edge 1, of the first cell.
+    fn of_regular(&self) -> f64 {
+        let half = 0.5f64.sqrt();
+        let nodes = vec![[0.0; 3], [0.0, half, half], [half, 0.0, half], [half, half, 0.0]];
+        let regular = TetMesh { nodes, tets: vec![[0, 1, 2, 3]], zones: Vec::new() };
+        // It is a mesh.
+        let Ok(map) = Tets::new(&regular, 0.0) else { return 1.0 };
+        let cell = Share { weights: None, ..self.tiling.cells[0].clone() };
+        let level = Level::Same(self.tiling.mean_level());
+        Steepness::new(&Arc::new(Tiling::of(Arc::new(map), vec![cell], self.tiling.part, level))).at_nodes[0]
+    }
+
     /// The radius of a port at each node, mm.
     fn of_struts(&self) -> Vec<f64> {
         let tiling = &self.tiling;
         let ports = tiling.port_areas(tiling.ports().area);
         // Of a regular tetrahedron with edge 1: its steepness, and the area of its faces over π.
-        let (steep, face) = (self.ratio * steepest(&tiling.cells), 3f64.sqrt() / (4.0 * core::f64::consts::PI));
+        let (steep, face) = (self.of_regular(), 3f64.sqrt() / (4.0 * core::f64::consts::PI));
         ports.iter().zip(self.at_nodes.iter()).map(|(share, own)| (share * face).sqrt() * steep / own).collect()
     }
 }
