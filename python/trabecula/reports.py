@@ -38,6 +38,7 @@ __all__ = [
     "MeshReport",
     "MinMeanMax",
     "NarrowestNeck",
+    "NetReport",
     "PeriodReport",
     "PermeabilityReport",
     "QualityReport",
@@ -719,6 +720,19 @@ class NarrowestNeck(Report):
     """Position, mm."""
 
 
+class NetReport(Report):
+    """What the net on a part's surface covers."""
+
+    opening: float
+    """Diameter of the largest disc on the surface between its rods, mm."""
+    opening_at: list[float]
+    """Middle of that disc, mm."""
+    ports: int
+    """Number of ports where it is."""
+    untied: int
+    """Number of those that no rod reaches."""
+
+
 class PeriodReport(Report):
     """The whole numbers of cells round a hole of the region."""
 
@@ -1213,6 +1227,7 @@ class TilingReport(Report):
         "creases": "Creases",
         "joins": "ZoneJoin",
         "mesh": "TetMeshReport",
+        "net": "NetReport",
         "thickness": "WallSpread",
         "zones": "ZoneReport",
     }
@@ -1224,7 +1239,7 @@ class TilingReport(Report):
     """Angles between walls at faces of tetrahedra; None where there are none."""
     edge: float
     """Mean length of edges, mm."""
-    end_radius: float | None
+    end_radius: float | list[float] | None
     """Radius of the net's rods, or of rounded ends, mm; None with flat ends."""
     face_fraction: float | list[float] | None
     """Share of a tetrahedron's face that is solid; None for zones."""
@@ -1237,6 +1252,8 @@ class TilingReport(Report):
     """The mesh."""
     method: str
     """How its surface is made: explicit, in each tetrahedron apart, or implicit, on a grid over the part."""
+    net: NetReport | None
+    """What the net covers; None without one."""
     overlap: float
     """Overlap of tetrahedra, 0 to 0.2 of their size."""
     pieces: int | None

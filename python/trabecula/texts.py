@@ -177,7 +177,10 @@ def _tiling(it: Report) -> Iterator[str]:
         yield f"  walls      {figure(w.mean)} mm on average, 90 % between {figure(w.low)} and {figure(w.high)} mm"
     if it.end_radius is not None:
         what = "net of rods of radius" if it.surface == "net" else "rounded to"
-        yield f"  ends       {what} {figure(it.end_radius)} mm at the surface"
+        yield f"  ends       {what} {span(it.end_radius)} mm at the surface"
+    if it.net:
+        untied = f", {it.net.untied} of them without a rod" if it.net.untied else ""
+        yield f"  net        ties {counted(it.net.ports, 'port')}{untied}; openings of up to {figure(it.net.opening)} mm"
     if it.creases:
         smooth = " (before smoothing)" if it.overlap else ""
         yield f"  creases    {it.creases.mean:.0f}° on average, {it.creases.max:.0f}° at most at faces of tetrahedra{smooth}"

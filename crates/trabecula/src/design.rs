@@ -25,6 +25,7 @@ mod default_spacing;
 mod design_schema;
 mod finish_tiling;
 mod joins;
+mod net_coverage;
 mod sample;
 mod sets_kind;
 mod skin_kind;
@@ -75,6 +76,7 @@ pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
+pub use net_coverage::Coverage;
 pub use sets_kind::*;
 pub use skin_kind::*;
 pub use study_kind::*;
@@ -153,8 +155,10 @@ pub struct Tiled {
     pub explicit: bool,
     /// How it ends at the part's surface.
     pub ends: Ends,
-    /// The radius of the net's rods, or of rounded ends, mm.
-    pub radius: Option<f64>,
+    /// The least and the greatest radius of the net's rods, or of rounded ends, mm.
+    pub radii: Option<[f64; 2]>,
+    /// What the net covers.
+    pub coverage: Option<Coverage>,
     /// The solid fraction of the finished part, where the level was solved for it.
     pub finished: Option<f64>,
     /// The lattice as it ends.

@@ -28,8 +28,8 @@ pub use mesh_report::{
     VoidReport,
 };
 pub use tets_report::{
-    Creases, DihedralReport, FitReport, LayersMade, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport,
-    WallSpread, ZoneJoin, ZoneReport,
+    Creases, DihedralReport, FitReport, LayersMade, MinMeanMax, NetReport, TetMeshReport, TetQualityReport,
+    TilingReport, WallSpread, ZoneJoin, ZoneReport,
 };
 pub use volume_report::{BeamMeshReport, DomainReport, SetReport, ShellReport, VolumeReport, VoxelElementsReport};
 

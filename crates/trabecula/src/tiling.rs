@@ -9,6 +9,7 @@
 
 mod blended_share;
 mod crease;
+mod end_sizes;
 mod mixture;
 mod node_levels;
 mod ports;
@@ -30,7 +31,7 @@ use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm
 pub use crease::Creases;
 pub use node_levels::Amount;
 pub use ports::Ports;
-pub use rounded::{BLUNT, Rounded};
+pub use rounded::Rounded;
 pub use space_filling::SpaceFilling;
 use surface::Bending;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
@@ -115,19 +116,10 @@ impl Tiling {
 
     /// Several cells over a mesh.
     pub fn of(map: Arc<Tets>, cells: Vec<Share>, part: Part, level: Level) -> Tiling {
-        // |∇f| ≤ Σ amplitude 2π|h| in phase, times |du/dx|.
-        let own = cells.iter().map(|c| {
-            let waves = c.cell.series().terms().iter();
-            let sum: f64 = waves.map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from))).sum();
-            core::f64::consts::TAU * sum / c.scale
-        });
-        let own = own.fold(0.0, f64::max);
+        let steepest = steepest(&cells);
         let corners = cells[0].cell.corners();
         let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
-        // All tetrahedra of cells are regular: with edges of another length the Jacobian is that much larger.
-        let size = |s: &TetCell| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
-        let longest = cells.iter().map(|c| size(&c.cell)).fold(0.0, f64::max);
-        let more = longest / size(&cells[0].cell);
+        let edge = norm(along[0]);
         let of = |t: usize| {
             let slopes = map.slopes(t);
             // du/dx = Σ (p_i − p_4) ∇λ_iᵀ.
@@ -139,7 +131,7 @@ impl Tiling {
                 let most = c.cell.series().amplitude() / c.scale;
                 Some(most * map.steeper(t) * norm(linear_slope(map.slopes(t), w, map.tet(t))))
             };
-            own * more * spectral_norm(&j) * map.steeper(t) + cells.iter().filter_map(turn).sum::<f64>()
+            steepest / edge * spectral_norm(&j) * map.steeper(t) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
         Tiling {
@@ -362,6 +354,18 @@ impl Tiling {
         let edge = norm(geometry::math::sub(s.corners()[0], s.corners()[1]));
         self.map.mean_edge() / edge
     }
+}
+
+/// The bound of |∇f| in a regular tetrahedron, times its edge. |∇f| ≤ Σ amplitude 2π|h| in phase, times |du/dx|; all tetrahedra of cells
+/// are regular, and with edges of another length the Jacobian is that much larger.
+fn steepest(cells: &[Share]) -> f64 {
+    let own = cells.iter().map(|c| {
+        let waves = c.cell.series().terms().iter();
+        let sum: f64 = waves.map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from))).sum();
+        core::f64::consts::TAU * sum / c.scale
+    });
+    let edge = |c: &Share| norm(geometry::math::sub(c.cell.corners()[0], c.cell.corners()[3]));
+    own.fold(0.0, f64::max) * cells.iter().map(edge).fold(0.0, f64::max)
 }
 
 /// The gradient (per mm) of what is linear in the coordinates of a tetrahedron of these nodes, whose slopes are `m`.

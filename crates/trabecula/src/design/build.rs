@@ -6,8 +6,8 @@ use super::build_cell::cell;
 use super::data::*;
 use super::finish_tiling::Finished;
 use super::{
-    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin, build_tets,
-    build_tiling, sample, warn,
+    Built, Coverage, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin,
+    build_tets, build_tiling, sample, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
@@ -161,14 +161,19 @@ fn tiled(
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
+    let opening = domain.opening();
     let build_tiling::Made { done, alone, explicit, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
-    let Finished { tiling, placed, field, net, radius, fraction } = done;
+    let Finished { tiling, placed, field, net, radii, fraction: finished } = done;
+    let coverage = net.as_ref().map(|rods| Coverage::new(&tiling, rods));
+    if let Some(of) = &coverage {
+        of.warn(opening, &format!("{}.map.tets.surface", environment.path), warnings);
+    }
     let (name, ends) = (domain.name.to_string(), domain.ends());
     let mesh = domain.report;
     Ok((
-        Tiled { name, tiling, placed, zones, mesh, alone, explicit, joins, ends, radius, finished: fraction, field },
-        net,
+        Tiled { name, tiling, placed, zones, mesh, alone, explicit, joins, ends, radii, coverage, finished, field },
+        net.map(|rods| rods.solid),
     ))
 }
 

@@ -48,6 +48,11 @@ impl Domain<'_> {
     pub fn ends(&self) -> Ends {
         self.joined.surface
     }
+
+    /// The widest opening (mm) that its net may have.
+    pub fn opening(&self) -> Option<f64> {
+        self.joined.net.as_ref().and_then(|net| net.opening)
+    }
 }
 
 /// How a mesh fits the region.

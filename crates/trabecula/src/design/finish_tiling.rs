@@ -3,18 +3,16 @@
 use std::sync::Arc;
 
 use super::sample;
-use super::surface_net::Net;
-use crate::cell::Part;
-use crate::csg_tree::CsgSolid;
+use super::surface_net::{Net, Rods};
 use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::implicit::Implicit;
 use crate::kind::DesignError;
 use crate::map::{Ends, Joined};
 use crate::region::{Notes, Region};
-use crate::tiling::{BLUNT, Rounded, Tiling};
+use crate::tiling::{Rounded, Tiling};
 use geometry::fault::number;
-use geometry::math::Vec3;
+use geometry::math::{Vec3, add, scale, sub};
 use geometry::progress::checkpoint;
 
 /// Points at which the finished part is sampled; spread evenly, their share is within about 0.0005.
@@ -24,6 +22,8 @@ const ROUNDS: usize = 12;
 const NEAR: f64 = 2e-4;
 /// The first change of the level, as a share of it.
 const NUDGE: f64 = 0.02;
+/// How far below the surface it is decided what is solid there, as a share of the way to the middle of a tetrahedron.
+const BELOW: f64 = 1e-3;
 /// By how much the finished part may have more than was asked for.
 const OFF: f64 = 5e-3;
 
@@ -35,9 +35,9 @@ pub(super) struct Finished {
     /// The lattice as it ends, by position.
     pub field: Arc<dyn Implicit>,
     /// The net that ties its ports.
-    pub net: Option<CsgSolid>,
-    /// The radius of the net's rods, or of rounded ends, mm.
-    pub radius: Option<f64>,
+    pub net: Option<Rods>,
+    /// The least and the greatest radius of the net's rods, or of rounded ends, mm.
+    pub radii: Option<[f64; 2]>,
     /// The solid fraction of the finished part, where it is another than that of the flat tetrahedra.
     pub fraction: Option<f64>,
 }
@@ -46,7 +46,7 @@ pub(super) struct Finished {
 pub(super) struct Finish<'a> {
     ends: Ends,
     region: Region,
-    /// The radius as given.
+    /// The radius of the net's rods as given.
     radius: Option<f64>,
     on: Option<Region>,
     environment: &'a Environment<'a>,
@@ -89,7 +89,7 @@ impl<'a> Finish<'a> {
     /// kept solid if `whole`.
     pub fn made(&self, tiling: Tiling, asked: Option<f64>, whole: bool) -> Result<Finished, DesignError> {
         let net = match self.ends {
-            Ends::Net => Some(self.net(&tiling)?),
+            Ends::Net => Some(Arc::new(self.net(&tiling)?)),
             _ => None,
         };
         let Some(asked) = asked else {
@@ -103,8 +103,8 @@ impl<'a> Finish<'a> {
         // A net of a given radius is the same at every level.
         let fixed = net.as_ref().zip(self.radius);
         if let Some((net, radius)) = fixed {
-            let rods = self.rods(net, radius)?;
-            fill(&mut kept, &points, |p, out| rods.values(p, out));
+            let rods = self.rods(net, &tiling.given_radii(radius))?;
+            fill(&mut kept, &points, |p, out| rods.solid.values(p, out));
         }
         let share_of = |solid: &[bool]| solid.iter().filter(|s| **s).count() as f64 / points.len() as f64;
         if share_of(&kept) > asked + OFF {
@@ -123,7 +123,7 @@ impl<'a> Finish<'a> {
             let mut solid = kept.clone();
             fill(&mut solid, &points, |p, out| made.field.values(p, out));
             if let (Some(rods), None) = (&made.net, fixed) {
-                fill(&mut solid, &points, |p, out| rods.values(p, out));
+                fill(&mut solid, &points, |p, out| rods.solid.values(p, out));
             }
             let found = share_of(&solid);
             if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
@@ -199,48 +199,68 @@ impl<'a> Finish<'a> {
         let mut solid = vec![false; points.len()];
         fill(&mut solid, &points, |p, out| made.field.values(p, out));
         if let Some(rods) = &made.net {
-            fill(&mut solid, &points, |p, out| rods.values(p, out));
+            fill(&mut solid, &points, |p, out| rods.solid.values(p, out));
         }
         let fraction = solid.iter().filter(|s| **s).count() as f64 / points.len() as f64;
         Ok(Finished { fraction: Some(fraction), ..made })
     }
 
-    /// The middle lines of the net.
+    /// The middle lines of the net: on the faces of the boundary that are chosen, where no skin or keep zone ties the ports anyway.
     fn net(&self, tiling: &Tiling) -> Result<Net, DesignError> {
-        let ports = tiling.ports().0;
-        let net = Net::new(&tiling.map, &self.region, &ports, self.on.as_ref());
-        net.ok_or_else(|| {
+        let map = &tiling.map;
+        let all = map.boundary_faces();
+        let third = |(t, f): &(usize, [usize; 3])| {
+            let c = map.corners(*t);
+            scale(f.iter().fold([0.0; 3], |s, i| add(s, c[*i])), 1.0 / 3.0)
+        };
+        let chosen = |i: &usize| self.on.as_ref().is_none_or(|on| on.value(third(&all[*i])) < 0.0);
+        let on: Vec<usize> = (0..all.len()).filter(chosen).collect();
+        if on.is_empty() {
             let message =
                 "no triangle of the mesh's boundary has its middle in this region; make it reach over the surface";
-            DesignError::new(format!("{}.net.on", self.map), message)
-        })
+            return Err(DesignError::new(format!("{}.net.on", self.map), message));
+        }
+        let corners = |(t, f): &(usize, [usize; 3])| {
+            let c = map.corners(*t);
+            let middle = scale(c.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
+            let below = |p: Vec3| add(p, scale(sub(middle, p), BELOW));
+            [c[f[0]], c[f[1]], c[f[2]], third(&(*t, *f))].map(below)
+        };
+        let points: Vec<Vec3> = on.iter().flat_map(|i| corners(&all[*i])).collect();
+        let mut tied = vec![false; points.len()];
+        self.environment.filled.iter().for_each(|body| fill(&mut tied, &points, |p, out| body.values(p, out)));
+        let open = on.iter().zip(tied.chunks(4)).filter(|(_, solid)| solid.iter().any(|s| !s)).map(|(i, _)| *i);
+        let open: Vec<usize> = open.collect();
+        if open.is_empty() {
+            let message = "the skin or a keep zone is solid wherever the net would be, and ties the ports without it; leave the net out \
+                           (surface = \"capped\"), or leave the skin open where it is wanted";
+            return Err(DesignError::new(format!("{}.surface", self.map), message));
+        }
+        Ok(Net::new(map, &self.region, &tiling.ports(), open))
     }
 
-    fn rods(&self, net: &Net, radius: f64) -> Result<CsgSolid, DesignError> {
-        net.solid(radius).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))
+    fn rods(&self, net: &Arc<Net>, of: &[f64]) -> Result<Rods, DesignError> {
+        if of.iter().all(|r| r.is_nan() || *r <= 0.0) {
+            let message = "the cell has no ports on the surface at this level, so there is nothing for the net to tie; ask for a higher \
+                           fraction, take another cell, or give net.radius";
+            return Err(DesignError::new(format!("{}.net", self.map), message));
+        }
+        net.rods(of).map_err(|f| DesignError::new(format!("{}.net", self.map), f.message))
     }
 
     /// The lattice with its ends at its own level.
-    fn finished(&self, tiling: Arc<Tiling>, net: Option<&Net>) -> Result<Finished, DesignError> {
-        let sheet = || tiling.thickness().map(|w| w.mean);
+    fn finished(&self, tiling: Arc<Tiling>, net: Option<&Arc<Net>>) -> Result<Finished, DesignError> {
         let (field, placed) = (tiling.clone(), tiling.clone());
-        let plain = Finished { tiling: tiling.clone(), placed, field, net: None, radius: None, fraction: None };
+        let plain = Finished { tiling: tiling.clone(), placed, field, net: None, radii: None, fraction: None };
         match (self.ends, net) {
             (Ends::Net, Some(net)) => {
-                // Half a rod has the area of a port, or is as deep as a wall is thick.
-                let own = || {
-                    if tiling.part == Part::Sheet { sheet() } else { None }.unwrap_or(2f64.sqrt() * tiling.ports().1)
-                };
-                let radius = self.radius.unwrap_or_else(own);
-                Ok(Finished { net: Some(self.rods(net, radius)?), radius: Some(radius), ..plain })
+                let of = self.radius.map_or_else(|| tiling.rod_radii(), |radius| tiling.given_radii(radius));
+                let rods = self.rods(net, &of)?;
+                Ok(Finished { radii: Some(rods.range()), net: Some(rods), ..plain })
             }
             (Ends::Rounded, _) => {
-                let own = if tiling.part == Part::Sheet { sheet().map(|w| BLUNT * 0.5 * w) } else { None };
-                let radius = own.unwrap_or_else(|| tiling.ports().1);
-                let field = Arc::new(Rounded::new(&tiling, &self.region, radius));
-                // Each wall has a radius of its own: the mean is reported where that is known.
-                let known = if tiling.part == Part::Sheet { own } else { Some(radius) };
-                Ok(Finished { field, radius: known, ..plain })
+                let rounded = Rounded::new(&tiling, &self.region);
+                Ok(Finished { radii: Some(rounded.end_radii()), field: Arc::new(rounded), ..plain })
             }
             _ => Ok(plain),
         }

@@ -38,7 +38,7 @@ impl TiledCell {
         let wall = match part {
             Part::Sheet => made.thickness().map(|w| w.min),
             // Without ports there is no neck.
-            _ => Some(2.0 * made.ports().1).filter(|w| *w > 0.0),
+            _ => Some(2.0 * made.port_radius()).filter(|w| *w > 0.0),
         };
         let edges = [0, 1, 2].map(|a| [0, 1, 2].map(|b| if a == b { edge } else { 0.0 }));
         let field: Arc<dyn Implicit> = match SpaceFilling::of(&made, edge) {

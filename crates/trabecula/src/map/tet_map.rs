@@ -368,16 +368,20 @@ impl Tets {
         out
     }
 
-    /// The nodes of the faces on the boundary, counter-clockwise seen from outside.
-    pub(crate) fn boundary_nodes(&self) -> Vec<[u32; 3]> {
+    /// The faces on the boundary, counter-clockwise seen from outside: of which tetrahedron, and which of its corners.
+    pub(crate) fn boundary_faces(&self) -> Vec<(usize, [usize; 3])> {
         let mut out = Vec::new();
         for t in 0..self.len() {
             for (_, f) in FACES.iter().enumerate().filter(|f| self.across[t][f.0] == NONE) {
-                let f = f.map(|i| self.tets[t][i]);
-                out.push(if self.flipped[t] { [f[0], f[2], f[1]] } else { f });
+                out.push((t, if self.flipped[t] { [f[0], f[2], f[1]] } else { *f }));
             }
         }
         out
+    }
+
+    /// The nodes of the faces on the boundary, in their order.
+    pub(crate) fn boundary_nodes(&self) -> Vec<[u32; 3]> {
+        self.boundary_faces().into_iter().map(|(t, f)| f.map(|i| self.tets[t][i])).collect()
     }
 
     /// Barycentric coordinates of a point with respect to a tetrahedron as it is bent.

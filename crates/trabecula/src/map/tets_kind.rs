@@ -132,10 +132,13 @@ impl Ends {
 /// A net on the part's surface that ties the ports of a lattice.
 #[derive(Clone, Debug, Default, PartialEq, Kind)]
 pub struct NetSpec {
-    /// Radius of its rods, whose middles are on the surface, so that half of each is in the part; of the area of the lattice's own
-    /// ports unless given.
+    /// Radius of its rods, whose middles are on the surface, so that half of each is in the part; less where tetrahedra are so small that
+    /// it would close the openings. Of the area of the ports there, from place to place, unless given.
     #[kind(unit = "mm", above = 0.0)]
     pub radius: Option<f64>,
+    /// The widest opening that it may have, of which a warning says if one is wider.
+    #[kind(unit = "mm", above = 0.0)]
+    pub opening: Option<f64>,
     /// Where it is: on triangles of the boundary whose middles are in this region; everywhere unless given.
     pub on: Option<RegionKind>,
 }

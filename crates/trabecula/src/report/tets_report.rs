@@ -251,7 +251,9 @@ pub struct TilingReport {
     /// How the lattice ends at the part's surface: capped, open, net or rounded.
     pub surface: &'static str,
     /// Radius of the net's rods, or of rounded ends, mm; None with flat ends.
-    pub end_radius: Option<f64>,
+    pub end_radius: Option<Varying>,
+    /// What the net covers; None without one.
+    pub net: Option<NetReport>,
     /// Thickness of the walls, mm; None for networks and for zones.
     pub thickness: Option<WallSpread>,
     /// Number of ports on each face of a tetrahedron; None for zones.
@@ -260,6 +262,19 @@ pub struct TilingReport {
     pub face_fraction: Option<Varying>,
     /// Angles between walls at faces of tetrahedra; None where there are none.
     pub creases: Option<Creases>,
+}
+
+/// What the net on a part's surface covers.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct NetReport {
+    /// Number of ports where it is.
+    pub ports: usize,
+    /// Number of those that no rod reaches.
+    pub untied: usize,
+    /// Diameter of the largest disc on the surface between its rods, mm.
+    pub opening: f64,
+    /// Middle of that disc, mm.
+    pub opening_at: [f64; 3],
 }
 
 /// A zone of a tetrahedral mesh.

@@ -6,7 +6,7 @@
 use super::{Level, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
-use geometry::math::{Vec3, cross, norm, sub};
+use geometry::math::{cross, norm, sub};
 use geometry::union_find::{find, unite};
 
 /// Steps along an edge of a face on which its trace is found.
@@ -107,27 +107,47 @@ impl Ports {
     }
 }
 
+impl Ports {
+    /// The radius of the circle in an opening between its lines and edges, in edges of a regular triangle.
+    pub(super) fn opening(&self) -> f64 {
+        let (lines, edges) = self.lines();
+        match (lines.is_empty(), edges) {
+            // Triangles.
+            (true, _) => 3f64.sqrt() / 6.0,
+            // Hexagons about nodes.
+            (false, false) => 0.5,
+            // Kites from a node to the middle of a triangle.
+            (false, true) => 0.25 * (3f64.sqrt() - 1.0),
+        }
+    }
+}
+
 impl Tiling {
-    /// The ports at the mean level, and the radius (mm) of a disc of a port's area on a mean face of the boundary; where cells are mixed
-    /// those of the first at the fraction of the whole, tied along edges too.
-    pub fn ports(&self) -> (Ports, f64) {
+    /// The ports at the mean level; where cells are mixed those of the first at the fraction of the whole, tied along edges too.
+    pub fn ports(&self) -> Ports {
         let cell = &self.cells[0];
-        let ports = if self.cells.len() == 1 {
-            let levels = self.levels();
-            Ports::new(&cell.cell, self.part, 0.5 * (levels.lo + levels.hi) * cell.scale)
-        } else {
-            let (volume, solid) = self.volumes();
-            Ports { at_edges: true, ..Ports::new(&cell.cell, self.part, cell.cell.iso(self.part, solid / volume)) }
-        };
-        let at = |n: u32| self.map.nodes()[n as usize];
+        if self.cells.len() == 1 {
+            return Ports::new(&cell.cell, self.part, self.mean_level() * cell.scale);
+        }
+        let (volume, solid) = self.volumes();
+        Ports { at_edges: true, ..Ports::new(&cell.cell, self.part, cell.cell.iso(self.part, solid / volume)) }
+    }
+
+    /// The radius (mm) of a disc of a port's area on a mean face of the boundary.
+    pub fn port_radius(&self) -> f64 {
         let faces = self.map.boundary_nodes();
         let area = |f: &[u32; 3]| {
-            let [a, b, c]: [Vec3; 3] = f.map(at);
+            let [a, b, c] = f.map(|n| self.map.nodes()[n as usize]);
             0.5 * norm(cross(sub(b, a), sub(c, a)))
         };
         let mean = faces.iter().map(area).sum::<f64>() / faces.len().max(1) as f64;
-        let radius = (ports.area * mean / core::f64::consts::PI).sqrt();
-        (ports, radius)
+        (self.ports().area * mean / core::f64::consts::PI).sqrt()
+    }
+
+    /// Whether points of a tetrahedron are solid, by its own coordinates.
+    pub fn solid_in(&self, t: usize, at: &[Bary]) -> Vec<bool> {
+        let at: Vec<(usize, Bary)> = at.iter().map(|l| (t, *l)).collect();
+        self.known_in(&at).into_iter().map(|k| self.cut.value(k.f, k.t) <= 0.0).collect()
     }
 
     /// The tiling with its surface moved: solid where its field was at most `by`. The half-level of a sheet stays positive.

@@ -4,28 +4,36 @@
 //! intersection max(a, b) becomes min(max(a, b), −r) + |(max(a + r, 0), max(b + r, 0))|: within r of both surfaces the solid ends on a
 //! quarter circle of radius r. A strut of that radius ends in a half ball, the edge of a wall 2r thick in a half circle.
 //!
+//! *Radii follow the lattice.* A strut is thinner in smaller and in flatter tetrahedra, where the lattice's function is steeper in proportion,
+//! and at lower levels: its radius is that of a port of a regular tetrahedron that is as steep. So is that of a wall.
+//!
 //! *No surface is tangent to another.* Of a sheet both sides are rounded, and as half circles they would meet in their common tangent, which
 //! is the region's face besides: what is cut there is decided by rounding. So r is a little more than half the wall at every place, the sides
 //! meet in an obtuse ridge, and b is taken a little less deep than it is: what is rounded ends before the face.
 
 use std::sync::Arc;
 
-use super::{Level, Tiling};
+use super::{Level, Share, Tiling};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::implicit::Implicit;
+use crate::map::Tets;
 use crate::map::curved_tets::within;
 use crate::region::Region;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
+use geometry::tetmesh::TetMesh;
 
 /// Values within this share of the cell's range are near the surface.
 const NEAR: f64 = 0.04;
+
+/// Points at which steepness is looked for.
+const SAMPLES: usize = 40_000;
 
 /// By how much a tetrahedron may be steeper than the mean of those about a node: more it is where one is much smaller or flatter than the rest.
 const SPREAD: f64 = 2.0;
 
 /// The radius of a wall's end over half the wall, more than one, so that its sides meet at an angle of 2 acos(1 − 1/1.2), 160°.
-pub const BLUNT: f64 = 1.2;
+const BLUNT: f64 = 1.2;
 
 /// How far below the region's surface what is rounded ends, in radii.
 const BELOW: f64 = 0.01;
@@ -36,18 +44,20 @@ pub struct Rounded {
     of: Arc<dyn Implicit>,
     region: Region,
     radius: Radius,
+    /// The least and the greatest radius, mm.
+    radii: Interval,
     /// The steepness (per mm) of the lattice at its surface.
     steepness: Steepness,
     parts: Vec<Arc<dyn Implicit>>,
 }
 
 /// The radius of ends.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 enum Radius {
-    /// The same everywhere, mm.
-    Same(f64),
-    /// That of walls, of which the least and the greatest, mm.
-    OfWalls(Interval),
+    /// That of struts at the nodes of the mesh, mm.
+    OfStruts(Arc<Vec<f64>>),
+    /// That of walls.
+    OfWalls,
 }
 
 /// |∇f| at the surface, as it varies with the size of tetrahedra.
@@ -63,9 +73,10 @@ impl Steepness {
         let width = (range.hi - range.lo) / tiling.cells[0].scale;
         // The mean at points near the surface, in units of the bound of each tetrahedron.
         let step = tiling.map.len().div_ceil(200).max(1);
+        let count = SAMPLES / tiling.map.len().clamp(1, 200);
         let mut ratios = Vec::new();
         for t in (0..tiling.map.len()).step_by(step) {
-            let known = tiling.known(&tiling.points_in(t, 200));
+            let known = tiling.known(&tiling.points_in(t, count));
             let near = known.iter().filter(|k| tiling.cut.value(k.f, k.t).abs() < NEAR * width);
             ratios.extend(near.map(|k| norm(k.slope) / tiling.lipschitz[t]));
         }
@@ -83,40 +94,58 @@ impl Steepness {
         Steepness { tiling: tiling.clone(), at_nodes: Arc::new(sums.into_iter().map(mean).collect()) }
     }
 
-    /// The steepness, and the level over it.
-    fn at(&self, p: Vec3) -> [f64; 2] {
-        let (t, l) = self.tiling.map.locate(p);
-        let l = within(l, 0.0);
-        let steep = self.tiling.linear(&self.at_nodes, t, l);
-        [steep, self.tiling.level_at(t, l) / steep]
-    }
-
-    /// The least and the greatest level over the steepness: between nodes it is a mean of theirs.
-    fn levels(&self) -> Interval {
-        let level = |n: usize| match &self.tiling.level {
+    /// The steepness and the level at a node.
+    fn of_node(&self, n: usize) -> [f64; 2] {
+        let level = match &self.tiling.level {
             Level::Same(t) => *t,
             Level::Nodes(of) => of[n],
         };
-        let of: Vec<f64> = self.at_nodes.iter().enumerate().map(|(n, steep)| level(n) / steep).collect();
-        self.tiling.used(&of)
+        [self.at_nodes[n], level]
+    }
+
+    /// The steepness in a regular tetrahedron with edge 1, of the first cell.
+    fn of_regular(&self) -> f64 {
+        let half = 0.5f64.sqrt();
+        let nodes = vec![[0.0; 3], [0.0, half, half], [half, 0.0, half], [half, half, 0.0]];
+        let regular = TetMesh { nodes, tets: vec![[0, 1, 2, 3]], zones: Vec::new() };
+        // It is a mesh.
+        let Ok(map) = Tets::new(&regular, 0.0) else { return 1.0 };
+        let cell = Share { weights: None, ..self.tiling.cells[0].clone() };
+        let level = Level::Same(self.tiling.mean_level());
+        Steepness::new(&Arc::new(Tiling::of(Arc::new(map), vec![cell], self.tiling.part, level))).at_nodes[0]
+    }
+
+    /// The radius of a port at each node, mm.
+    fn of_struts(&self) -> Vec<f64> {
+        let tiling = &self.tiling;
+        let ports = tiling.port_areas(tiling.ports().area);
+        // Of a regular tetrahedron with edge 1: its steepness, and the area of its faces over π.
+        let (steep, face) = (self.of_regular(), 3f64.sqrt() / (4.0 * core::f64::consts::PI));
+        ports.iter().zip(self.at_nodes.iter()).map(|(share, own)| (share * face).sqrt() * steep / own).collect()
     }
 }
 
 impl Rounded {
-    /// A lattice in a region with its ends rounded: to a radius (mm), or to that of its walls if it is a sheet.
-    pub fn new(tiling: &Arc<Tiling>, region: &Region, radius: f64) -> Rounded {
+    /// A lattice in a region with its ends rounded, to the radii of its struts or walls.
+    pub fn new(tiling: &Arc<Tiling>, region: &Region) -> Rounded {
         let steepness = Steepness::new(tiling);
-        let radius = match tiling.part {
+        let (radius, at_nodes) = match tiling.part {
             Part::Sheet => {
-                let of = steepness.levels();
-                Radius::OfWalls(Interval::new(BLUNT * of.lo, BLUNT * of.hi))
+                let of = |n: usize| steepness.of_node(n);
+                (Radius::OfWalls, (0..tiling.map.nodes().len()).map(of).map(|[s, t]| BLUNT * t / s).collect())
             }
-            _ => Radius::Same(radius),
+            _ => {
+                let of = Arc::new(steepness.of_struts());
+                (Radius::OfStruts(of.clone()), of.to_vec())
+            }
         };
+        // Between nodes they are means of theirs.
+        let radii = tiling.used(&at_nodes);
         let one = |of: Arc<dyn Implicit>, parts| Rounded {
             of,
             region: region.clone(),
-            radius,
+            radius: radius.clone(),
+            radii,
             steepness: steepness.clone(),
             parts,
         };
@@ -125,12 +154,29 @@ impl Rounded {
         one(tiling.clone(), parts)
     }
 
+    /// The least and the greatest radius at the surface, mm.
+    pub fn end_radii(&self) -> [f64; 2] {
+        let Steepness { tiling, .. } = &self.steepness;
+        let radius = |n: u32| match &self.radius {
+            Radius::OfStruts(of) => of[n as usize],
+            Radius::OfWalls => {
+                let [steep, level] = self.steepness.of_node(n as usize);
+                BLUNT * level / steep
+            }
+        };
+        let nodes = tiling.map.boundary_nodes().into_iter().flatten();
+        nodes.map(radius).fold([f64::INFINITY, 0.0], |[lo, hi], r| [lo.min(r), hi.max(r)])
+    }
+
     /// The steepness and the radius at a point.
     fn at(&self, p: Vec3) -> [f64; 2] {
-        let [steep, level] = self.steepness.at(p);
-        match self.radius {
-            Radius::Same(r) => [steep, r],
-            Radius::OfWalls(_) => [steep, BLUNT * level],
+        let Steepness { tiling, at_nodes, .. } = &self.steepness;
+        let (t, l) = tiling.map.locate(p);
+        let l = within(l, 0.0);
+        let steep = tiling.linear(at_nodes, t, l);
+        match &self.radius {
+            Radius::OfStruts(of) => [steep, tiling.linear(of, t, l)],
+            Radius::OfWalls => [steep, BLUNT * tiling.level_at(t, l) / steep],
         }
     }
 }
@@ -170,10 +216,7 @@ impl Field for Rounded {
         let (of, region) = (self.of.bound(b), self.region.bound(b));
         let steep = self.steepness.at_nodes.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
         // The function rises with both, and with the radius.
-        let r = match self.radius {
-            Radius::Same(r) => Interval::new(r, r),
-            Radius::OfWalls(of) => of,
-        };
+        let r = self.radii;
         let low = if of.lo < 0.0 { of.lo / steep.0 } else { of.lo / steep.1 };
         let high = if of.hi < 0.0 { of.hi / steep.1 } else { of.hi / steep.0 };
         Interval::new(joined(r.lo, low, region.lo).0, joined(r.hi, high, region.hi).0)
@@ -182,7 +225,7 @@ impl Field for Rounded {
 
 impl Implicit for Rounded {
     fn lipschitz(&self) -> f64 {
-        let Steepness { tiling, at_nodes } = &self.steepness;
+        let Steepness { tiling, at_nodes, .. } = &self.steepness;
         let least =
             |t: usize| tiling.map.tet(t).map(|n| at_nodes[n as usize]).into_iter().fold(f64::INFINITY, f64::min);
         (0..tiling.map.len()).map(|t| tiling.lipschitz[t] / least(t)).fold(1.0, f64::max)

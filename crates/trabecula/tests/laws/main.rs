@@ -40,5 +40,6 @@ mod tiling_amounts;
 mod tiling_curved;
 mod tiling_ends;
 mod tiling_fields;
+mod tiling_net;
 mod walls;
 mod wavelength;
