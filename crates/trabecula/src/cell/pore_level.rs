@@ -11,6 +11,8 @@ const NEAR: f64 = 1e-6;
 
 /// Share of the diameter that a pore may be off.
 const MET: f64 = 1e-3;
+/// The same to either side of a step that is no jump of the void's.
+const UNEVEN: f64 = 0.01;
 
 /// Why no level has a pore: the greatest or the least (mm) that the cell has.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +113,11 @@ impl Cell {
             }
             if lo.1 <= (1.0 + MET) * pore {
                 return Ok(sign * lo.0);
+            }
+            // Where the pass is found on the grid alone, pores are uneven; the void is there on both sides of such a step.
+            if lo.1 < (1.0 + UNEVEN) * pore && hi.1 > (1.0 - UNEVEN) * pore {
+                let nearest = if lo.1 - pore < pore - hi.1 { lo.0 } else { hi.0 };
+                return Ok(sign * nearest);
             }
             fewest = fewest.min(lo.1);
         }

@@ -183,6 +183,10 @@ fn designs_have_the_pore_asked_for() {
     assert!((number(slabs(0.06).expect("built").report().lattices["core"].pore) - 0.06).abs() < 1e-4);
     let refused = slabs(0.001).err().expect("refused").to_string();
     assert!(refused.contains("at least") && refused.contains("smaller wavelength"), "{refused}");
+    // A step of the pore, where the pass is found on the grid alone, is no end of what the cell has.
+    let stepped =
+        built("cell = \"diamond\"\npart = \"sheet\"\nmap.affine.wavelength = 3\nlevel.pore = 0.6").expect("built");
+    assert!((number(stepped.report().lattices["core"].pore) - 0.6).abs() < 0.006);
     // An even wall of thickness w takes w from the pore of its bare mid-surface.
     let pore = |w: f64| {
         let made =
