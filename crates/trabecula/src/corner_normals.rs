@@ -103,7 +103,8 @@ mod tests {
         let rings = n / 2;
         let top = height.acos();
         for ring in 0..=rings {
-            let polar = std::f64::consts::PI - (std::f64::consts::PI - top) * (ring as f64 + 0.3) / (rings as f64 + 0.3);
+            let polar =
+                std::f64::consts::PI - (std::f64::consts::PI - top) * (ring as f64 + 0.3) / (rings as f64 + 0.3);
             for k in 0..n {
                 let (s, c) = (std::f64::consts::TAU * k as f64 / n as f64).sin_cos();
                 made.mesh.vertices.push([polar.sin() * c, polar.sin() * s, polar.cos()]);
@@ -125,13 +126,13 @@ mod tests {
     }
 
     proptest! {
-        /// Of a coarse cap the normals are radial, to rounding but at the rim, there as far as a corner is moved; those of the disc are
+        /// Of a coarse cap the normals are radial, to rounding but at the edge, there up to what a corner is moved by; those of the disc are
         /// its own. A field that is not the surface's says nothing.
         #[test]
         fn normals_are_those_of_the_field_on_either_side_of_an_edge(height in -0.7..0.7f64, n in 32usize..64) {
             let (cap, surface) = (Cap { height, sign: 1.0 }, surface(height, n));
             let normals = corner_normals(&cap, &surface);
-            let rim = |p: Vec3| (p[2] - height).abs() < 1e-9;
+            let at_edge = |p: Vec3| (p[2] - height).abs() < 1e-9;
             // Sides of triangles are at most π / (n / 2) by 2 π / n long, and middles nearer than two thirds of their diagonals.
             let moved = INWARDS * 2.0 / 3.0 * std::f64::consts::TAU / n as f64 * std::f64::consts::SQRT_2;
             for (i, found) in normals.iter().enumerate() {
@@ -139,7 +140,7 @@ mod tests {
                 let found = found.map(f64::from);
                 let (want, off) = match surface.cut[i / 3] {
                     true => ([0.0, 0.0, 1.0], 1e-6),
-                    false if rim(p) => (p, moved),
+                    false if at_edge(p) => (p, moved),
                     false => (p, 1e-6),
                 };
                 prop_assert!(norm(sub(found, want)) <= off, "{found:?} {want:?} {off}");

@@ -39,7 +39,7 @@ pub enum Projection {
 pub(super) struct Camera {
     pub center: Vec3,
     pub axes: [Vec3; 3],
-    /// Distance from the centre (mm); of parallel rays, that of the plane which depths are told from.
+    /// Distance from the centre (mm); of parallel rays, that of the plane from which depths are measured.
     pub distance: f64,
     /// Samples per unit of slope: in the depth of the centre, `distance` mm are as many samples.
     pub focal: f64,

@@ -75,7 +75,7 @@ impl SeenMarks {
         for (k, end) in self.arms.iter().flatten().enumerate() {
             let to = [origin[0] + end[0], origin[1] - end[1]];
             made.arms.push((origin, to, LINES[k]));
-            // The letter stands off the end of its arm, or beside it where the arm is seen from its end.
+            // The letter stands off the end of its arm, or to its left where the arm is seen from its end.
             let long = end[0].hypot(end[1]);
             let off = if long > 0.2 * ARM { end.map(|c| c / long * 0.75) } else { [-0.65, -0.65] };
             let at = [to[0] + off[0], to[1] - off[1] - 0.5];
