@@ -70,7 +70,6 @@ fn directions(field: &dyn Field, points: &[Vec3]) -> Vec<Vec3> {
 mod tests {
     use super::*;
     use geometry::math::{Aabb, Interval};
-    use geometry::mesh::Mesh;
     use proptest::prelude::*;
 
     /// The part of a ball of radius 1 about the origin below a height; turned inside out by a sign of −1.
