@@ -114,7 +114,7 @@ impl<'a> Shader<'a> {
             Finish::Plain if cut => CUT,
             Finish::Plain => LATTICE,
         };
-        let (sun, open) = self.light([x, y], near, p, flat);
+        let (sun, open) = self.light([x, y], near, p, n);
         lit([n, eye, self.key], sun, camera, colour, open, cut)
     }
 
@@ -128,10 +128,11 @@ impl<'a> Shader<'a> {
         lit([section.normal, eye, self.key], sun, self.camera, colour, open, true)
     }
 
-    /// The shares of the key light and of the sky that reach a point of a face of normal `flat`.
-    fn light(&self, [x, y]: [usize; 2], near: f32, p: Vec3, flat: Vec3) -> (f32, f32) {
+    /// The shares of the key light and of the sky that reach a point of a surface of normal `n`: the one that is shaded by, so that no facets
+    /// show where the key light grazes.
+    fn light(&self, [x, y]: [usize; 2], near: f32, p: Vec3, n: Vec3) -> (f32, f32) {
         match &self.shade {
-            Some((shadows, occlusion)) => (shadows.light(p, flat), occlusion.open(x, y, near)),
+            Some((shadows, occlusion)) => (shadows.light(p, n), occlusion.open(x, y, near)),
             None => (1.0, 1.0),
         }
     }
