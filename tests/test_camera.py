@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from trabecula.camera import VIEWS, section_plane, towards
 from trabecula.turntable import SIGNATURE, animated
 
@@ -89,6 +91,40 @@ def test_a_cube_that_is_cut_shows_its_section(cube):
     assert red(whole) == red(other) == 0 and 0 <= rectangle - red(cut) <= 2 * (np.ptp(ys) + np.ptp(xs)) and red(cut) > 4000
 
 
+def test_parallel_rays_draw_to_scale(cube):
+    """A square of 4 mm fills 92 % of the height, seen from the top, in whatever depth a section shows it."""
+    low = lt.Mesh.of(cube.vertices * [1, 1, 3], cube.triangles)
+    for mesh in (cube, low):
+        png = mesh.png((200, 160), *VIEWS["top"], background="white", projection="orthographic", section="z=3.9")
+        _, (seen,) = read(png)
+        ys, xs = np.nonzero((seen[..., 0].astype(int) - seen[..., 1]) > 60)
+        assert abs(np.ptp(xs) + 1 - 0.92 * 160) <= 1 and abs(np.ptp(ys) + 1 - 0.92 * 160) <= 1
+    with pytest.raises(ValueError, match="scale_bar needs an orthographic projection"):
+        cube.png(scale_bar=True)
+    with pytest.raises(ValueError, match="projection is 'flat'; it must be one of perspective, orthographic"):
+        cube.png(projection="flat")
+    with pytest.raises(ValueError, match="elevation is 200"):
+        cube.png(elevation=200)
+    with pytest.warns(lt.DesignWarning, match="80 × 60 pixels is too small for legend, scale bar or axes"):
+        cube.png((80, 60), axes=True)
+    with pytest.warns(lt.DesignWarning, match="too small for its legend"):
+        cube.png((80, 60), color=np.arange(8.0))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2), st.booleans(), st.floats(-80, 80), st.floats(-80, 80), st.booleans())
+def test_a_section_in_a_face_is_hatched_as_a_whole_and_one_outside_is_refused(cube, axis, far, azimuth, elevation, parallel):
+    look = {"projection": "orthographic" if parallel else "perspective"}
+    name, place = "xyz"[axis], 4 if far else 0
+    eye = (azimuth + 180 * (axis == 0 and not far) + (90 if far else -90) * (axis == 1), elevation)
+    eye = eye if axis < 2 else (azimuth, (5 + abs(elevation)) * (1 if far else -1))
+    at, inside = (read(cube.png((160, 120), *eye, section=f"{name}={v}", **look))[1][0] for v in (place, abs(place - 0.004)))
+    assert abs(int(red(at)) - int(red(inside))) <= 0.02 * red(inside) + 8
+    for text in (f"{name}=100", f"{name}<100", f"{name}>100", f"{name}=-1"):
+        with pytest.raises(ValueError, match=rf"the mesh lies from 0 to 4 mm along {name}"):
+            cube.png((40, 30), section=text)
+
+
 def test_a_turntable_is_its_pictures(cube, tmp_path):
     frames = [cube.png((40, 30), azimuth, 20) for azimuth in (0, 90, 180)]
     control, pictures = read(animated(frames, 1.5))
@@ -102,4 +138,6 @@ def test_a_turntable_is_its_pictures(cube, tmp_path):
     # The same side is kept all round: the section is seen from the front and not from behind.
     assert len(pictures) == 4 and red(pictures[0]) > 100 and red(pictures[2]) == 0
     mistaken = in_process("render", tmp_path / "cube.stl", "-o", tmp_path / "a.png", "--section", "w=2", status=1)
+    for wrong in (["--seconds", 3], ["--elevation", 200], ["--scale-bar"]):
+        in_process("render", tmp_path / "cube.stl", "-o", tmp_path / "a.png", *wrong, status=2)
     assert mistaken == "" and not (tmp_path / "a.png").exists()

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
+from test_camera import read
 from test_viewer import BOX, box
+from trabecula.design import parsed
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -82,6 +84,38 @@ def test_what_lies_behind_is_not_drawn():
     drawn = {x: len(paths(pair(x).svg((400, 400), 0, 0))[0]["edges"]) for x in (8, -8)}
     alone = len(paths(lt.Mesh.of(4 * corners, triangles).svg((400, 400), 0, 0))[0]["edges"])
     assert drawn[8] > drawn[-8] == alone
+
+
+def test_a_drawing_by_parallel_rays_has_a_bar_of_its_scale(mesh):
+    low, high = (np.asarray(end) for end in mesh.bounds)
+    svg = mesh.svg((800, 600), -90, 0, dpi=254, projection="orthographic", scale_bar=True, axes=True)
+    root = ElementTree.fromstring(svg)
+    lines = {name: np.concatenate(found) for name, found in paths(svg)[0].items() if name}
+    drawn = np.concatenate([lines[name] for name in ("edges", "contours") if name in lines])
+    scale = np.ptp(drawn[:, 0]) / (high - low)[0]
+    # Contours are judged by samples of 80 mm / 3600.
+    assert abs(np.ptp(drawn[:, 1]) - scale * (high - low)[2]) < 0.1
+    (words,) = (t.text for t in root.iter(f"{SVG}text") if t.text.endswith(" mm"))
+    assert abs(np.ptp(lines["scale_bar"][:, 0]) - scale * float(words.removesuffix(" mm"))) < 0.05
+    assert {t.text for t in root.iter(f"{SVG}text")} == {"x", "y", "z", words}
+    assert lines["scale_bar"].max() < 80 and (lines["scale_bar"][:, 1].min() > drawn[:, 1].max())
+
+
+def test_a_beam_is_shaded_along_itself_and_its_ends_are_flat(tmp_path):
+    """By the normals of its field a cylinder is as light all along, by those of its mesh it is not."""
+    (tmp_path / "n.csv").write_text("id,x,y,z\n0,-5,0,0\n1,5,0,0\n")
+    (tmp_path / "s.csv").write_text("0,1\n")
+    text = 'schema = 1\nregion.box.size = [6, 4, 4]\nbeams.b = { nodes = "n.csv", struts = "s.csv", radius = 1 }\n'
+    solid = parsed(text, False, "beam.toml", str(tmp_path)).build()
+    mesh = solid.mesh(edge=0.3)
+    rough = []
+    for of in (solid, None):
+        png = mesh.png((300, 200), -90, 0, projection="orthographic", background="white", solid=of)
+        _, (rows,) = read(png)
+        middle = rows[:, 90:210].astype(float)
+        inside = (middle.max(axis=(1, 2)) < 250).nonzero()[0][4:-4]
+        rough.append(middle[inside].std(axis=1).mean())
+    assert rough[0] < rough[1] / 2
 
 
 def test_the_command_draws_at_a_size_in_print(mesh, tmp_path):

@@ -524,24 +524,20 @@ class Mesh:
     def write(self, path: str | PathLike[str], extension: str, title: str) -> None: ...
     def png(
         self,
-        width: int,
-        height: int,
-        azimuth: float,
-        elevation: float,
+        seen: tuple[int, int, float, float, bool],
+        cut: tuple[tuple[tuple[float, float, float], float] | None, bool, bool],
+        solid: Solid | None = None,
         tint: tuple[str, Sequence[float], tuple[float, float]] | None = None,
         shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
         lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
-        section: tuple[tuple[float, float, float], float] | None = None,
         background: str = "shaded",
         dpi: float | None = None,
-    ) -> bytes: ...
+    ) -> tuple[bytes, bool]: ...
     def svg(
         self,
-        width: int,
-        height: int,
-        azimuth: float,
-        elevation: float,
-        section: tuple[tuple[float, float, float], float] | None,
+        seen: tuple[int, int, float, float, bool],
+        cut: tuple[tuple[tuple[float, float, float], float] | None, bool, bool],
         size: Sequence[float],
         unit: str,
-    ) -> str: ...
+        solid: Solid | None = None,
+    ) -> tuple[str, bool]: ...

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 import re
 
-__all__ = ["BACKGROUNDS", "VIEWS", "section_plane", "towards"]
+__all__ = ["BACKGROUNDS", "NO_SCALE", "PROJECTIONS", "VIEWS", "section_plane", "towards"]
 
 #: What lies behind a surface in a picture.
 BACKGROUNDS = ("shaded", "white", "transparent")
+#: How space becomes a plane: by a lens, or by parallel rays.
+PROJECTIONS = ("perspective", "orthographic")
+#: Why pictures by a lens have no scale bar.
+NO_SCALE = "in perspective what is nearer is larger, and no one length is to scale"
 #: Azimuth about +z and elevation above xy, degrees, of views by name.
 VIEWS = {
     "iso": (45.0, math.degrees(math.atan(math.sqrt(0.5)))),

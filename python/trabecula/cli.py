@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from .camera import BACKGROUNDS, VIEWS
+from .camera import BACKGROUNDS, PROJECTIONS, VIEWS
 from .completion import SHELLS, script
 from .formats import (
     BEAM_WRITES,
@@ -90,6 +90,7 @@ def number(what: str, ok: Callable[[float], bool] = lambda v: True, allowed: str
 LENGTH = number("a length in mm", lambda v: v > 0, " greater than 0")
 SAMPLES = number("a number", lambda v: v >= 2, " of at least 2")
 ANGLE = number("degrees")
+ELEVATION = number("degrees", lambda v: -90 <= v <= 90, " from -90 to 90")
 COUNT = number("a whole number", lambda v: 1 <= v <= 4096, " from 1 to 4096", int)
 MODULUS = number("Young's modulus", lambda v: v > 0, " greater than 0")
 NUMBER = number("a number")
@@ -737,7 +738,8 @@ COMMANDS = {
     "render": (
         "Draw a design or a mesh file as PNG, or as SVG in lines.",
         "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25\n"
-        "  trabecula render part.toml -o figure.svg --size 85mm --section x=0",
+        "  trabecula render part.toml -o figure.svg --size 85mm --section x=0\n"
+        "  trabecula render part.toml -o front.png --view front --projection orthographic --scale-bar --axes",
         *(DESIGN_OR_MESH, output(("png", "svg"), "the picture (.png), or line drawing (.svg)")),
         option(
             "--size",
@@ -749,15 +751,23 @@ COMMANDS = {
         option("--dpi", type=DPI, metavar="N", help="pixels an inch in print (default, of a size in mm: 300)"),
         option("--background", choices=BACKGROUNDS, help="what is behind the part in a PNG (default: shaded)"),
         option("--azimuth", type=ANGLE, metavar="DEG", help="camera about +z (default: 30)"),
-        option("--elevation", type=ANGLE, metavar="DEG", help="camera above xy (default: 25)"),
+        option("--elevation", type=ELEVATION, metavar="DEG", help="camera above xy (default: 25)"),
         option("--view", choices=VIEWS, help="camera by name, in place of its angles"),
+        option(
+            "--projection",
+            choices=PROJECTIONS,
+            default=PROJECTIONS[0],
+            help="orthographic: lengths across the view are to scale at any depth (default: perspective)",
+        ),
+        option("--scale-bar", action="store_true", help="with a bar of a round length; needs --projection orthographic"),
+        option("--axes", action="store_true", help="with the directions of x, y and z"),
         option(
             "--section",
             metavar="PLANE",
             help='"z=10": without what is before this plane (mm), what it cuts hatched; "z<10", "z>10": what is kept',
         ),
         option("--turn", type=FRAMES, metavar="N", help="an animated PNG: N pictures from all round"),
-        option("--seconds", type=SECONDS, default=6.0, metavar="S", help="time of one turn (default: 6)"),
+        option("--seconds", type=SECONDS, metavar="S", help="time of one turn (default: 6)"),
         option(
             "--show",
             choices=SHOWN,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .camera import VIEWS, section_plane, towards
+from .camera import NO_SCALE, VIEWS, section_plane, towards
 from .errors import Refused, WrongUsage
 from .files import check_place, kind_of, write_bytes
 from .formats import is_design
@@ -23,28 +23,28 @@ def render(args) -> None:
     angles = camera(args)
     pixels, dpi = resolution(args)
     line_art = drawn_in_lines(args)
-    if args.show is None:
-        made, shown = surface(args), {}
-    elif not is_design(args.file):
-        if args.show not in OF_MESH:
+    solid = None
+    if not is_design(args.file):
+        if args.show is not None and args.show not in OF_MESH:
             words = f"--show {args.show} is for a design with a solved map (map.phase) or a blend"
             raise WrongUsage(f"{args.file} is a mesh; {words}")
-        made, shown = surface(args), dict(OF_MESH[args.show])
+        made, shown = surface(args), dict(OF_MESH.get(args.show, {}))
     else:
         solid = build(args.file)
         try:
-            seen = look(solid, args.show)
+            seen = look(solid, args.show) if args.show else lambda *_: {}
         except ValueError as error:
             raise Refused(f"{args.file}: {error}") from None
         made = meshed(solid, args)
         shown = dict(seen(made, towards(*angles)))
     settle()
+    always = {"projection": args.projection, "scale_bar": args.scale_bar, "axes": args.axes, "solid": solid}
     if line_art:
         # Not a whole number of pixels an inch, so that the width is the one asked for.
         exact = 25.4 * pixels[0] / args.size[0] if args.size[2] == "mm" else dpi
-        made.render(args.output, pixels, *angles, section=args.section, dpi=exact)
+        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, **always)
     else:
-        shown |= {"background": args.background or "shaded", "dpi": dpi}
+        shown |= {"background": args.background or "shaded", "dpi": dpi, **always}
         if args.turn is None:
             made.render(args.output, pixels, *angles, section=args.section, **shown)
         else:
@@ -86,9 +86,13 @@ def drawn_in_lines(args) -> bool:
 
 
 def camera(args) -> tuple[float, float]:
-    """Azimuth and elevation; the section with the side that is kept, refused if it cannot be read."""
+    """Azimuth and elevation; the section with the side that is kept. Refused: what does not go together, or cannot be read."""
     if args.view and (args.azimuth is not None or args.elevation is not None):
         raise WrongUsage("--view says from where; leave out --azimuth and --elevation")
+    if args.scale_bar and args.projection != "orthographic":
+        raise WrongUsage(f"--scale-bar needs --projection orthographic: {NO_SCALE}")
+    if args.seconds is not None and args.turn is None:
+        raise WrongUsage("--seconds is the time of a turn: give --turn too, or leave it out")
     azimuth, elevation = VIEWS[args.view] if args.view else (30.0, 25.0)
     azimuth = azimuth if args.azimuth is None else args.azimuth
     elevation = elevation if args.elevation is None else args.elevation
@@ -113,4 +117,4 @@ def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, floa
             azimuth = angles[0] + 360 * i / args.turn
             frames.append(made.png(pixels, azimuth, angles[1], section=args.section, **shown))
             progress(i + 1, args.turn)
-    write_bytes(args.output, animated(frames, args.seconds))
+    write_bytes(args.output, animated(frames, args.seconds or 6.0))

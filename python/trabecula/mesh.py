@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 from . import _core
-from .camera import BACKGROUNDS, section_plane, towards
+from .camera import BACKGROUNDS, NO_SCALE, PROJECTIONS, section_plane, towards
 from .errors import DesignWarning
 from .files import extension, read_text, whole_file, write_bytes
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
@@ -471,6 +471,10 @@ class Mesh(Picture, Transformed):
         section: str | None = None,
         background: str = "shaded",
         dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
     ) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
@@ -480,10 +484,13 @@ class Mesh(Picture, Transformed):
         are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is pale unless it has
         colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed surface, ``"z<10"``,
         ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched. ``background`` is
-        ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in print. ValueError for
-        what cannot be drawn.
+        ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in print. ``projection`` is
+        ``"perspective"``, by a lens, or ``"orthographic"``, by parallel rays: lengths across the view are then to scale at any
+        depth, and ``scale_bar`` draws a bar of a round length. ``axes`` draws the directions of x, y and z. ``solid``, of which
+        this is the mesh, gives the normals that the surface is shaded by: its facets do not show then. ValueError for what
+        cannot be drawn; a DesignWarning where the picture is too small for legend, bar or axes.
         """
-        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
+        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         if background not in BACKGROUNDS:
             raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
         inch = None if dpi is None else positive("dpi", dpi)
@@ -492,7 +499,10 @@ class Mesh(Picture, Transformed):
         tint = None if color is None else self._tint(color, label, span)
         mixed = None if shares is None else self._shares(shares, label)
         drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
-        return self._core.png(*pixels, *angles, tint, mixed, drawn, plane, background, inch)
+        made, fits_foot = self._core.png(seen, cut, solid and solid._core, tint, mixed, drawn, background, inch)
+        if not fits_foot:
+            _warn_small(seen, "legend, scale bar or axes" if scale_bar or axes else "its legend")
+        return made
 
     def svg(
         self,
@@ -501,37 +511,60 @@ class Mesh(Picture, Transformed):
         elevation: float = 25,
         section: str | None = None,
         dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
     ) -> str:
         """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
         where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
-        without hidden lines. A ``section`` is hatched; camera and section as for ``png``. ``size`` is in pixels, ``dpi`` of
-        them an inch: the drawing then has its size in mm. Contours, edges, section and hatching are a path each, by these
-        names. ValueError for what cannot be drawn.
+        without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
+        in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
+        scale_bar are a path each, by these names. ValueError for what cannot be drawn.
         """
-        pixels, angles, plane = self._camera(size, azimuth, elevation, section)
-        if dpi is None:
-            return self._core.svg(*pixels, *angles, plane, [float(n) for n in pixels], "px")
-        wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
-        if not 0.1 <= wide <= 1e5:
-            raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
-        return self._core.svg(*pixels, *angles, plane, [wide, round(wide * pixels[1] / pixels[0], 2)], "mm")
+        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
+        pixels = seen[:2]
+        made, fits_foot = self._core.svg(seen, cut, *_paper(pixels, dpi), solid and solid._core)
+        if not fits_foot:
+            _warn_small(seen, "scale bar or axes")
+        return made
 
-    def _camera(self, size: tuple[int, int], azimuth: float, elevation: float, section: str | None) -> tuple:
-        """Pixels, angles and the plane of a section of a picture."""
-        pixels = tuple(whole("size", v, 1, 16384) for v in size)
+    def _camera(
+        self,
+        size: tuple[int, int],
+        azimuth: float,
+        elevation: float,
+        section: str | None,
+        projection: str,
+        scale_bar: bool,
+        axes: bool,
+    ) -> tuple[tuple, tuple]:
+        """How a picture is seen, as pixels, angles and whether by parallel rays; the plane of its section, and its marks."""
+        wide, high = (whole("size", v, 1, 16384) for v in size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
         if not all(map(math.isfinite, angles)):
             raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
-        if section is None:
-            return pixels, angles, None
-        normal, offset = section_plane(section, towards(*angles))
+        if abs(angles[1]) > 90:
+            raise ValueError(f"elevation is {angles[1]:g}; it must be from -90 to 90 degrees above the xy plane")
+        if projection not in PROJECTIONS:
+            raise ValueError(f"projection is {projection!r}; it must be one of {', '.join(PROJECTIONS)}")
+        parallel = projection == "orthographic"
+        if scale_bar and not parallel:
+            raise ValueError(f"scale_bar needs an orthographic projection: {NO_SCALE}")
+        plane = None if section is None else self._plane(section, towards(*angles))
+        return (wide, high, *angles, parallel), (plane, bool(scale_bar), bool(axes))
+
+    def _plane(self, section: str, eye: tuple[float, float, float]) -> tuple[tuple[float, float, float], float]:
+        """The plane of a section; a ValueError where it leaves nothing, or all because it lies outside."""
+        normal, offset = section_plane(section, eye)
         axis = [abs(n) for n in normal].index(1)
         low, high = (end[axis] for end in self.bounds)
-        if min(normal[axis] * low, normal[axis] * high) >= offset:
-            raise ValueError(
-                f'section "{section}" leaves nothing: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}'
-            )
-        return pixels, angles, (normal, offset)
+        place, slack = normal[axis] * offset, 1e-6 * math.dist(*self.bounds)
+        nothing = min(normal[axis] * low, normal[axis] * high) >= offset
+        if nothing or not low - slack <= place <= high + slack:
+            what = "leaves nothing" if nothing else "cuts nothing off"
+            raise ValueError(f'section "{section}" {what}: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}')
+        return normal, offset
 
     def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
         import numpy as np
@@ -604,6 +637,10 @@ class Mesh(Picture, Transformed):
         section: str | None = None,
         background: str = "shaded",
         dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
     ) -> None:
         """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
 
@@ -612,9 +649,12 @@ class Mesh(Picture, Transformed):
         if extension(path, ("png", "svg")) == "svg":
             if color is not None or shares is not None or lines is not None:
                 raise ValueError("an .svg is a line drawing, without colours or lines: leave them out, or write a .png")
-            made = self.svg(size, azimuth, elevation, section, dpi).encode()
+            made = self.svg(size, azimuth, elevation, section, dpi, projection, scale_bar, axes, solid).encode()
         else:
-            made = self.png(size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi)
+            marks = {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": solid}
+            made = self.png(
+                size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi, **marks
+            )
         write_bytes(path, made)
 
     def _picture(self) -> Mesh:
@@ -623,6 +663,21 @@ class Mesh(Picture, Transformed):
     def _spacing(self) -> float:
         low, high = self.bounds
         return max(b - a for a, b in zip(low, high, strict=True)) / 200
+
+
+def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:
+    """The size of a drawing, and its unit: mm where pixels are so many an inch."""
+    if dpi is None:
+        return [float(n) for n in pixels], "px"
+    wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+    if not 0.1 <= wide <= 1e5:
+        raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
+    return [wide, round(wide * pixels[1] / pixels[0], 2)], "mm"
+
+
+def _warn_small(seen: tuple, what: str) -> None:
+    words = f"a picture of {seen[0]} × {seen[1]} pixels is too small for {what}: none is drawn"
+    warnings.warn(words, DesignWarning, stacklevel=3)
 
 
 def _revived(state: tuple, known: dict) -> Mesh:

@@ -100,9 +100,12 @@ class Seen(Picture):
         section: str | None = None,
         background: str = "shaded",
         dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
     ) -> None:
         """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file, or a line drawing to an .svg
-        file; camera, section, background and dpi as for ``Mesh.png``.
+        file; camera, section, background, dpi, projection, scale bar and axes as for ``Mesh.png``.
 
         ``show`` is what it shows beside the form: ``thickness``, the local thickness of walls. Of a solved map
         (``map.phase``): ``angle``, ``spacing``, ``density``, the deviation from the one asked for, see ``map_error``;
@@ -112,7 +115,8 @@ class Seen(Picture):
         """
         seen = None if show is None else look(self, show)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
-        shown = seen(made, towards(azimuth, elevation)) if seen else {}
+        shown = dict(seen(made, towards(azimuth, elevation))) if seen else {}
+        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": self}
         made.render(path, size, azimuth, elevation, section=section, background=background, dpi=dpi, **shown)
 
     def view(

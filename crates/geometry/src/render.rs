@@ -4,14 +4,15 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
+mod camera;
 mod font;
 mod hatching;
 mod legend;
 mod line_drawing;
 mod lines;
+mod marks;
 mod occlusion;
 mod paper;
 mod png;
@@ -23,9 +24,12 @@ mod space_lines;
 mod tint;
 mod visible_parts;
 
-pub use line_drawing::line_drawing;
+use camera::Camera;
+pub use camera::{Projection, View};
+pub use line_drawing::{line_drawing, line_drawing_fits};
 pub use lines::Lines;
 use lines::Tubes;
+pub use marks::Marks;
 use paper::Paper;
 pub use png::png;
 use raster::{BAND, Projected, Raster};
@@ -34,17 +38,6 @@ use section::SeenSection;
 use shade::{Finish, Shader};
 pub use shares::{Colours, Shares};
 pub use tint::Tint;
-
-/// How to draw.
-#[derive(Clone, Copy, Debug)]
-pub struct View {
-    /// Pixels across and down.
-    pub size: [usize; 2],
-    /// Direction from which the camera looks: azimuth about +Z (degrees from +X towards +Y).
-    pub azimuth: f64,
-    /// Elevation above the XY plane, degrees.
-    pub elevation: f64,
-}
 
 /// What lies behind a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,8 +67,22 @@ pub struct Look {
     pub lines: Option<Lines>,
     /// What is left out, of a closed surface; what the plane cuts is hatched.
     pub section: Option<Section>,
+    /// Unit normals at the corners of the surface's triangles, three for each, by which it is shaded and its contours are found; those of
+    /// the mesh where they are zero or none is given.
+    pub normals: Option<Vec<[f32; 3]>>,
     /// What lies behind the surface.
     pub background: Background,
+    /// What tells size and direction.
+    pub marks: Marks,
+}
+
+impl Look {
+    /// Whether a picture has room for the legend and the marks of this look: there is none for them in a small one.
+    pub fn fits(&self, view: &View) -> bool {
+        let paper = Paper { size: view.size, channels: 3, bytes: Vec::new() };
+        let marked = self.marks != Marks::default();
+        (self.colours.is_none() && self.lines.is_none() && !marked) || !legend::rows(self, view, &paper).is_empty()
+    }
 }
 
 /// The largest picture, in pixels.
@@ -85,76 +92,9 @@ const OVER: usize = 3;
 /// Samples drawn at once, more or less: larger pictures are drawn in bands of rows.
 const SAMPLES: usize = 6_000_000;
 
-/// Where the eye is and how it sees: right, up, and from the scene to the eye.
-struct Camera {
-    center: Vec3,
-    axes: [Vec3; 3],
-    /// Distance from the centre (mm).
-    distance: f64,
-    /// Samples per unit of slope.
-    focal: f64,
-    middle: [f64; 2],
-}
-
-impl Camera {
-    /// A camera with a narrow lens, such that the points fill the picture but for a margin.
-    fn new(bounds: &Aabb, points: &[Vec3], view: &View, size: [usize; 2]) -> Camera {
-        let (az, el) = (view.azimuth.to_radians(), view.elevation.clamp(-90.0, 90.0).to_radians());
-        let out = [az.cos() * el.cos(), az.sin() * el.cos(), el.sin()];
-        let right = [-az.sin(), az.cos(), 0.0];
-        let axes = [right, cross(out, right), out];
-        let radius = (norm(bounds.size()) / 2.0).max(1e-9);
-        let distance = radius * 6.0;
-        let mut camera =
-            Camera { center: bounds.center(), axes, distance, focal: 1.0, middle: size.map(|n| n as f64 / 2.0) };
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for p in points {
-            let [x, y, _] = camera.project(*p);
-            for (a, v) in [x, y].into_iter().enumerate() {
-                low[a] = low[a].min(v - camera.middle[a]);
-                high[a] = high[a].max(v - camera.middle[a]);
-            }
-        }
-        let room = [0, 1].map(|a| 0.92 * size[a] as f64 / (high[a] - low[a]).max(1e-12));
-        camera.focal = room[0].min(room[1]);
-        for a in 0..2 {
-            camera.middle[a] -= camera.focal * (low[a] + high[a]) / 2.0;
-        }
-        camera
-    }
-
-    /// The same view in a picture of `factor` times as many samples across and down.
-    fn scaled(&self, factor: f64) -> Camera {
-        Camera { focal: factor * self.focal, middle: self.middle.map(|m| factor * m), ..*self }
-    }
-
-    /// Column, row (samples) and depth: the inverse distance along the view, greater when nearer.
-    fn project(&self, p: Vec3) -> [f64; 3] {
-        let d = sub(p, self.center);
-        let near = 1.0 / (self.distance - dot(d, self.axes[2]));
-        let k = self.focal * near;
-        [self.middle[0] + k * dot(d, self.axes[0]), self.middle[1] - k * dot(d, self.axes[1]), near]
-    }
-
-    /// The point of the scene behind a sample.
-    fn unproject(&self, x: f64, y: f64, near: f64) -> Vec3 {
-        let k = 1.0 / (self.focal * near);
-        let right = (x - self.middle[0]) * k;
-        let up = (self.middle[1] - y) * k;
-        let out = self.distance - 1.0 / near;
-        let axes = self.axes;
-        add(self.center, add(scale(axes[0], right), add(scale(axes[1], up), scale(axes[2], out))))
-    }
-
-    /// The direction from a point to the eye.
-    fn towards(&self, p: Vec3) -> Vec3 {
-        unit(sub(add(self.center, scale(self.axes[2], self.distance)), p))
-    }
-}
-
 /// Draws the surface; returns rows from the top, RGB, or RGBA (not premultiplied) on a transparent background.
 ///
-/// Perspective with a narrow lens, fitted to the bounds, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
+/// Fitted to the bounds but for a margin of 4 % on each side, above legend and marks, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
 /// boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
 /// gives no rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
 pub fn render(surface: &SurfaceMesh, view: &View, look: &Look) -> Vec<u8> {
@@ -172,21 +112,24 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
     let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
     let channels = look.background.channels();
     let mut paper = Paper { size: [w, h], channels, bytes: vec![0u8; channels * pixels] };
-    let legend = legend::rows(look, &paper);
+    let legend = legend::rows(look, view, &paper);
+    let mut per_mm = None;
     if drawn {
         let size = [w * OVER, h * OVER];
         let room = [size[0], size[1] - legend::height(&legend, &paper) * OVER];
-        let section = look.section.as_ref();
+        let section = look.section.map(|s| s.before_faces(&bounds));
+        let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
         let camera = Camera::new(&bounds, &shown, view, room);
+        per_mm = Some(camera.samples_per_mm(1.0 / camera.distance) / OVER as f64);
         let finish = match (&look.colours, &look.lines) {
             (Some(colours), _) => Finish::Coloured(colours),
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let body = Layer::new(surface, &camera, size, finish, section);
+        let body = Layer::new(surface, &camera, size, (finish, look.normals.as_deref()), section);
         let tubes = look.lines.as_ref().map(Tubes::of);
-        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, Finish::Lines(t), section));
+        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, (Finish::Lines(t), None), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
         for (i, part) in paper.bytes.chunks_mut(rows / OVER * w * channels).enumerate() {
@@ -201,7 +144,7 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
         resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, look.background, &mut paper.bytes);
     }
     if !legend.is_empty() {
-        legend::draw(&legend, &mut paper);
+        legend::draw(&legend, &mut paper, per_mm);
     }
     paper.bytes
 }
@@ -218,7 +161,7 @@ impl<'a> Layer<'a> {
         surface: &'a SurfaceMesh,
         camera: &'a Camera,
         size: [usize; 2],
-        finish: Finish<'a>,
+        finish: (Finish<'a>, Option<&'a [[f32; 3]]>),
         section: Option<&'a Section>,
     ) -> Layer<'a> {
         let projected = Projected::of(surface, camera, size, section);

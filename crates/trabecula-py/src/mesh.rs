@@ -6,7 +6,10 @@ use std::path::PathBuf;
 use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
-use geometry::render::{Background, Colours, Lines, Look, Section, Shares, Tint, View, line_drawing, png, render};
+use geometry::render::{
+    Background, Colours, Lines, Look, Marks, Projection, Section, Shares, Tint, View, line_drawing, line_drawing_fits,
+    png, render,
+};
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
@@ -16,6 +19,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use trabecula::analysis;
+use trabecula::corner_normals::corner_normals;
 use trabecula::report::{MeshReport, QualityReport, SimplifyReport, SmoothReport, ThicknessReport, ThicknessSpread};
 use trabecula::surface_maker::Figures;
 
@@ -24,6 +28,7 @@ use crate::file;
 use crate::region::Region;
 use crate::report::report;
 use crate::run::{run, run_apart};
+use crate::solid::Solid;
 
 /// A triangle mesh.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -36,6 +41,22 @@ pub struct Mesh {
 
 /// Lines of a picture: a caption, names, the number of the name and the points (mm) of each line, half their width (mm).
 type NamedLines = (String, Vec<String>, Vec<(usize, Vec<[f64; 3]>)>, f64);
+
+/// Pixels across and down, azimuth and elevation, whether by parallel rays.
+type Seen = (usize, usize, f64, f64, bool);
+
+fn view((width, height, azimuth, elevation, parallel): Seen) -> View {
+    let projection = if parallel { Projection::Orthographic } else { Projection::Perspective };
+    View { size: [width, height], azimuth, elevation, projection }
+}
+
+/// The normal and the offset of a section; whether there is a scale bar, and axes.
+type Cut = (Option<([f64; 3], f64)>, bool, bool);
+
+fn look((section, scale_bar, axes): Cut) -> Look {
+    let section = section.map(|(normal, offset)| Section { normal, offset });
+    Look { section, marks: Marks { scale_bar, axes }, ..Look::default() }
+}
 
 /// A row of the table of mesh formats.
 #[pyclass(frozen, get_all)]
@@ -350,58 +371,53 @@ impl Mesh {
     }
 
     /// A picture as PNG bytes: with a number at each vertex to be seen as a colour, between the two ends of a scale, or with shares of
-    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset; on a `background`
-    /// ("shaded", "white" or "transparent"), `dpi` pixels an inch.
-    #[pyo3(signature = (width, height, azimuth, elevation, tint=None, shares=None, lines=None, section=None, background="shaded", dpi=None))]
+    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset; with marks; on a
+    /// `background` ("shaded", "white" or "transparent"), `dpi` pixels an inch. And whether there is room for its legend and marks.
+    /// The field of `solid`, whose surface it is, gives the normals.
+    #[pyo3(signature = (seen, cut, solid=None, tint=None, shares=None, lines=None, background="shaded", dpi=None))]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn png<'py>(
         &self,
         py: Python<'py>,
-        width: usize,
-        height: usize,
-        azimuth: f64,
-        elevation: f64,
+        seen: Seen,
+        cut: Cut,
+        solid: Option<Py<Solid>>,
         tint: Option<(String, Vec<f64>, [f64; 2])>,
         shares: Option<(String, Vec<String>, Vec<f64>)>,
         lines: Option<NamedLines>,
-        section: Option<([f64; 3], f64)>,
         background: &str,
         dpi: Option<f64>,
-    ) -> PyResult<Bound<'py, PyBytes>> {
-        let size = [width, height];
+    ) -> PyResult<(Bound<'py, PyBytes>, bool)> {
         let scale = tint.map(|(title, values, span)| Colours::Scale(Tint { title, values, span }));
         let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
         let lines = lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius });
-        let section = section.map(|(normal, offset)| Section { normal, offset });
         let background = match background {
             "white" => Background::White,
             "transparent" => Background::Transparent,
             _ => Background::Shaded,
         };
-        let look = Look { colours: scale.or(parts), lines, section, background };
-        let bytes = run(py, None, None, |_| {
-            let view = View { size, azimuth, elevation };
-            png(&render(&self.surface, &view, &look), size, background.channels(), dpi)
-        })?;
-        Ok(PyBytes::new(py, &bytes))
+        let (view, look) = (view(seen), Look { colours: scale.or(parts), lines, background, ..look(cut) });
+        let bytes =
+            run(py, None, None, |_| png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi))?;
+        Ok((PyBytes::new(py, &bytes), look.fits(&view)))
     }
 
-    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of a view of `width` × `height`.
-    #[pyo3(signature = (width, height, azimuth, elevation, section, size, unit))]
-    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
+    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of the view.
+    #[pyo3(signature = (seen, cut, size, unit, solid=None))]
     fn svg(
         &self,
         py: Python<'_>,
-        width: usize,
-        height: usize,
-        azimuth: f64,
-        elevation: f64,
-        section: Option<([f64; 3], f64)>,
+        seen: Seen,
+        cut: Cut,
         size: [f64; 2],
         unit: &str,
-    ) -> PyResult<String> {
-        let section = section.map(|(normal, offset)| Section { normal, offset });
-        let view = View { size: [width, height], azimuth, elevation };
-        run(py, None, None, |_| line_drawing(&self.surface, &view, section.as_ref(), size, unit))
+        solid: Option<Py<Solid>>,
+    ) -> PyResult<(String, bool)> {
+        let (view, mut look) = (view(seen), look(cut));
+        let text = run(py, None, None, |_| {
+            look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
+            line_drawing(&self.surface, &view, &look, size, unit)
+        })?;
+        Ok((text, line_drawing_fits(&look, &view)))
     }
 }

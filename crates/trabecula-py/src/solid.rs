@@ -13,6 +13,7 @@ use pyo3::types::PyDict;
 use trabecula::analysis;
 use trabecula::design::Built;
 use trabecula::extract::{self, SpaceMade};
+use trabecula::field::Field;
 use trabecula::map::{Misfit, Phase};
 use trabecula::report::{
     DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
@@ -41,6 +42,11 @@ pub struct Solid {
 impl Solid {
     pub fn new(built: Built, design: String) -> Self {
         Solid { built, design }
+    }
+
+    /// Negative in the solid.
+    pub fn as_field(&self) -> &dyn Field {
+        &self.built.solid
     }
 
     /// The solid itself.

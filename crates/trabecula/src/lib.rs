@@ -41,6 +41,7 @@ pub mod blend;
 pub mod cell;
 mod coincident;
 mod conforming_tets;
+pub mod corner_normals;
 pub mod csg_tree;
 pub mod design;
 pub mod effective;

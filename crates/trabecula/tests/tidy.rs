@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// The modules of `trabecula`, layer by layer. A module imports from lower layers only: not from its neighbours in its own.
 const LAYERS: &[&[&str]] = &[
     &["field", "kind", "surface_maker"],
-    &["implicit"],
+    &["implicit", "corner_normals"],
     &["csg_tree"],
     &["coincident"],
     &["region"],

@@ -1,7 +1,8 @@
 //! The legend at the foot of a picture: rows of a scale, of names with their colours, of words.
 
+use super::marks::SeenMarks;
 use super::paper::{Colour, INK, Paper};
-use super::{Look, Tint};
+use super::{Look, Tint, View};
 
 /// Colours of areas and of lines by number, in sRGB: those of Okabe and Ito (2008), which all eyes tell apart. Complementary ones come first
 /// for areas, whose mixtures then are grey; red, green and blue for lines.
@@ -24,17 +25,21 @@ pub(super) enum Row<'a> {
     Names(Vec<(&'a str, Colour)>),
     /// Words.
     Words(&'a str),
+    /// A scale bar and axes.
+    Marks(SeenMarks),
 }
 
 /// A row of a letter's height and the gap below it, in half letters.
 const ROW: usize = 3;
 
 /// The rows for a picture, from the top; none where it is too small for them.
-pub(super) fn rows<'a>(look: &'a Look, paper: &Paper) -> Vec<Row<'a>> {
+pub(super) fn rows<'a>(look: &'a Look, view: &View, paper: &Paper) -> Vec<Row<'a>> {
     let mut found = Vec::new();
     if paper.size[0] < 180 || paper.size[1] < 8 * paper.letter() {
         return found;
     }
+    let wide = paper.size[0] as f64 / paper.letter() as f64;
+    found.extend(SeenMarks::new(look.marks, view, wide).map(Row::Marks));
     if let Some(colours) = &look.colours {
         colours.legend(paper, &mut found);
     }
@@ -77,11 +82,19 @@ fn wide(row: &[(&str, Colour)], paper: &Paper) -> usize {
 
 /// Pixels of the foot of a picture that the rows take.
 pub(super) fn height(rows: &[Row], paper: &Paper) -> usize {
-    if rows.is_empty() { 0 } else { (rows.len() * ROW + 2) * paper.letter() / 2 }
+    if rows.is_empty() { 0 } else { (rows.iter().map(row_height).sum::<usize>() + 2) * paper.letter() / 2 }
 }
 
-/// Draws the rows.
-pub(super) fn draw(rows: &[Row], paper: &mut Paper) {
+/// Half letters of a row and the gap below it.
+fn row_height(row: &Row) -> usize {
+    match row {
+        Row::Marks(marks) => (2.0 * marks.height()).ceil() as usize + ROW - 2,
+        _ => ROW,
+    }
+}
+
+/// Draws the rows; `per_mm` is how many pixels a mm is, where that is one number.
+pub(super) fn draw(rows: &[Row], paper: &mut Paper, per_mm: Option<f64>) {
     let [w, h] = paper.size;
     let letter = paper.letter();
     let mut y = h.saturating_sub(height(rows, paper)) + letter / 2;
@@ -89,6 +102,7 @@ pub(super) fn draw(rows: &[Row], paper: &mut Paper) {
         match row {
             Row::Words(text) => paper.write(text, w / 2, y, 0.5, INK),
             Row::Scale(tint) => tint.scale(paper, y),
+            Row::Marks(marks) => draw_marks(marks, paper, y, per_mm),
             Row::Names(entries) => {
                 let mut x = (w + letter).saturating_sub(wide(entries, paper)) / 2;
                 for (name, colour) in entries {
@@ -98,7 +112,23 @@ pub(super) fn draw(rows: &[Row], paper: &mut Paper) {
                 }
             }
         }
-        y += ROW * letter / 2;
+        y += row_height(row) * letter / 2;
+    }
+}
+
+fn draw_marks(marks: &SeenMarks, paper: &mut Paper, top: usize, per_mm: Option<f64>) {
+    let letter = paper.letter() as f64;
+    let place = |[x, y]: [f64; 2]| [x * letter, top as f64 + y * letter];
+    let drawn = marks.drawn(paper.size[0] as f64 / letter, per_mm.map(|p| p / letter));
+    for (from, to, colour) in &drawn.arms {
+        paper.stroke(place(*from), place(*to), drawn.thin * letter, *colour);
+    }
+    if let Some([low, high]) = drawn.bar {
+        paper.rectangle(place(low), place(high), INK);
+    }
+    for (words, at, anchor, colour) in &drawn.words {
+        let [x, y] = place(*at).map(|c| c.round().max(0.0) as usize);
+        paper.write(words, x, y, *anchor, *colour);
     }
 }
 
@@ -123,7 +153,7 @@ mod tests {
         let many: Vec<String> = (0..9).map(|i| format!("lattice number {i}")).collect();
         let rows = names(many.iter().map(String::as_str), &AREAS, &paper);
         assert!(rows.len() > 2);
-        draw(&rows, &mut paper);
+        draw(&rows, &mut paper, None);
         for i in 0..many.len() {
             let patch = paper.bytes.chunks(3).filter(|p| *p == colour(&AREAS, i)).count();
             assert_eq!(patch, paper.letter().pow(2), "{i}");

@@ -5,11 +5,13 @@ use std::fmt::Write;
 use rayon::prelude::*;
 
 use super::hatching::hatching;
+use super::marks::{Drawn, SeenMarks};
+use super::paper::Colour;
 use super::raster::Projected;
+use super::section::SeenSection;
 use super::space_lines::{LineKind, SpaceLine, space_lines};
 use super::visible_parts::{Point, Seen, simpler};
-use super::{BAND, Camera, Section, View};
-use crate::math::{add, scale};
+use super::{BAND, Camera, Look, Marks, View};
 use crate::surface_mesh::SurfaceMesh;
 use std::borrow::Cow;
 
@@ -20,17 +22,15 @@ const STROKES: [f64; 3] = [1.0 / 340.0, 1.0 / 500.0, 1.0 / 900.0];
 const HATCH: f64 = 1.0 / 75.0;
 /// Of the width of the picture: the length of edges that are too short to be drawn.
 const CRUMB: f64 = 0.012;
+/// The height of a letter, of the shorter side of the picture; that of a capital, of the size of its font.
+const LETTER: f64 = 1.0 / 42.0;
+const CAPITAL: f64 = 0.72;
 
 /// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
-/// more than 35°, where it ends and between lattice and cuts; and the outline of a section, hatched. `size` is width and height in `unit`
-/// (`mm` or `px`), of the same aspect as that of the view. Empty for views that are no picture (see `render`).
-pub fn line_drawing(
-    surface: &SurfaceMesh,
-    view: &View,
-    section: Option<&Section>,
-    size: [f64; 2],
-    unit: &str,
-) -> String {
+/// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Of a look, colours, lines and
+/// background are not drawn. `size` is width and height in `unit` (`mm` or `px`), of the same aspect as that of the view. Empty for views
+/// that are no picture (see `render`).
+pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, size: [f64; 2], unit: &str) -> String {
     let [w, h] = view.size.map(|n| n as f64);
     let bounds = surface.mesh.bounds();
     if !(w > 0.0 && h > 0.0 && view.azimuth.is_finite() && view.elevation.is_finite()) {
@@ -42,28 +42,79 @@ pub fn line_drawing(
     let part = size[0] / samples[0] as f64;
     let mut groups: [Vec<Vec<Point>>; 3] = Default::default();
     let mut hatched = Vec::new();
+    // A letter, and the height and the width of the picture, in samples and in letters.
+    let letter = LETTER * samples[0].min(samples[1]) as f64;
+    let wide = samples[0] as f64 / letter;
+    let marks = SeenMarks::new(look.marks, view, wide);
+    let foot = marks.as_ref().map_or(0.0, |m| (m.height() + 1.0) * letter);
+    let mut drawn_marks = Drawn::default();
     if !bounds.is_empty() && bounds.is_finite() {
+        let section = look.section.map(|s| s.before_faces(&bounds));
+        let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
-        let camera = Camera::new(&bounds, &shown, view, samples);
+        let camera = Camera::new(&bounds, &shown, view, [samples[0], samples[1] - foot as usize]);
         let rows = samples[1].div_ceil(BAND) * BAND;
         let raster = Projected::of(surface, &camera, [samples[0], rows], section).draw(surface, 0, rows);
-        let eye = add(camera.center, scale(camera.axes[2], camera.distance));
-        let least = CRUMB * samples[0] as f64 * camera.distance / camera.focal;
-        let lines = space_lines(surface, eye, section, least);
+        let per_mm = camera.samples_per_mm(1.0 / camera.distance);
+        let lines = space_lines(surface, look.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / per_mm);
         let seen = Seen { camera: &camera, raster: &raster };
         let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
             lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();
         for (kind, lines) in parts {
             groups[kind as usize].extend(lines);
         }
-        if section.is_some_and(|s| s.height(eye) > 0.0) {
+        if section.is_some_and(|s| SeenSection::new(s, &camera).faces_the_eye()) {
             hatched = hatching(&polygons(&lines, &camera), HATCH * samples[0] as f64);
+        }
+        if let Some(marks) = &marks {
+            drawn_marks = marks.drawn(wide, Some(per_mm / letter));
         }
     }
     let drawn =
         groups.map(|lines| lines.into_iter().map(|line| line.iter().map(|p| p.map(|c| c * part)).collect()).collect());
     let hatched = hatched.iter().map(|line| line.map(|p| p.map(|c| c * part)).to_vec()).collect();
-    text(&drawn, &hatched, size, unit)
+    let top = size[1] - (foot - letter / 2.0) * part;
+    text(&drawn, &hatched, &marks_text(&drawn_marks, letter * part, top), size, unit)
+}
+
+/// The elements of marks in a row that begins at `top`, with letters of this height.
+fn marks_text(marks: &Drawn, letter: f64, top: f64) -> String {
+    let digits = (2.0 - letter.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let place = |[x, y]: [f64; 2]| [x * letter, top + y * letter];
+    let hex = |[r, g, b]: Colour| format!("#{r:02x}{g:02x}{b:02x}");
+    let mut out = String::new();
+    let width = 2.0 * marks.thin * letter;
+    for (from, to, colour) in &marks.arms {
+        let line = path(&[vec![place(*from), place(*to)]], digits);
+        let _ = writeln!(
+            out,
+            "<path class=\"axis\" stroke=\"{}\" stroke-width=\"{width:.digits$}\" d=\"{line}\"/>",
+            hex(*colour)
+        );
+    }
+    if let Some([low, high]) = marks.bar.map(|bar| bar.map(place)) {
+        let corners = [low, [high[0], low[1]], high, [low[0], high[1]], low].to_vec();
+        let _ =
+            writeln!(out, "<path id=\"scale_bar\" fill=\"#000\" stroke=\"none\" d=\"{}\"/>", path(&[corners], digits));
+    }
+    for (words, [x, y], anchor, colour) in &marks.words {
+        let anchor = if *anchor > 0.0 { "middle" } else { "start" };
+        let [x, y] = place([*x, *y + 1.0]);
+        let _ = writeln!(
+            out,
+            "<text x=\"{x:.digits$}\" y=\"{y:.digits$}\" font-family=\"sans-serif\" font-size=\"{:.digits$}\" text-anchor=\"{anchor}\" \
+             fill=\"{}\" stroke=\"none\">{words}</text>",
+            letter / CAPITAL,
+            hex(*colour)
+        );
+    }
+    out
+}
+
+/// Whether a line drawing is wide enough for the marks of its look.
+pub fn line_drawing_fits(look: &Look, view: &View) -> bool {
+    let [w, h] = view.size.map(|n| n as f64);
+    look.marks == Marks::default() || SeenMarks::new(look.marks, view, w / (LETTER * w.min(h))).is_some()
 }
 
 /// The outlines of the section in the picture.
@@ -77,7 +128,7 @@ fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<Point>> {
 }
 
 /// The file.
-fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, [w, h]: [f64; 2], unit: &str) -> String {
+fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, marks: &str, [w, h]: [f64; 2], unit: &str) -> String {
     let [contours, edges, section] = groups;
     let [strong, thin, fine] = STROKES.map(|share| share * w);
     // A hundredth of a stroke.
@@ -97,6 +148,7 @@ fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, [w, h]: [f64; 
                 writeln!(out, "<path id=\"{name}\" stroke-width=\"{width:.digits$}\" d=\"{}\"/>", path(lines, digits));
         }
     }
+    out.push_str(marks);
     out.push_str("</g>\n</svg>\n");
     out
 }
@@ -118,10 +170,11 @@ fn path(lines: &[Vec<Point>], digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{contour, sphere};
+    use super::super::{Projection, Section};
     use super::*;
     use crate::mesh::Mesh;
 
-    const VIEW: View = View { size: [400, 300], azimuth: 35.0, elevation: 25.0 };
+    const VIEW: View = View { size: [400, 300], azimuth: 35.0, elevation: 25.0, projection: Projection::Perspective };
 
     /// The points of a path by its name.
     fn lines(svg: &str, name: &str) -> Vec<Vec<Point>> {
@@ -149,7 +202,7 @@ mod tests {
     fn a_cube_is_nine_edges() {
         let mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
-        let svg = line_drawing(&surface, &VIEW, None, [85.0, 63.75], "mm");
+        let svg = line_drawing(&surface, &VIEW, &Look::default(), [85.0, 63.75], "mm");
         assert!(svg.contains("width=\"85mm\" height=\"63.75mm\" viewBox=\"0 0 85 63.75\""));
         let found = lines(&svg, "edges");
         let bounds = surface.mesh.bounds();
@@ -175,7 +228,7 @@ mod tests {
     #[test]
     fn a_ball_is_one_circle() {
         let surface = sphere(40);
-        let svg = line_drawing(&surface, &VIEW, None, [400.0, 300.0], "px");
+        let svg = line_drawing(&surface, &VIEW, &Look::default(), [400.0, 300.0], "px");
         let found = lines(&svg, "contours");
         assert_eq!(found.len(), 1, "{svg:.300}");
         let span = |k: usize| found[0].iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p[k]), h.max(p[k])));
@@ -193,8 +246,9 @@ mod tests {
     fn a_section_is_hatched() {
         let surface = sphere(40);
         let eye = View { azimuth: 0.0, elevation: 0.0, ..VIEW };
-        let section = Section { normal: [1.0, 0.0, 0.0], offset: 0.5 };
-        let svg = line_drawing(&surface, &eye, Some(&section), [400.0, 300.0], "px");
+        let section = Some(Section { normal: [1.0, 0.0, 0.0], offset: 0.5 });
+        let look = Look { section, ..Look::default() };
+        let svg = line_drawing(&surface, &eye, &look, [400.0, 300.0], "px");
         let outline = lines(&svg, "section");
         assert_eq!(outline.len(), 1);
         let corners = &outline[0];
@@ -203,20 +257,45 @@ mod tests {
         let total: f64 = hatch.iter().map(|line| super::super::visible_parts::length(line)).sum();
         assert!((total * 400.0 * HATCH / area - 1.0).abs() < 0.02, "{total} {area}");
         // From behind, the section is not seen.
-        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, Some(&section), [400.0, 300.0], "px");
+        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, &look, [400.0, 300.0], "px");
         assert!(lines(&behind, "hatching").is_empty());
         assert_eq!(lines(&behind, "contours").len() + lines(&behind, "section").len(), 1);
+    }
+
+    /// Without perspective a box is as large as its sides at one scale, which is that of the bar.
+    #[test]
+    fn a_box_and_a_bar_are_of_one_scale() {
+        let mesh = Mesh::cuboid([1.0, -2.0, 3.0], [13.0, 4.0, 11.0]);
+        let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
+        let view = View { azimuth: -90.0, elevation: 0.0, projection: Projection::Orthographic, size: [800, 600] };
+        let look = Look { marks: Marks { scale_bar: true, axes: true }, ..Look::default() };
+        let svg = line_drawing(&surface, &view, &look, [80.0, 60.0], "mm");
+        let span = |name: &str, k: usize| {
+            let all = lines(&svg, name).concat();
+            all.iter().fold(0.0f64, |m, p| m.max(p[k])) - all.iter().fold(f64::INFINITY, |m, p| m.min(p[k]))
+        };
+        let scale = span("edges", 0) / 12.0;
+        // Whole samples at either end.
+        let step = 80.0 / SAMPLES;
+        assert!((scale * 12.0 - 0.92 * 80.0).abs() < 2.0 * step || span("edges", 1) < 0.92 * 60.0);
+        assert!((span("edges", 1) - 8.0 * scale).abs() < 2.0 * step, "{} {}", span("edges", 1), 8.0 * scale);
+        let at = svg.find(" mm</text>").expect("words");
+        let said: f64 = svg[svg[..at].rfind('>').expect("start") + 1..at].parse().expect("a number");
+        assert!((span("scale_bar", 0) - said * scale).abs() < 2.0 * step, "{said}");
+        assert_eq!(svg.matches("class=\"axis\"").count(), 3);
+        let plain = line_drawing(&surface, &view, &Look::default(), [80.0, 60.0], "mm");
+        assert!(!plain.contains("<text") && !plain.contains("scale_bar"));
     }
 
     /// What lies behind is not drawn, and the drawing is the same for any number of threads.
     #[test]
     fn the_same_for_any_number_of_threads_and_nothing_of_nothing() {
         let surface = contour(16, |p| (0..3).map(|k| (2.0 * core::f64::consts::TAU * p[k]).cos()).sum::<f64>());
-        let drawn = || line_drawing(&surface, &VIEW, None, [400.0, 300.0], "px");
+        let drawn = || line_drawing(&surface, &VIEW, &Look::default(), [400.0, 300.0], "px");
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool").install(drawn);
         assert_eq!(one, drawn());
-        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, None, [400.0, 300.0], "px");
+        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, &Look::default(), [400.0, 300.0], "px");
         assert!(!nothing.contains("<path"));
-        assert!(line_drawing(&surface, &View { size: [0, 3], ..VIEW }, None, [1.0, 1.0], "px").is_empty());
+        assert!(line_drawing(&surface, &View { size: [0, 3], ..VIEW }, &Look::default(), [1.0, 1.0], "px").is_empty());
     }
 }

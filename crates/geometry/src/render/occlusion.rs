@@ -69,7 +69,7 @@ fn estimated(camera: &Camera, near: &[f32], [w, h]: [usize; 2]) -> Vec<f32> {
             let turn = ((x & 3) + 4 * (y & 3)) as f64 * 0.618_033_988_75 * core::f64::consts::TAU;
             let mut dark = 0.0;
             for (reach, weight) in reaches.into_iter().zip([0.62, 0.38]) {
-                let radius = (camera.focal * f64::from(near[y * w + x]) * reach).max(2.0);
+                let radius = (camera.samples_per_mm(f64::from(near[y * w + x])) * reach).max(2.0);
                 let mut sum = 0.0;
                 for k in 0..SKY {
                     let r = radius * ((k as f64 + 0.5) / SKY as f64);

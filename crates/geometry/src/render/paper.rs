@@ -61,6 +61,34 @@ impl Paper {
         }
     }
 
+    /// Fills a rectangle with corners between pixels, each pixel by the share of it that is covered.
+    pub fn rectangle(&mut self, low: [f64; 2], high: [f64; 2], colour: Colour) {
+        let share = |k: usize, at: usize| (high[k].min(at as f64 + 1.0) - low[k].max(at as f64)).clamp(0.0, 1.0);
+        for y in low[1].max(0.0) as usize..high[1].max(0.0).ceil() as usize {
+            for x in low[0].max(0.0) as usize..high[0].max(0.0).ceil() as usize {
+                self.blend([x, y], colour, (share(0, x) * share(1, y)) as f32);
+            }
+        }
+    }
+
+    /// Draws a straight line with round ends, `half` its width.
+    pub fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64, colour: Colour) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let square = along[0] * along[0] + along[1] * along[1];
+        let span = |k: usize| {
+            let (low, high) = (from[k].min(to[k]) - half - 1.0, from[k].max(to[k]) + half + 1.0);
+            low.max(0.0) as usize..high.max(0.0).ceil() as usize
+        };
+        for y in span(1) {
+            for x in span(0) {
+                let d = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
+                let s = if square > 0.0 { ((d[0] * along[0] + d[1] * along[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
+                let off = (d[0] - s * along[0]).hypot(d[1] - s * along[1]);
+                self.blend([x, y], colour, (half - off + 0.5) as f32);
+            }
+        }
+    }
+
     /// Mixes a colour into a pixel, by the share of it that is covered.
     fn blend(&mut self, [x, y]: [usize; 2], colour: Colour, cover: f32) {
         let [w, h] = self.size;

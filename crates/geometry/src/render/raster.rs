@@ -20,7 +20,7 @@ pub(super) struct Raster {
     pub first: usize,
     /// Samples across.
     pub width: usize,
-    /// Inverse distance, 0 where nothing is seen.
+    /// Depth as of `Camera::project`, 0 where nothing is seen.
     pub near: Vec<f32>,
     /// The triangle seen; with `INSIDE` the one behind the section there, in whose plane the depth is.
     pub triangle: Vec<u32>,
@@ -119,7 +119,7 @@ fn fill(
             if u < 0.0 || v < 0.0 || w < 0.0 {
                 continue;
             }
-            // The inverse distance is linear over the screen.
+            // Depth is affine over the screen.
             let z = u * a[2] + v * b[2] + w * c[2];
             let at = y * width + x;
             if z > near[at] && !section.is_some_and(|s| s.removes(f64::from(fx), f64::from(fy) + first as f64, z)) {

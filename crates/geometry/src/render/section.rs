@@ -1,7 +1,7 @@
 //! Sections: what lies beyond a plane is left out, and the solid that the plane cuts is seen in it.
 
-use super::Camera;
-use crate::math::{Vec3, add, dot, scale, sub};
+use super::{Camera, Projection};
+use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 
 /// A plane; what lies where `normal` · p > `offset` is left out.
@@ -17,6 +17,12 @@ impl Section {
     /// Height of a point above the plane (mm).
     pub(super) fn height(&self, p: Vec3) -> f64 {
         dot(self.normal, p) - self.offset
+    }
+
+    /// The plane a hair before: by 1/100 000 of the diagonal of these bounds, which no picture shows, but more than the rounding of depths.
+    /// A face that lies in the plane is then cut as a whole, where it would be in part.
+    pub(super) fn before_faces(&self, bounds: &Aabb) -> Section {
+        Section { offset: self.offset - 1e-5 * norm(bounds.size()), ..*self }
     }
 
     /// The vertices of a mesh that are kept, and the points where the plane cuts its edges; all vertices if the plane leaves out all.
@@ -38,8 +44,8 @@ impl Section {
     }
 }
 
-/// A section as a camera sees it. The inverse distance times the height above the plane is affine in column, row and inverse
-/// distance; `of` has its coefficients, the constant first.
+/// A section as a camera sees it. The height above the plane, by a lens times the inverse distance, is affine in column, row and depth; `of`
+/// has its coefficients, the constant first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenSection {
     of: [f64; 4],
@@ -48,10 +54,18 @@ pub(super) struct SeenSection {
 impl SeenSection {
     pub(super) fn new(section: &Section, camera: &Camera) -> SeenSection {
         let [right, up, out] = camera.axes.map(|a| dot(section.normal, a));
-        let eye = add(camera.center, scale(camera.axes[2], camera.distance));
         let (across, down) = (right / camera.focal, -up / camera.focal);
         let constant = -out - across * camera.middle[0] - down * camera.middle[1];
-        SeenSection { of: [constant, across, down, section.height(eye)] }
+        let d = camera.distance;
+        let of = match camera.projection {
+            Projection::Perspective => {
+                [constant, across, down, section.height(add(camera.center, scale(camera.axes[2], d)))]
+            }
+            Projection::Orthographic => {
+                [section.height(camera.center) + d * constant, d * across, d * down, d * d * out]
+            }
+        };
+        SeenSection { of }
     }
 
     /// Whether the section leaves out the point behind a sample.
@@ -61,9 +75,14 @@ impl SeenSection {
         a + b * x + c * y + d * f64::from(near) > 0.0
     }
 
-    /// The inverse distance of the plane behind a sample, if the eye is in front of it.
+    /// Whether the eye is in front of the plane, where it sees what is cut.
+    pub(super) fn faces_the_eye(&self) -> bool {
+        self.of[3] > 0.0
+    }
+
+    /// The depth of the plane behind a sample, if the eye is in front of it.
     pub(super) fn near(&self, x: f64, y: f64) -> Option<f32> {
         let [a, b, c, d] = self.of;
-        (d > 0.0).then(|| (-(a + b * x + c * y) / d) as f32)
+        self.faces_the_eye().then(|| (-(a + b * x + c * y) / d) as f32)
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::lines::Tubes;
 use super::occlusion::Occlusion;
 use super::raster::{INSIDE, NONE, Projected, Raster, weights};
-use super::{Camera, Colours, Section, View};
+use super::{Camera, Colours, Projection, Section, View};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -47,7 +47,7 @@ pub(super) struct Shader<'a> {
     surface: &'a SurfaceMesh,
     camera: &'a Camera,
     finish: Finish<'a>,
-    normals: Normals,
+    normals: Normals<'a>,
     /// The direction to the key light.
     key: Vec3,
     shade: Option<(Shadows, Occlusion)>,
@@ -55,12 +55,12 @@ pub(super) struct Shader<'a> {
 }
 
 impl<'a> Shader<'a> {
-    /// Prepares a picture of `size` samples across and down.
+    /// Prepares a picture of `size` samples across and down, of a finish and normals at corners.
     pub(super) fn new(
         surface: &'a SurfaceMesh,
         camera: &'a Camera,
         size: [usize; 2],
-        finish: Finish<'a>,
+        (finish, normals): (Finish<'a>, Option<&'a [[f32; 3]]>),
         section: Option<&'a Section>,
     ) -> Shader<'a> {
         let key = towards(camera, -0.55, 0.75, 0.60);
@@ -68,7 +68,7 @@ impl<'a> Shader<'a> {
             Finish::Lines(_) => None,
             _ => Some((Shadows::cast(surface, key, section), Occlusion::of(surface, camera, size, section))),
         };
-        Shader { surface, camera, finish, normals: Normals::of(surface), key, shade, section }
+        Shader { surface, camera, finish, normals: Normals::of(surface, normals), key, shade, section }
     }
 
     /// Premultiplied colour and cover of each sample.
@@ -97,11 +97,11 @@ impl<'a> Shader<'a> {
         {
             return self.cut_through(section, [x, y], near, p, eye);
         }
-        let cut = surface.cut.get(triangle as usize).copied().unwrap_or(false);
+        let cut = is_cut(surface, triangle as usize);
         let flat = unit(area(surface, triangle as usize));
         let t = surface.mesh.triangles[triangle as usize].map(|v| v as usize);
         let k = weights(surface, triangle, p);
-        let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(self.normals.at(surface, t[i], flat), k[i])));
+        let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(self.normals.at_corner(surface, triangle, i, flat), k[i])));
         let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
         // An open mesh may show its inside.
         if dot(flat, eye) < 0.0 {
@@ -114,7 +114,7 @@ impl<'a> Shader<'a> {
             Finish::Plain if cut => CUT,
             Finish::Plain => LATTICE,
         };
-        let (sun, open) = self.light([x, y], near, p, flat);
+        let (sun, open) = self.light([x, y], near, p, n);
         lit([n, eye, self.key], sun, camera, colour, open, cut)
     }
 
@@ -128,10 +128,11 @@ impl<'a> Shader<'a> {
         lit([section.normal, eye, self.key], sun, self.camera, colour, open, true)
     }
 
-    /// The shares of the key light and of the sky that reach a point of a face of normal `flat`.
-    fn light(&self, [x, y]: [usize; 2], near: f32, p: Vec3, flat: Vec3) -> (f32, f32) {
+    /// The shares of the key light and of the sky that reach a point of a surface of normal `n`: the one that is shaded by, so that no facets
+    /// show where the key light grazes.
+    fn light(&self, [x, y]: [usize; 2], near: f32, p: Vec3, n: Vec3) -> (f32, f32) {
         match &self.shade {
-            Some((shadows, occlusion)) => (shadows.light(p, flat), occlusion.open(x, y, near)),
+            Some((shadows, occlusion)) => (shadows.light(p, n), occlusion.open(x, y, near)),
             None => (1.0, 1.0),
         }
     }
@@ -160,7 +161,8 @@ impl Shadows {
         let size = [Self::SIZE; 2];
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
-        let eye = Camera::new(&surface.mesh.bounds(), &surface.mesh.vertices, &View { size, azimuth, elevation }, size);
+        let view = View { size, azimuth, elevation, projection: Projection::Perspective };
+        let eye = Camera::new(&surface.mesh.bounds(), &surface.mesh.vertices, &view, size);
         let raster = Projected::of(surface, &eye, size, section).draw(surface, 0, Self::SIZE);
         let texel = eye.distance / eye.focal;
         Shadows { eye, raster, texel }
@@ -212,28 +214,36 @@ fn lit([n, eye, key]: [Vec3; 3], sun: f32, camera: &Camera, colour: [f32; 3], op
     })
 }
 
-/// Normals at vertices, weighted by area: one for each vertex, but where faces meet in an edge, one for each side.
-pub(super) struct Normals {
-    pub(super) smooth: Vec<[f32; 3]>,
+/// Normals at vertices, weighted by area: one for each vertex, but where faces meet in an edge or a cut ends, one for each side. And those
+/// that are given at corners, which come first.
+pub(super) struct Normals<'a> {
+    given: Option<&'a [[f32; 3]]>,
+    smooth: Vec<[f32; 3]>,
     /// The triangles about a vertex on an edge.
     edges: HashMap<usize, Vec<u32>>,
 }
 
-impl Normals {
+impl<'a> Normals<'a> {
     /// Cosine of the angle from which on faces meet in an edge: 35°.
     pub(super) const EDGE: f64 = 0.82;
 
-    pub(super) fn of(surface: &SurfaceMesh) -> Normals {
+    pub(super) fn of(surface: &SurfaceMesh, given: Option<&'a [[f32; 3]]>) -> Normals<'a> {
         let mesh = &surface.mesh;
+        let given = given.filter(|n| n.len() == 3 * mesh.triangles.len());
         let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
+        // Whether a vertex is one of cuts, and of others.
+        let mut kinds = vec![[false; 2]; mesh.vertices.len()];
         for (i, t) in mesh.triangles.iter().enumerate() {
             let n = area(surface, i);
             for v in t {
                 (0..3).for_each(|k| sums[*v as usize][k] += n[k] as f32);
+                kinds[*v as usize][usize::from(is_cut(surface, i))] = true;
             }
         }
         sums.par_iter_mut().for_each(|n| *n = unit(n.map(f64::from)).map(|c| c as f32));
-        let apart = |i: usize, v: u32| dot(unit(area(surface, i)), sums[v as usize].map(f64::from)) < Self::EDGE;
+        let apart = |i: usize, v: u32| {
+            kinds[v as usize] == [true; 2] || dot(unit(area(surface, i)), sums[v as usize].map(f64::from)) < Self::EDGE
+        };
         let mut edges = HashMap::new();
         for (i, t) in mesh.triangles.iter().enumerate() {
             for v in t.iter().filter(|v| apart(i, **v)) {
@@ -247,18 +257,41 @@ impl Normals {
                 }
             }
         }
-        Normals { smooth: sums, edges }
+        Normals { given, smooth: sums, edges }
     }
 
-    /// The normal at a vertex of a face whose own is `flat`.
-    pub(super) fn at(&self, surface: &SurfaceMesh, vertex: usize, flat: Vec3) -> Vec3 {
+    /// The normal at a corner of a triangle whose own is `flat`.
+    pub(super) fn at_corner(&self, surface: &SurfaceMesh, triangle: u32, corner: usize, flat: Vec3) -> Vec3 {
+        self.given(triangle, corner).unwrap_or_else(|| self.at(surface, triangle, corner, flat))
+    }
+
+    /// The same, of a vertex that lies on no edge which is drawn: one normal for all triangles about it.
+    pub(super) fn at_vertex(&self, surface: &SurfaceMesh, triangle: u32, corner: usize) -> Vec3 {
+        let vertex = surface.mesh.triangles[triangle as usize][corner] as usize;
+        self.given(triangle, corner).unwrap_or_else(|| self.smooth[vertex].map(f64::from))
+    }
+
+    fn given(&self, triangle: u32, corner: usize) -> Option<Vec3> {
+        let n = self.given?[3 * triangle as usize + corner];
+        (n != [0.0; 3]).then(|| n.map(f64::from))
+    }
+
+    /// By the mesh: the sum over the triangles of the same kind that turn little from this one.
+    fn at(&self, surface: &SurfaceMesh, triangle: u32, corner: usize, flat: Vec3) -> Vec3 {
+        let vertex = surface.mesh.triangles[triangle as usize][corner] as usize;
         let Some(around) = self.edges.get(&vertex) else {
             return self.smooth[vertex].map(f64::from);
         };
-        let near = around.iter().map(|i| area(surface, *i as usize));
-        let sum = near.filter(|n| dot(*n, flat) > Self::EDGE * norm(*n)).fold([0.0; 3], add);
+        let cut = is_cut(surface, triangle as usize);
+        let same = around.iter().map(|i| *i as usize).filter(|i| is_cut(surface, *i) == cut);
+        let near = same.map(|i| area(surface, i)).filter(|n| dot(*n, flat) > Self::EDGE * norm(*n));
+        let sum = near.fold([0.0; 3], add);
         if norm(sum) > 0.0 { unit(sum) } else { flat }
     }
+}
+
+fn is_cut(surface: &SurfaceMesh, triangle: usize) -> bool {
+    surface.cut.get(triangle).copied().unwrap_or(false)
 }
 
 /// Twice the area of a triangle, along its normal.

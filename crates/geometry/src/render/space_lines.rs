@@ -7,8 +7,8 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::Section;
 use super::shade::{Normals, area};
+use super::{Camera, Section};
 use crate::math::{Vec3, add, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 use crate::union_find::{find, singles, unite};
@@ -47,11 +47,17 @@ fn key(a: u32, b: u32) -> EdgeKey {
     (a.min(b), a.max(b))
 }
 
-/// All lines of a surface as seen from `eye`; of a section only what is kept. Edges that hang together without a loop and are shorter than
+/// All lines of a surface as a camera sees it; of a section only what is kept. Edges that hang together without a loop and are shorter than
 /// `least` (mm) in all are left out: a coarse mesh has such where the surface bends strongly.
-pub(super) fn space_lines(surface: &SurfaceMesh, eye: Vec3, section: Option<&Section>, least: f64) -> Vec<SpaceLine> {
+pub(super) fn space_lines(
+    surface: &SurfaceMesh,
+    normals: Option<&[[f32; 3]]>,
+    camera: &Camera,
+    section: Option<&Section>,
+    least: f64,
+) -> Vec<SpaceLine> {
     let edges = without_crumbs(surface, sharp_edges(surface), least);
-    let mut lines = contours(surface, eye, &edges.iter().copied().collect());
+    let mut lines = contours(surface, normals, camera, &edges.iter().copied().collect());
     lines.extend(edge_lines(surface, &edges));
     if let Some(section) = section {
         lines = lines.iter().flat_map(|line| kept(line, section)).collect();
@@ -183,8 +189,13 @@ impl Crossings {
     }
 }
 
-fn contours(surface: &SurfaceMesh, eye: Vec3, sharp: &HashSet<EdgeKey>) -> Vec<SpaceLine> {
-    let normals = Normals::of(surface);
+fn contours(
+    surface: &SurfaceMesh,
+    normals: Option<&[[f32; 3]]>,
+    camera: &Camera,
+    sharp: &HashSet<EdgeKey>,
+) -> Vec<SpaceLine> {
+    let normals = Normals::of(surface, normals);
     let mesh = &surface.mesh;
     let on_edge: HashSet<u32> = sharp.iter().flat_map(|(a, b)| [*a, *b]).collect();
     let mut found = Crossings::default();
@@ -196,10 +207,10 @@ fn contours(surface: &SurfaceMesh, eye: Vec3, sharp: &HashSet<EdgeKey>) -> Vec<S
         let flat = unit(flat);
         let corners = mesh.corners(i);
         let n: [Vec3; 3] = core::array::from_fn(|k| match t[k] {
-            v if on_edge.contains(&v) => normals.at(surface, v as usize, flat),
-            v => normals.smooth[v as usize].map(f64::from),
+            v if on_edge.contains(&v) => normals.at_corner(surface, i as u32, k, flat),
+            _ => normals.at_vertex(surface, i as u32, k),
         });
-        let g: [f64; 3] = core::array::from_fn(|k| dot(n[k], sub(eye, corners[k])));
+        let g: [f64; 3] = core::array::from_fn(|k| dot(n[k], camera.to_eye(corners[k])));
         let long = longest(surface, i);
         let between = |a: Vec3, b: Vec3, s: f64| add(a, scale(sub(b, a), s));
         found.add(

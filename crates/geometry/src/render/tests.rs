@@ -1,4 +1,5 @@
 use super::*;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
 /// A surface of a function on a cube by cutting the six tetrahedra of each grid cell, closed at the cube's faces.
@@ -66,7 +67,7 @@ fn gyroid(cells: f64) -> impl Fn(Vec3) -> f64 {
     }
 }
 
-const VIEW: View = View { size: [200, 150], azimuth: 35.0, elevation: 25.0 };
+const VIEW: View = View { size: [200, 150], azimuth: 35.0, elevation: 25.0, projection: Projection::Perspective };
 
 #[test]
 fn nothing_gives_the_background() {
@@ -83,7 +84,7 @@ fn one_triangle_fills_what_it_should() {
         Mesh { vertices: vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 1.0, 1.0]], triangles: vec![[0, 1, 2]] };
     // Seen along −x it is half of a square that fills 92 % of the height.
     let s = SurfaceMesh { mesh, cut: vec![false] };
-    let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200] };
+    let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200], ..VIEW };
     let (with, without) =
         (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
     let pixels = with.chunks(3).zip(without.chunks(3)).filter(|(a, b)| a != b).count() as f64;
@@ -105,7 +106,7 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
         triangles: vec![[4, 5, 6], [4, 6, 7], [0, 1, 2], [0, 2, 3]],
     };
     let s = SurfaceMesh { mesh, cut: vec![true, true, false, false] };
-    let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60] };
+    let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60], ..VIEW };
     let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
     let front = middle(render(&s, &view, &Look::default()));
     let back = middle(render(&s, &View { azimuth: 180.0, ..view }, &Look::default()));
@@ -128,7 +129,7 @@ fn edges_are_smooth_at_any_size() {
         Mesh { vertices: vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.4, 1.0]], triangles: vec![[0, 1, 2]] };
     let s = SurfaceMesh { mesh, cut: vec![true] };
     for size in [[200, 150], [2400, 1800]] {
-        let view = View { azimuth: 0.0, elevation: 0.0, size };
+        let view = View { azimuth: 0.0, elevation: 0.0, size, ..VIEW };
         let (with, without) =
             (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
         let level = |y: usize, x: usize| i32::from(with[3 * (y * size[0] + x)]);
@@ -256,7 +257,7 @@ fn legends_have_room() {
 #[test]
 fn a_section_is_as_large_as_the_solid_there() {
     let ball = contour(24, |p| norm(sub(p, [0.5; 3])) - 0.4);
-    let view = View { size: [200, 200], azimuth: 20.0, elevation: 90.0 };
+    let view = View { size: [200, 200], azimuth: 20.0, elevation: 90.0, projection: Projection::Perspective };
     let look = |offset: f64, side: f64| Look {
         section: Some(Section { normal: [0.0, 0.0, side], offset: side * offset }),
         ..Look::default()
@@ -294,7 +295,7 @@ fn gallery() {
     for (name, s) in
         [("network", contour(160, |p| gyroid(3.0)(p) + 0.25)), ("sheet", contour(160, |p| gyroid(3.0)(p).abs() - 0.3))]
     {
-        let view = View { size: [1200, 900], azimuth: 35.0, elevation: 28.0 };
+        let view = View { size: [1200, 900], azimuth: 35.0, elevation: 28.0, projection: Projection::Perspective };
         let t = std::time::Instant::now();
         let rgb = render(&s, &view, &Look::default());
         let drawn = t.elapsed();
@@ -341,4 +342,93 @@ fn a_transparent_background_mixes_to_the_same_picture() {
     };
     let drawn = render(&s, &VIEW, &legend);
     assert!(drawn.chunks(4).any(|p| p == [40, 40, 44, 255]) && drawn[3] == 0);
+}
+
+/// A box, no triangle of which is a cut.
+fn cuboid(low: Vec3, high: Vec3) -> SurfaceMesh {
+    let mesh = Mesh::cuboid(low, high);
+    SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh }
+}
+
+/// Columns and rows of the pixels that are: first and beyond the last.
+fn spans(size: [usize; 2], is: impl Fn(usize) -> bool) -> [[usize; 2]; 2] {
+    let mut found = [[usize::MAX, 0]; 2];
+    for i in (0..size[0] * size[1]).filter(|i| is(*i)) {
+        for (k, at) in [i % size[0], i / size[0]].into_iter().enumerate() {
+            found[k] = [found[k][0].min(at), found[k][1].max(at + 1)];
+        }
+    }
+    found
+}
+
+const PARALLEL: View = View { size: [400, 300], azimuth: -90.0, elevation: 0.0, projection: Projection::Orthographic };
+
+/// By parallel rays a box is as large as its sides at one scale, from any side and at any depth; by a lens its far side is smaller.
+#[test]
+fn a_box_is_to_scale_by_parallel_rays() {
+    let s = cuboid([1.0, -2.0, 3.0], [13.0, 4.0, 11.0]);
+    let look = Look { background: Background::Transparent, ..Look::default() };
+    for (azimuth, elevation, wide, high) in [(-90.0, 0.0, 12.0, 8.0), (0.0, 0.0, 6.0, 8.0), (-90.0, 90.0, 12.0, 6.0)] {
+        let view = View { azimuth, elevation, ..PARALLEL };
+        let rgba = render(&s, &view, &look);
+        let [x, y] = spans(view.size, |i| rgba[4 * i + 3] >= 128).map(|[a, b]| (b - a) as f64);
+        let scale = f64::min(0.92 * 400.0 / wide, 0.92 * 300.0 / high);
+        // Each side to half a pixel.
+        assert!((x - scale * wide).abs() <= 1.0 && (y - scale * high).abs() <= 1.0, "{x} {y} {scale}");
+        let filled = (0..400 * 300).map(|i| f64::from(rgba[4 * i + 3]) / 255.0).sum::<f64>();
+        assert!((filled - scale * scale * wide * high).abs() <= (x + y) / 3.0, "{filled}");
+    }
+    // From a corner the nearest and the farthest edge are as long as each other.
+    let far = |projection| {
+        let view = View { azimuth: 45.0, elevation: 0.0, projection, size: [400, 300] };
+        let bounds = s.mesh.bounds();
+        let camera = Camera::new(&bounds, &s.mesh.vertices, &view, view.size);
+        let long = |x: f64, y: f64| camera.project([x, y, 3.0])[1] - camera.project([x, y, 11.0])[1];
+        long(1.0, -2.0) / long(13.0, 4.0)
+    };
+    assert!((far(Projection::Orthographic) - 1.0).abs() < 1e-12 && far(Projection::Perspective) < 0.9);
+}
+
+/// The bar is as many pixels long as it says; marks change nothing above the foot but its height, and small pictures have none.
+#[test]
+fn the_scale_bar_is_as_long_as_it_says() {
+    let s = cuboid([0.0; 3], [12.0, 6.0, 2.0]);
+    let white = |marks| Look { background: Background::White, marks, ..Look::default() };
+    let bar = white(Marks { scale_bar: true, axes: false });
+    for size in [[400, 300], [900, 700], [1600, 1200]] {
+        let view = View { size, ..PARALLEL };
+        let rgb = render(&s, &view, &bar);
+        // Below the box, which fills the width, the bar is the longest run of ink in a row.
+        let scale = 0.92 * size[0] as f64 / 12.0;
+        let below = size[1] / 2 + scale as usize + 2;
+        let row = |y: usize| (0..size[0]).map(|x| rgb[3 * (y * size[0] + x)] < 140).collect::<Vec<_>>();
+        let run = |y: usize| row(y).chunk_by(|a, b| a == b).filter(|r| r[0]).map(<[bool]>::len).max().unwrap_or(0);
+        let longest = (below..size[1]).map(run).max().unwrap_or(0) as f64;
+        // 2 mm: 3/10 of the width are 3.9 mm.
+        assert!((longest - 2.0 * scale).abs() <= 1.0, "{longest} {scale}");
+    }
+    let small = View { size: [120, 90], ..PARALLEL };
+    assert!(!bar.fits(&small) && bar.fits(&PARALLEL) && Look::default().fits(&small));
+    assert_eq!(render(&s, &small, &bar), render(&s, &small, &white(Marks::default())));
+    let axes = render(&s, &PARALLEL, &white(Marks { scale_bar: false, axes: true }));
+    let seen = |k: usize| (0..400 * 300).any(|i| axes[3 * i..3 * i + 3] == legend::LINES[k]);
+    assert!((0..3).all(seen), "each axis has its colour, the one that is seen from its end by its letter");
+}
+
+/// A face in the plane of a section is cut as a whole, whatever the camera, and of what lies beyond nothing is left.
+#[test]
+fn a_face_in_the_plane_of_a_section_is_of_one_kind() {
+    let s = cuboid([0.0; 3], [12.0; 3]);
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        for (azimuth, elevation) in [(30.0, 25.0), (77.0, 60.0), (10.0, 90.0)] {
+            let view = View { size: [400, 300], azimuth, elevation, projection };
+            let cut = |offset| {
+                let section = Some(Section { normal: [0.0, 0.0, 1.0], offset });
+                let rgb = render(&s, &view, &Look { section, ..Look::default() });
+                rgb.chunks(3).filter(|p| i32::from(p[0]) - i32::from(p[1]) > 60).count() as f64
+            };
+            let (at, below) = (cut(12.0), cut(11.99));
+            assert!(below > 4000.0 && (at / below - 1.0).abs() < 0.01, "{at} {below}");
+        }
+    }
 }

@@ -31,12 +31,12 @@ impl Seen<'_> {
         if !((0..width).contains(&x) && (0..rows).contains(&y)) {
             return f64::INFINITY;
         }
-        1.0 / f64::from(self.raster.near[(y * width + x) as usize]).max(1e-300)
+        self.camera.distance_of(f64::from(self.raster.near[(y * width + x) as usize]))
     }
 
     fn sees(&self, p: &LinePoint) -> bool {
         let [x, y, near] = self.camera.project(p.at);
-        let (far, slack) = (1.0 / near, BEHIND / (self.camera.focal * near));
+        let (far, slack) = (self.camera.distance_of(near), BEHIND / self.camera.samples_per_mm(near));
         let (x, y) = (x.floor() as i64, y.floor() as i64);
         if (-1..=1).any(|j| (-1..=1).any(|i| far <= self.far(x + i, y + j) + slack)) {
             return true;
