@@ -22,7 +22,7 @@ fn net(report: &DesignReport) -> NetReport {
 fn graded(some: &mut Random, i: u64, keys: &str) -> (String, f64) {
     let r = some.between(8.0, 10.0);
     let fine = some.between(1.8, 2.2);
-    let region = if i % 2 == 0 {
+    let region = if i.is_multiple_of(2) {
         format!("box = {{ min = [{}, {}, {}], max = [{r}, {}, {}] }}", -r, -0.5 * r, -0.4 * r, 0.5 * r, 0.4 * r)
     } else {
         format!("sphere.radius = {r}")
