@@ -1,7 +1,8 @@
 //! Meshes of beams: linear or quadratic line elements with circular sections.
 
 use super::FeSet;
-use crate::math::{Vec3, norm, scale, sub, unit};
+use super::surface_load::shared;
+use crate::math::{Vec3, norm, sub, unit};
 
 /// A mesh of beams.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,12 +83,7 @@ impl BeamMesh {
     /// `force`: shares by their areas.
     pub fn nodal_forces(&self, set: &FeSet, force: Vec3) -> Vec<(u32, Vec3)> {
         let end = |(e, k): &(u32, u8)| (self.elements[*e as usize][*k as usize], self.area(*e as usize));
-        let mut shares: Vec<(u32, f64)> = set.faces.iter().map(end).collect();
-        // Stable, so that sums have the same bits.
-        shares.sort_by_key(|s| s.0);
-        let whole: f64 = shares.iter().map(|s| s.1).sum();
-        let at = |of: &[(u32, f64)]| (of[0].0, scale(force, of.iter().map(|s| s.1).sum::<f64>() / whole));
-        shares.chunk_by(|a, b| a.0 == b.0).map(at).collect()
+        shared(force, set.faces.iter().map(end).collect())
     }
 }
 

@@ -1,7 +1,8 @@
 //! Voxels as finite elements: hexahedra, each with the share of it that is solid, in one piece.
 
 use super::FeSet;
-use crate::math::{Aabb, Vec3, scale};
+use super::surface_load::shared;
+use crate::math::{Aabb, Vec3};
 use crate::union_find::{find, singles, unite};
 
 /// Hexahedra of a regular grid.
@@ -133,12 +134,7 @@ impl HexMesh {
             let (axis, _) = FACING[k as usize];
             self.step[(axis + 1) % 3] * self.step[(axis + 2) % 3]
         };
-        let whole: f64 = set.faces.iter().map(|f| area(f.1)).sum();
-        let mut shares: Vec<(u32, f64)> =
-            set.faces.iter().flat_map(|f| self.face(*f).map(|n| (n, 0.25 * area(f.1) / whole))).collect();
-        shares.sort_by_key(|s| s.0);
-        let at = |of: &[(u32, f64)]| (of[0].0, scale(force, of.iter().map(|s| s.1).sum()));
-        shares.chunk_by(|a, b| a.0 == b.0).map(at).collect()
+        shared(force, set.faces.iter().flat_map(|f| self.face(*f).map(|n| (n, area(f.1)))).collect())
     }
 }
 

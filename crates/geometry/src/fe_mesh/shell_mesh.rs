@@ -1,7 +1,8 @@
 //! Meshes of shells: linear or quadratic triangles on a mid-surface, with a thickness at each node.
 
 use super::FeSet;
-use crate::math::{Vec3, cross, norm, scale, sub};
+use super::surface_load::shared;
+use crate::math::{Vec3, cross, norm, sub};
 
 /// A mesh of shells.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,11 +69,7 @@ impl ShellMesh {
                 }
             }
         }
-        // Stable, so that sums have the same bits.
-        shares.sort_by_key(|s| s.0);
-        let whole: f64 = shares.iter().map(|s| s.1).sum();
-        let at = |of: &[(u32, f64)]| (of[0].0, scale(force, of.iter().map(|s| s.1).sum::<f64>() / whole));
-        shares.chunk_by(|a, b| a.0 == b.0).map(at).collect()
+        shared(force, shares)
     }
 }
 

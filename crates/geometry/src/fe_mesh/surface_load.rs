@@ -20,6 +20,15 @@ const POINTS: [(f64, f64, f64); 7] = {
     ]
 };
 
+/// A force shared among nodes, ascending by node, by the sum of each node's shares.
+pub(super) fn shared(force: Vec3, mut shares: Vec<(u32, f64)>) -> Vec<(u32, Vec3)> {
+    // Stable, so that sums have the same bits.
+    shares.sort_by_key(|s| s.0);
+    let whole: f64 = shares.iter().map(|s| s.1).sum();
+    let at = |of: &[(u32, f64)]| (of[0].0, force.map(|f| f * of.iter().map(|s| s.1).sum::<f64>() / whole));
+    shares.chunk_by(|a, b| a.0 == b.0).map(at).collect()
+}
+
 impl FeMesh {
     /// The work-equivalent forces at the nodes of a set's faces, ascending by node, of a uniform traction whose resultant is `force`:
     /// force · ∫ Nᵢ dA / ∫ dA with the shape functions Nᵢ of the faces. Those of flat quadratic faces are at the middles of edges alone.
@@ -36,11 +45,7 @@ impl FeMesh {
                 }
             }
         }
-        // Stable, so that sums have the same bits.
-        shares.sort_by_key(|s| s.0);
-        let whole: f64 = shares.iter().map(|s| s.1).sum();
-        let at = |of: &[(u32, f64)]| (of[0].0, force.map(|f| f * of.iter().map(|s| s.1).sum::<f64>() / whole));
-        shares.chunk_by(|a, b| a.0 == b.0).map(at).collect()
+        shared(force, shares)
     }
 
     /// ∫ N dA of the nodes of a quadratic face: corners a b c, then the middles of ab, bc, ca.
