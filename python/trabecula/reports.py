@@ -765,8 +765,7 @@ class PermeabilityReport(Report):
     """Edges of the cell, mm, one row each."""
     error: float
     """Estimated relative error of k: its distance from k_n over its size (Frobenius's norm), and what a cell that is not
-    whole numbers of steps adds. Each eigenvalue of k is extrapolated by an order of its own, and changed by half at
-    most."""
+    whole numbers of steps adds. Each eigenvalue of k is extrapolated by an order of its own, and changed by half at most."""
     fraction: float
     """Solid fraction of the cell."""
     grids: list[CellGrid]

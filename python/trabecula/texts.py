@@ -188,7 +188,8 @@ def _tiling(it: Report) -> Iterator[str]:
 
 def _distortion(it: Report) -> Iterator[str]:
     mean, most = max(a.mean for a in it.angle), max(a.max for a in it.angle)
-    yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most at the points sampled, each of the axis where that is greatest"
+    where = "at the points sampled, each of the axis where that is greatest"
+    yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most {where}"
     ratio = max((s.mean for s in it.spacing), key=lambda mean: max(mean, 1 / mean))
     farthest = max(s.max for s in it.spacing)
     yield (
