@@ -75,7 +75,7 @@ def mesh(args) -> None:
 def mesh_step(args) -> None:
     """``trabecula mesh -o OUT.step``."""
     names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "triangles")
-    why = "a STEP file: it has smooth faces, and no triangles"
+    why = "a STEP file: it has smooth faces, and all components"
     refuse_others(args, names, ("drop-small", "keep"), why)
 
     def words(made: dict) -> str:

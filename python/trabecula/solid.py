@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import math
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
 from .beam_files import save_beams
+from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
 from .given import flag, number, positions, positive, thread_count
@@ -463,7 +465,7 @@ class Solid(Seen, Simulated, Resolution):
         assembly: bool | None = None,
     ) -> StepReport:
         """Writes a STEP file (.step or .stp; mm) of smooth faces for CAD systems, and gives its figures. Each connected
-        component is a solid. ``protocol`` is "ap214" or "ap242".
+        component is a solid, with a warning of several. ``protocol`` is "ap214" or "ap242".
 
         Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
         rational B-splines; where a box, a tetrahedron, half-spaces or an intersection of these cuts them, the cuts are planar
@@ -483,7 +485,15 @@ class Solid(Seen, Simulated, Resolution):
         name = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
-            return self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
+            made = self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
+            if made.parts is None and made.solids > 1:
+                warnings.warn(
+                    f"the file has {made.solids} solids that do not touch: a STEP file keeps all components, of which meshes "
+                    "drop the small ones",
+                    DesignWarning,
+                    stacklevel=2,
+                )
+            return made
 
     def save_beams(
         self, path: str | os.PathLike[str], chord: float | None = None, mesh: bool = True, threads: int | None = None
