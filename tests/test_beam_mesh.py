@@ -180,3 +180,11 @@ def test_meshio_reads_beams(tmp_path):
         read = meshio.read(tmp_path / "a.vtu")
         assert (read.cells_dict[kind] == mesh.elements).all() and (read.points == mesh.nodes).all()
         assert (read.cell_data["radius"][0].ravel() == mesh.radii).all()
+
+
+def test_a_force_on_what_is_held_is_refused(tmp_path):
+    """A flat frame has the same nodes least and farthest along z."""
+    flat = wireframe([[0, 0, 0], [9, 0, 0], [9, 9, 0]], [[0, 1], [1, 2]])
+    with pytest.raises(ValueError, match="all nodes of Z1, which is loaded, are held by Z0"):
+        flat.beam_mesh().write(tmp_path / "a.inp", hold=["Z0"], load={"Z1": (0, 0, 1)})
+    flat.beam_mesh().write(tmp_path / "a.inp", hold=["X0"], load={"Z1": (0, 0, 1)})

@@ -130,7 +130,10 @@ def test_reports_layers_and_laws_compare_and_print(solid):
         (lambda s: s.mesh(edge=0.5).png(lines=[[0, 0, 0]]), "lines must be polylines by name"),
         (lambda s: lt.write_parts("p.3mf", s.mesh(edge=0.5)), "parts must be meshes by name"),
         (lambda s: lt.write_parts("p.3mf", {"a": 3}), "parts must be meshes by name"),
-        (lambda s: lt.objective(lt.Design(BOX, gyroid()), ["lattice.core.level.fraction"], ["volume"])([0.3]), "path: value"),
+        (
+            lambda s: lt.objective(lt.Design(BOX, gyroid()), ["lattice.core.level.fraction"], ["volume_mm3"])([0.3]),
+            "path: value",
+        ),
         (lambda s: lt.objective(lt.Design(BOX, gyroid()), [], [], properties={"stiffness": {"q": 1}}), 'no setting "q"'),
     ],
 )

@@ -715,3 +715,13 @@ def test_a_property_that_fails_leaves_the_rest_of_its_row():
     table = lt.sweep(study, per_cell=16, properties={"stiffness": {"n": 16}, "conductivity": {"n": 16, "pore": 0.5}})
     assert table["volume_mm3"][0] == pytest.approx(6.4, rel=0.05) and table["k11"][0] > 0.5
     assert table["C11"][0] is None and table["error"][0].startswith("stiffness: ")
+
+
+def test_the_command_keeps_rows_whose_property_fails(tmp_path):
+    base = BASE.replace('cell = "gyroid"', 'cell = "primitive"').replace('part = "sheet"', 'part = "lower"')
+    (tmp_path / "balls.toml").write_text(base + '[sweep]\n"lattice.a.level.fraction" = [0.1, 0.12]')
+    words = ("--per-cell", 12, "--properties", "stiffness", "--n", 16)
+    done = command("sweep", tmp_path / "balls.toml", "-o", tmp_path / "balls.csv", *words)
+    assert done.returncode == 0 and "2 of them with an error" in done.stdout
+    rows = table(tmp_path / "balls.csv")
+    assert all(float(row["volume_mm3"]) > 5 and row["error"].startswith("stiffness: ") for row in rows)

@@ -20,7 +20,18 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
 
-__all__ = ["LAST", "PROPERTIES", "TEXTS", "Job", "check_paths", "columns_of_job", "named", "row_of", "unit_of_column"]
+__all__ = [
+    "LAST",
+    "PROPERTIES",
+    "TEXTS",
+    "Job",
+    "check_paths",
+    "columns_of_job",
+    "is_made",
+    "named",
+    "row_of",
+    "unit_of_column",
+]
 
 #: Units of the columns of figures; those of parameters are the design's: mm and degrees.
 UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm²", "seconds": "s"} | {
@@ -93,7 +104,7 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
         if job.meshes or job.pictures:
             mesh = solid.mesh(**resolution, threads=job.threads)
             measured = mesh.measure()
-            for pattern, write in ((job.meshes, mesh.write), (job.pictures, mesh.render)):
+            for pattern, write in ((job.meshes, mesh.write), (job.pictures, lambda path: mesh.render(path, solid=solid))):
                 if pattern:
                     write(named(pattern, number))
         else:
@@ -105,6 +116,7 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
                 found = getattr(solid, name)(threads=job.threads, **settings)
             except FAULTS as error:  # what else was found of the design stays
                 failed.append(f"{name}: {_words(error)}")
+                figures |= dict.fromkeys(PROPERTIES[name].columns)
                 continue
             figures |= dict(zip(PROPERTIES[name].columns, PROPERTIES[name].figures(found), strict=True))
             reported += [f"{name}: {warning.message}" for warning in found.warnings]
@@ -112,6 +124,11 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     figures["error"] = " | ".join(failed) or None
     return figures
+
+
+def is_made(row: Mapping[str, Any]) -> bool:
+    """Whether there is a solid of this row, of which a property may be missing."""
+    return row.get("volume_mm3") is not None
 
 
 def _varied(design: Design, values: Mapping[str, Any]) -> _core.Design:

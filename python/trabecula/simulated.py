@@ -28,7 +28,7 @@ __all__ = ["Simulated"]
 
 #: Bytes for each voxel of a cell: six fields of displacements, residuals and directions, on all grids; three of temperature.
 STIFFNESS_BYTES, CONDUCTIVITY_BYTES = 800, 200
-#: Memory of voxels cut by the interface of two conductors, for each face of a voxel on the faces of the cell.
+#: Bytes of voxels that the interface of two conductors cuts, for each of n² squares: some twelve of 800 bytes.
 CUT_BYTES = 10_000
 #: Bytes for each node of a pore: nineteen populations, where each comes from, and the states that are combined.
 PERMEABILITY_BYTES = 1300

@@ -15,7 +15,7 @@ from .errors import Refused, WrongUsage
 from .files import read_text, write_svg
 from .formats import kind_of
 from .keys import nearest
-from .rows import TEXTS, Job, columns_of_job, named
+from .rows import TEXTS, Job, columns_of_job, is_made, named
 from .scatter import scatter, without_place
 from .study import Study
 from .sweeps import FEW, Journal, columns_of, prepared, run, write_table
@@ -53,7 +53,7 @@ def table_of(design: Design, args) -> dict[str, Any]:
         make(job, points, journal, add, args)
         made = [journal.rows[number] for number in range(len(points))]
         failed = [row for row in made if row["error"]]
-        if len(failed) == len(made):
+        if not any(map(is_made, made)):
             journal.end()
             reasons = list(dict.fromkeys(row["error"] for row in failed))[:3]
             raise Refused(f"none of {len(made)} designs can be made; the first reasons: " + "; ".join(reasons))

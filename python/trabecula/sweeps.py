@@ -20,7 +20,7 @@ from .files import check_place, extension, whole_file
 from .formats import MESH_WRITES, SWEEP_WRITES
 from .given import whole
 from .keys import nearest
-from .rows import LAST, PROPERTIES, TEXTS, Job, check_paths, columns_of_job, named, row_of, unit_of_column
+from .rows import LAST, PROPERTIES, TEXTS, Job, check_paths, columns_of_job, is_made, named, row_of, unit_of_column
 from .sent import digests
 from .simulated import Simulated
 from .study import Study
@@ -202,7 +202,9 @@ class Journal:
             file.truncate(begun)
 
             def write(line: dict[str, Any]) -> None:
-                file.write(json.dumps(line).encode() + b"\n")
+                left = memoryview(json.dumps(line).encode() + b"\n")
+                while left:  # a disk that fills takes a part, and then none with an error
+                    left = left[file.write(left) or 0 :]
 
             def add(row: dict[str, Any]) -> None:
                 self.rows[row["design"]] = row
@@ -217,7 +219,9 @@ class Journal:
                 raise
             finally:
                 if self.ended:
-                    file.close()
+                    # While it is locked, where a file that is open can be removed.
+                    if os.name == "nt":
+                        file.close()
                     with suppress(FileNotFoundError):
                         os.remove(self.path)
 
@@ -228,7 +232,7 @@ class Journal:
         if not read:
             return 0
         changed = differences(read[0], self.head)
-        if changed and any(row["error"] is None for row in read[1:]):
+        if changed and any(map(is_made, read[1:])):
             raise Refused(
                 f"{self.path} holds {len(read) - 1} rows of another sweep: changed since are {', '.join(changed[:6])}; "
                 "take that back, or begin anew with --new"

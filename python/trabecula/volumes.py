@@ -61,7 +61,9 @@ class VolumeSet(NamedTuple):
 class FiniteElements:
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
-    _of_sets = "faces"
+    #: What a set needs that is held or loaded.
+    _of_sets = "faces on the boundary"
+    sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
 
     @cached_property
@@ -71,7 +73,7 @@ class FiniteElements:
     @property
     def volume(self) -> float:
         """Volume of the solid, mm³: of all domains of tetrahedra, of each hexahedron its solid share, of shells the thickness
-        integrated over the area.
+        integrated over the area, of beams area times length, where hubs count for each of theirs.
         """
         return self._figures.volume
 
@@ -92,7 +94,7 @@ class FiniteElements:
         if name not in self._figures.sets:
             raise ValueError(f"{what}: the mesh has no set {name}; it has {', '.join(self._figures.sets)}")
         if not self._figures.sets[name].faces:
-            raise ValueError(f"{what}: the set {name} has no {self._of_sets} on the boundary")
+            raise ValueError(f"{what}: the set {name} has no {self._of_sets}")
         return name
 
     def _write(
@@ -117,6 +119,7 @@ class FiniteElements:
         loads = [(self._with_faces("load", k), _resultant(f"the force on {k}", v)) for k, v in (load or {}).items()]
         if held or loads:
             self._check_loads()
+            self._check_held(held, loads)
         if fields and kind not in ("vtu", "xdmf"):
             raise ValueError(f"fields are written to .vtu and .xdmf, not .{kind}")
         further = {name: self._field(name, values) for name, values in (fields or {}).items()}
@@ -130,6 +133,15 @@ class FiniteElements:
         title = f"Trabecula {_core.__version__}: {os.path.splitext(os.path.basename(os.fsdecode(path)))[0]}"
         with whole_file(path) as temporary:
             self._core.write((temporary, kind, title), moduli, held, loads, arrays, *more)
+
+    def _check_held(self, held: Sequence[str], loads: Sequence[tuple[str, list[float]]]) -> None:
+        """Refuses a force on nodes all of which are held by other sets."""
+        import numpy as np
+
+        fast = np.unique(np.concatenate([self.sets[name].nodes for name in held]))
+        for name, force in loads:
+            if np.isin(self.forces(name, force)[0], fast).all():
+                raise ValueError(f"all nodes of {name}, which is loaded, are held by {', '.join(held)}: the force does nothing")
 
     def _of_elements(self) -> dict[str, NDArray]:
         """What each element has."""
@@ -403,7 +415,7 @@ class VoxelElements(FiniteElements):
 class ShellMesh(FiniteElements):
     """Triangles on the mid-surface of a sheet, with the wall's thickness at each node. Made by ``Solid.shell_mesh``."""
 
-    _of_sets = "edges"
+    _of_sets = "edges on the border"
 
     def __init__(self, core: _core.Shells):
         self._core = core
@@ -463,7 +475,7 @@ class ShellMesh(FiniteElements):
 class BeamMesh(FiniteElements):
     """Beams as line elements along their axes, each with a circular section. Made by ``Solid.beam_mesh``."""
 
-    _of_sets = "ends"
+    _of_sets = "ends of elements"
 
     def __init__(self, core: _core.BeamElements):
         self._core = core

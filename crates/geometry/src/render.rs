@@ -94,8 +94,8 @@ const SAMPLES: usize = 6_000_000;
 
 /// Draws the surface; returns rows from the top, RGB, or RGBA (not premultiplied) on a transparent background.
 ///
-/// Fitted to the bounds but for a margin of 4 % on each side, above legend and marks, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
-/// boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
+/// Fitted to the bounds but for a margin of 4 % on each side, above legend and marks, +Z up, nine samples a pixel. The lattice is smooth
+/// and warm, cuts by the region's boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
 /// gives no rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
 pub fn render(surface: &SurfaceMesh, view: &View, look: &Look) -> Vec<u8> {
     render_in_bands(surface, view, look, SAMPLES)

@@ -396,9 +396,11 @@ impl Mesh {
             "transparent" => Background::Transparent,
             _ => Background::Shaded,
         };
-        let (view, look) = (view(seen), Look { colours: scale.or(parts), lines, background, ..look(cut) });
-        let bytes =
-            run(py, None, None, |_| png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi))?;
+        let (view, mut look) = (view(seen), Look { colours: scale.or(parts), lines, background, ..look(cut) });
+        let bytes = run(py, None, None, |_| {
+            look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
+            png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi)
+        })?;
         Ok((PyBytes::new(py, &bytes), look.fits(&view)))
     }
 

@@ -24,7 +24,7 @@ const LAYERS: &[&[&str]] = &[
     &["blend"],
     &["solid"],
     &["extract", "layers", "patches", "volume_mesh", "voxel_fractions"],
-    &["analysis", "shell_mesh"],
+    &["analysis", "beam_mesh", "shell_mesh"],
     &["report"],
     &["effective"],
     &["design"],

@@ -12,6 +12,7 @@ use crate::graph::position_text;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, add, dot, sub};
 use geometry::mesh::Mesh;
+use geometry::progress::Cancellation;
 
 use super::Quadors;
 use super::collisions::Collision;
@@ -51,10 +52,11 @@ impl Quadors {
         let coarse = chord.max(MIN_ESTIMATE_CHORD * self.scale);
         let classes = self.classes();
         let step = classes.sample.len().div_ceil(ESTIMATE_HUBS);
+        let request = Cancellation::current();
         let each = (0..classes.sample.len()).into_par_iter().step_by(step).map(|c| {
             let n = classes.count[c] as f64;
             let triangles = |finer: f64| {
-                let mesh = self.hub_mesh(classes.sample[c], finer * coarse)?;
+                let mesh = request.enter(|| self.hub_mesh(classes.sample[c], finer * coarse))?;
                 Ok(finer * mesh.triangles.len() as f64)
             };
             let made = triangles(FINER[0]);
@@ -105,10 +107,11 @@ impl Quadors {
         let mut tessellation = Tessellation { quadors: self, classes: self.classes(), meshes: Vec::new(), chord };
         let misses = self.near_misses(NEAR * chord);
         // If triangles of beams that nearly touch cross, or vertices cannot be moved, everything is refined.
-        let mut fault = None;
+        let (mut fault, request) = (None, Cancellation::current());
         for finer in FINER {
             tessellation.chord = chord * finer;
-            let meshes = (tessellation.classes.sample.par_iter()).map(|&i| self.hub_mesh(i, tessellation.chord));
+            let one = |&i: &usize| request.enter(|| self.hub_mesh(i, tessellation.chord));
+            let meshes = tessellation.classes.sample.par_iter().map(one);
             match meshes.collect::<Result<_, _>>() {
                 Ok(meshes) => tessellation.meshes = meshes,
                 Err(found) => {

@@ -28,8 +28,9 @@ pub(super) struct Written<'a> {
 /// What else the design has: lattices, a blend, a skin or kept zones.
 pub(super) fn written(built: &Built) -> Result<Written<'_>, Fault> {
     let refuse = |why: &str| {
-        let message =
-            format!("a file of beams has beams alone, and {why}; write a mesh (3mf, stl) without --beams instead");
+        let message = format!(
+            "beams as such are written of a design that has nothing else, and {why}; mesh its surface or its solid instead"
+        );
         Fault::new("", message)
     };
     let (name, beams) = build_beams::only(built).map_err(refuse)?;

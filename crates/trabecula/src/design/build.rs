@@ -167,7 +167,7 @@ fn tiled(
     let Finished { tiling, placed, field, net, radii, fraction: finished } = done;
     let coverage = net.as_ref().map(|rods| Coverage::new(&tiling, rods));
     if let Some(of) = &coverage {
-        of.warn(opening, &format!("{}.map.tets.surface", environment.path), warnings);
+        of.warn(opening, &format!("{}.map.tets", environment.path), warnings);
     }
     let (name, ends) = (domain.name.to_string(), domain.ends());
     let mesh = domain.report;

@@ -58,25 +58,31 @@ impl Coverage {
 
     /// Warns of ports that no rod reaches, and of openings wider than `most` (mm).
     pub(super) fn warn(&self, most: Option<f64>, path: &str, warnings: &mut Vec<Warning>) {
-        let mut say = |message: String| warnings.push(Warning { path: path.to_string(), message });
+        let mut say = |key: &str, message: String| warnings.push(Warning { path: format!("{path}.{key}"), message });
         if self.ports == 0 {
-            say("the lattice has no ports on the surface, so the net ties nothing: take a higher fraction or another cell".into());
+            say("surface", "the lattice has no ports on the surface, so the net ties nothing: take a higher fraction or another cell".into());
         }
         if let Some(at) = self.at {
-            say(format!(
-                "no rod of the net reaches {} of {} ports, such as that at {}: its rods follow the ports of the first cell at the mean \
+            say(
+                "surface",
+                format!(
+                    "no rod of the net reaches {} of {} ports, such as that at {}: its rods follow the ports of the first cell at the mean \
                  level; let the fraction vary less, or take cells with ports in the same places",
-                self.untied,
-                self.ports,
-                position_text(at)
-            ));
+                    self.untied,
+                    self.ports,
+                    position_text(at)
+                ),
+            );
         }
         if let Some(most) = most.filter(|most| self.opening > *most) {
-            say(format!(
-                "the net has openings of up to {:.3} mm, at {}, wider than {most} mm: take smaller tetrahedra or thicker rods",
-                self.opening,
-                position_text(self.opening_at)
-            ));
+            say(
+                "net.opening",
+                format!(
+                    "the net has openings of up to {:.3} mm, at {}, wider than {most} mm: take smaller tetrahedra or thicker rods",
+                    self.opening,
+                    position_text(self.opening_at)
+                ),
+            );
         }
     }
 }

@@ -194,7 +194,12 @@ impl Net {
         // Nodes may coincide, where the mesh is finer than what it follows.
         let long = |ends: &&[u32; 2]| self.length(**ends) > SHORTEST * radii[ends[0] as usize];
         let rods = self.rods.iter().filter(long);
-        let beams = rods.map(|ends| Beam { ends: *ends, profile: Profile::Cone }).collect();
+        // Between equal hubs that are small the cone's parameter rounds to the cylinder's, which is none of a cone.
+        let profile = |ends: &[u32; 2]| match ends.map(|n| radii[n as usize]) {
+            [a, b] if a == b => Profile::Cylinder,
+            _ => Profile::Cone,
+        };
+        let beams = rods.map(|ends| Beam { ends: *ends, profile: profile(ends) }).collect();
         let quadors = Arc::new(Quadors::new(&Graph { hubs: hubs.collect(), beams }, Fillet::None)?);
         Ok(CsgSolid { surfaces: vec![Surface::smooth(quadors)], tree: CsgTree::Leaf(0) })
     }

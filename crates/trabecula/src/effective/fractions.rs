@@ -1,7 +1,7 @@
 //! Solid fractions of the voxels of a cell and interfaces through them, with the symmetry of its solid.
 
 use geometry::math::{Mat3, Vec3, dot};
-use geometry::progress::{Progress, Stopped};
+use geometry::progress::{Cancellation, Progress, Stopped, checkpoint};
 use homogenise::Interface;
 use rayon::prelude::*;
 
@@ -58,8 +58,9 @@ pub fn interfaces(solid: &CsgSolid, edges: &Mat3, shape: [usize; 3], fractions: 
     // Of three that are the same, one is found.
     let first = |i: &usize| !cyclic || orbit(n, *i).iter().all(|other| i <= other);
     let voxels: Vec<usize> = (0..fractions.len()).filter(cut).filter(first).collect();
-    let mut found: Vec<Interface> =
-        voxels.par_chunks(BATCH).flat_map_iter(|voxels| interfaces_in(solid, shape, voxels)).collect();
+    let request = Cancellation::current();
+    let each = |voxels| request.enter(|| interfaces_in(solid, shape, voxels));
+    let mut found: Vec<Interface> = voxels.par_chunks(BATCH).flat_map_iter(each).collect();
     if cyclic {
         let others = |i: Interface| {
             let [own, next, last] = orbit(n, i.voxel);
@@ -85,6 +86,7 @@ fn orbit(n: usize, voxel: usize) -> [usize; 3] {
 
 /// The interfaces through these voxels: the surfaces that decide there by their planes at the centre.
 fn interfaces_in(solid: &CsgSolid, [nx, ny, nz]: [usize; 3], voxels: &[usize]) -> Vec<Interface> {
+    checkpoint();
     let half = [nx, ny, nz].map(|n| 0.5 / n as f64);
     let centre = |i: &usize| [0, 1, 2].map(|a| half[a] * (2 * [i % nx, i / nx % ny, i / nx / ny][a] + 1) as f64);
     let points: Vec<Vec3> = voxels.iter().map(centre).collect();

@@ -62,8 +62,7 @@ fn a_net_follows_the_size_of_tetrahedra() {
     }
 }
 
-/// A radius that is given holds where tetrahedra have room for it, and nowhere more; in layers of prisms, whose tetrahedra are flat, rods
-/// and rounded ends are thinner than on the other side of the part.
+/// A radius that is given holds where tetrahedra have room for it, and nowhere more.
 #[test]
 fn a_given_radius_is_the_largest() {
     let mut some = Random(6);
@@ -109,7 +108,7 @@ fn a_net_is_where_a_skin_is_open() {
     };
     let count = |skin: &str| net(&built(&text(skin)).report()).ports;
     let (all, top) = (count(""), count("skin = { thickness = 0.8, open = [\"+z\"] }"));
-    // One port on each triangle: those of the upper face, and of none beside it.
+    // One port on each triangle: those of the upper face, and of no other.
     println!("{all} {top}");
     assert!(top > 0 && 6 * top < 2 * all, "{top} of {all}");
     let refused = Design::from_toml(&text("skin.thickness = 0.8")).expect("design").build(&NoFiles).map(|_| ());
