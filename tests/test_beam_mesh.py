@@ -101,7 +101,7 @@ def test_sets_loads_and_components(tmp_path):
     assert (alone.pieces, alone.length, alone.loose) == (1, 9, 2)
     with pytest.raises(ValueError, match="2 components"):
         apart.beam_mesh(islands="error")
-    with pytest.raises(ValueError, match="beams alone"):
+    with pytest.raises(ValueError, match="nothing else, and this design is not one graph of beams"):
         lattice().beam_mesh()
     for asked, words in (({"edge": 0}, "edge is 0"), ({"order": 3}, "order is 3"), ({"edge": 1e-9}, "at most")):
         with pytest.raises(ValueError, match=words):

@@ -722,6 +722,6 @@ def test_the_command_keeps_rows_whose_property_fails(tmp_path):
     (tmp_path / "balls.toml").write_text(base + '[sweep]\n"lattice.a.level.fraction" = [0.1, 0.12]')
     words = ("--per-cell", 12, "--properties", "stiffness", "--n", 16)
     done = command("sweep", tmp_path / "balls.toml", "-o", tmp_path / "balls.csv", *words)
-    assert done.returncode == 0 and "2 of them with an error" in done.stdout
+    assert done.returncode == 0 and "2 of them with an error" in done.stderr
     rows = table(tmp_path / "balls.csv")
     assert all(float(row["volume_mm3"]) > 5 and row["error"].startswith("stiffness: ") for row in rows)
