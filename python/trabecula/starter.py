@@ -38,7 +38,7 @@ wavelength = {wavelength:<15g}# the cell's edge; or three: [5, 5, 8]
 # rotate = [0, 0, 45]       # turns the lattice about x, y, z
 # offset = [0, 0, 0]        # moves it
 
-# How much is solid: one of fraction, porosity, thickness, iso. Each may vary in space:
+# How much is solid: one of fraction, porosity, thickness, pore, iso, stiffness, permeability. Each may vary in space:
 #   fraction = {{ linear = {{ along = [0, 0, 1], stops = [[-10, 0.20], [10, 0.45]] }} }}
 #   fraction = {{ depth = {{ stops = [[0, 0.60], [4, 0.25]] }} }}
 #   fraction = {{ formula = "0.3 + 0.1*sin(x/5)" }}
