@@ -74,7 +74,7 @@ def write_surface(path: str | os.PathLike[str], stiffness: Sequence[Sequence[flo
     kind = extension(path, SURFACE_WRITES)
     mesh, along = surface(stiffness)
     label = f"Young's modulus E{unit and f', {unit}'}"
-    draw = {"png": lambda: mesh.png((1200, 900), color=along, label=label), "ply": lambda: ply(mesh, along)}
+    draw = {"png": lambda: mesh.png((1200, 900), color=along, label=label, axes=True), "ply": lambda: ply(mesh, along)}
     data = draw.get(kind, lambda: vtu(mesh, along))()
     write_bytes(path, data)
 
