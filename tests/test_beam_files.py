@@ -133,7 +133,7 @@ def test_chains_of_frusta_read_back_are_the_quadrics_that_they_were(tmp_path, ra
 
 def test_what_no_file_of_beams_holds_is_refused(tmp_path):
     skin = CUT + "[skin]\nthickness = 1\n"
-    with pytest.raises(ValueError, match=r"skin or a kept zone.*write a mesh"):
+    with pytest.raises(ValueError, match=r"skin or a kept zone.*mesh its surface"):
         built(skin).save_beams(tmp_path / "a.3mf")
     with pytest.raises(ValueError, match="not one graph of beams"):
         design = lt.spartan("gyroid", wavelength=5, porosity=0.7, region=lt.region.box([10, 10, 10]))

@@ -347,3 +347,11 @@ def whole(built, fillet):
     more = {"fillet": fillet} if fillet else {}
     beams = lt.Beams(nodes=nodes, struts=graph["struts"].tolist(), radius=radius, **more)
     return lt.Design(region=lt.region.box(min=[-20, -20, -20], max=[30, 30, 30]), beams=beams).build()
+
+
+def test_loose_components_of_a_lattice_are_warned_of(tmp_path):
+    """Meshes drop what a cut leaves; a STEP file has it."""
+    core = lt.Lattice("gyroid", "sheet", lt.map.affine(8), lt.level.thickness(0.8))
+    solid = lt.Design(region=lt.region.box(size=[16, 8, 8]), lattice=core).build()
+    with pytest.warns(lt.DesignWarning, match="3 solids that do not touch"):
+        assert solid.save_step(tmp_path / "a.step").solids == 3

@@ -465,7 +465,7 @@ class Solid(Seen, Simulated, Resolution):
         assembly: bool | None = None,
     ) -> StepReport:
         """Writes a STEP file (.step or .stp; mm) of smooth faces for CAD systems, and gives its figures. Each connected
-        component is a solid, with a warning of several. ``protocol`` is "ap214" or "ap242".
+        component is a solid, with a warning of several of a lattice. ``protocol`` is "ap214" or "ap242".
 
         Beams alone are exact: cylinders, cones and balls are written as such, other beams as surfaces of revolution, fillets as
         rational B-splines; where a box, a tetrahedron, half-spaces or an intersection of these cuts them, the cuts are planar
@@ -486,7 +486,7 @@ class Solid(Seen, Simulated, Resolution):
         within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
             made = self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
-            if made.parts is None and made.solids > 1:
+            if made.angle is not None and made.solids > 1:  # of lattices; beams that stand apart are meant
                 warnings.warn(
                     f"the file has {made.solids} solids that do not touch: a STEP file keeps all components, of which meshes "
                     "drop the small ones",
