@@ -438,7 +438,7 @@ def test_memory_that_a_limit_leaves(tmp_path, cube):
     cube.write_text(CUBE.replace("[8, 8, 8]", "[60, 60, 60]"))
     limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))  # noqa: E731
     # Smoothing holds the mesh.
-    words = [*COMMAND, "mesh", str(cube), "-o", "a.ply", "--edge", "0.04", "--threads", "1", "--smooth"]
+    words = [*COMMAND, "mesh", str(cube), "-o", "a.ply", "--edge", "0.08", "--threads", "1", "--smooth"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=limit)
     assert done.returncode == 1 and "of memory" in done.stderr and "try edge" in done.stderr, done.stderr
 
