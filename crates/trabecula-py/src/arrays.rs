@@ -1,7 +1,7 @@
 //! Arrays of points in, arrays of numbers out.
 
 use geometry::spatial_order::spatial_order;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -23,6 +23,12 @@ pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
         ))),
         None => Ok(points),
     }
+}
+
+/// Rows of numbers as an array (n, N).
+pub fn table<T: Element, const N: usize>(py: Python<'_>, rows: Vec<[T; N]>) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let shape = [rows.len(), N];
+    rows.into_flattened().into_pyarray(py).reshape(shape)
 }
 
 /// Values of a field at points.

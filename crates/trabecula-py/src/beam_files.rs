@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use geometry::formats::{Companions, GRAPH_FORMATS, Indexed};
 use geometry::progress::Stopped;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::table;
 use crate::error;
 use crate::file;
 use crate::mesh::{Mesh, metadata};
@@ -49,19 +50,9 @@ type Graph<'py> = (
 pub fn read_graph<'py>(py: Python<'py>, bytes: &[u8], suffix: &str) -> PyResult<Graph<'py>> {
     let read = run(py, None, None, |_| geometry::formats::read_graph(bytes, suffix))?;
     let graph = read.map_err(|f| PyValueError::new_err(f.to_string()))?;
-    let (n, m) = (graph.nodes.len(), graph.beams.len());
     let radii = (!graph.radii.is_empty()).then(|| graph.radii.into_pyarray(py));
-    let of_beams = (!graph.beam_radii.is_empty())
-        .then(|| graph.beam_radii.into_flattened().into_pyarray(py).reshape([m, 2]))
-        .transpose()?;
-    Ok((
-        graph.nodes.into_flattened().into_pyarray(py).reshape([n, 3])?,
-        radii,
-        graph.beams.into_flattened().into_pyarray(py).reshape([m, 2])?,
-        of_beams,
-        graph.in_mm,
-        graph.remarks,
-    ))
+    let of_beams = (!graph.beam_radii.is_empty()).then(|| table(py, graph.beam_radii)).transpose()?;
+    Ok((table(py, graph.nodes)?, radii, table(py, graph.beams)?, of_beams, graph.in_mm, graph.remarks))
 }
 
 /// Writes the beams of a solid as 3MF with the beam lattice extension: frusta whose radii are within `tolerance` (mm) of those of the

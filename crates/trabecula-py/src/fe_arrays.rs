@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use geometry::fe_mesh::FeSet;
 use geometry::formats::{FeField, FeText};
 use geometry::math::Vec3;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::table;
 use crate::file;
 use crate::run::run;
 
@@ -24,16 +25,14 @@ pub type Field = (String, usize, bool, Vec<f64>);
 
 /// A set as arrays.
 pub fn members<'py>(py: Python<'py>, set: &FeSet) -> PyResult<Members<'py>> {
-    let faces: Vec<u32> = set.faces.iter().flat_map(|(t, k)| [*t, u32::from(*k)]).collect();
-    let faces = faces.into_pyarray(py).reshape([set.faces.len(), 2])?;
+    let faces = table(py, set.faces.iter().map(|(t, k)| [*t, u32::from(*k)]).collect())?;
     Ok((set.nodes.clone().into_pyarray(py), set.elements.clone().into_pyarray(py), faces))
 }
 
 /// Forces at nodes as arrays.
 pub fn forces(py: Python<'_>, of: Vec<(u32, Vec3)>) -> PyResult<Forces<'_>> {
     let (nodes, forces): (Vec<u32>, Vec<Vec3>) = of.into_iter().unzip();
-    let forces = forces.into_flattened().into_pyarray(py).reshape([nodes.len(), 3])?;
-    Ok((nodes.into_pyarray(py), forces))
+    Ok((nodes.into_pyarray(py), table(py, forces)?))
 }
 
 /// A field as the core takes it.

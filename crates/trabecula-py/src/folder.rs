@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use geometry::formats::{Array, Data, Elements, Shape};
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
-use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use trabecula::design::{CadMesh, FaceLabel, Loader, Scan, Tessellation, ZonedElements};
+
+use crate::arrays::table;
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
@@ -173,10 +175,8 @@ fn cad(name: &str, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
 fn tetrahedra(name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
     Python::attach(|py| {
         let make = || -> PyResult<TetMesh> {
-            let flat = surface.vertices.clone().into_flattened().into_pyarray(py);
-            let points = flat.reshape([surface.vertices.len(), 3])?;
-            let flat = surface.triangles.clone().into_flattened().into_pyarray(py);
-            let triangles = flat.reshape([surface.triangles.len(), 3])?;
+            let points = table(py, surface.vertices.clone())?;
+            let triangles = table(py, surface.triangles.clone())?;
             let call = py.import("trabecula.meshers")?.getattr("tetrahedra")?;
             let made = call.call1((name, points, triangles, size, limit))?;
             let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) = made.extract()?;

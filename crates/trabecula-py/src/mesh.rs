@@ -14,7 +14,7 @@ use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::transform::Transform;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -23,6 +23,7 @@ use trabecula::corner_normals::corner_normals;
 use trabecula::report::{MeshReport, QualityReport, SimplifyReport, SmoothReport, ThicknessReport, ThicknessSpread};
 use trabecula::surface_maker::Figures;
 
+use crate::arrays::table;
 use crate::error;
 use crate::file;
 use crate::region::Region;
@@ -200,17 +201,13 @@ impl Mesh {
     /// Vertex positions (n, 3), mm.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let v = self.surface.mesh.vertices.clone();
-        let n = v.len();
-        v.into_flattened().into_pyarray(py).reshape([n, 3])
+        table(py, self.surface.mesh.vertices.clone())
     }
 
     /// Vertex indices (m, 3), counter-clockwise seen from outside.
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let t = self.surface.mesh.triangles.clone();
-        let m = t.len();
-        t.into_flattened().into_pyarray(py).reshape([m, 3])
+        table(py, self.surface.mesh.triangles.clone())
     }
 
     /// For each triangle, whether it lies on the region's boundary.

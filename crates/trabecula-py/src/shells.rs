@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use trabecula::report::ShellReport;
 use trabecula::shell_mesh::{Made, Options};
 
+use crate::arrays::table;
 use crate::error;
 use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
 use crate::report::report;
@@ -42,8 +43,7 @@ impl Shells {
     /// Nodes (n, 3), mm.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let n = self.made.mesh.nodes.len();
-        self.made.mesh.nodes.clone().into_flattened().into_pyarray(py).reshape([n, 3])
+        table(py, self.made.mesh.nodes.clone())
     }
 
     /// Nodes of each triangle (m, 3) or (m, 6), in the order of VTK.

@@ -7,11 +7,12 @@ use geometry::formats;
 use geometry::math::Vec3;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::transform::Transform;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileKind, Tets, Unit};
 
+use crate::arrays::table;
 use crate::error;
 use crate::file;
 use crate::folder::Folder;
@@ -78,17 +79,13 @@ impl TetMesh {
     /// Nodes (n, 3), mm.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let nodes = self.tets.mesh.nodes.clone();
-        let n = nodes.len();
-        nodes.into_flattened().into_pyarray(py).reshape([n, 3])
+        table(py, self.tets.mesh.nodes.clone())
     }
 
     /// Nodes of each tetrahedron (m, 4), all of positive volume.
     #[getter]
     fn tets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let tets = self.tets.mesh.tets.clone();
-        let m = tets.len();
-        tets.into_flattened().into_pyarray(py).reshape([m, 4])
+        table(py, self.tets.mesh.tets.clone())
     }
 
     /// The zone of each tetrahedron; empty where there are none.

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use trabecula::report::VolumeReport;
 use trabecula::volume_mesh::{Made, Of, Options};
 
+use crate::arrays::table;
 use crate::error;
 use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
 use crate::file;
@@ -89,9 +90,7 @@ impl VolumeMesh {
     /// Nodes (n, 3), mm.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let nodes = self.mesh().nodes.clone();
-        let n = nodes.len();
-        nodes.into_flattened().into_pyarray(py).reshape([n, 3])
+        table(py, self.mesh().nodes.clone())
     }
 
     /// Nodes of each tetrahedron (m, 4) or (m, 10), in the order of VTK.
@@ -100,7 +99,7 @@ impl VolumeMesh {
         let mesh = self.mesh();
         let m = mesh.tets.len();
         if mesh.middles.is_empty() {
-            return mesh.tets.clone().into_flattened().into_pyarray(py).reshape([m, 4]);
+            return table(py, mesh.tets.clone());
         }
         let each = mesh.tets.iter().zip(&mesh.middles);
         let flat: Vec<u32> = each.flat_map(|(t, e)| t.iter().copied().chain(MIDDLES.map(|k| e[k]))).collect();

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use geometry::fe_mesh::HexMesh;
 use geometry::formats::{FeText, HEX_FORMATS};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use trabecula::report::VoxelElementsReport;
 
+use crate::arrays::table;
 use crate::error;
 use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
 use crate::report::report;
@@ -40,15 +41,13 @@ impl VoxelElements {
     /// Nodes (n, 3), mm.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let n = self.mesh.nodes.len();
-        self.mesh.nodes.clone().into_flattened().into_pyarray(py).reshape([n, 3])
+        table(py, self.mesh.nodes.clone())
     }
 
     /// Nodes of each hexahedron (m, 8), in the order of VTK.
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let m = self.mesh.hexes.len();
-        self.mesh.hexes.clone().into_flattened().into_pyarray(py).reshape([m, 8])
+        table(py, self.mesh.hexes.clone())
     }
 
     /// The share of each hexahedron that is solid.

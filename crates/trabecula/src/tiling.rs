@@ -10,6 +10,7 @@
 mod blended_share;
 mod crease;
 mod end_sizes;
+mod face_grid;
 mod mixture;
 mod node_levels;
 mod ports;
@@ -29,6 +30,7 @@ use crate::map::curved_tets::within;
 use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
+pub use face_grid::FaceGrid;
 pub use node_levels::Amount;
 pub use ports::Ports;
 pub use rounded::Rounded;

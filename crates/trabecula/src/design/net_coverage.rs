@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::Warning;
 use super::surface_net::Rods;
-use crate::tiling::Tiling;
+use crate::tiling::{FaceGrid, Tiling};
 
 /// Steps along an edge of a triangle on which ports are found, and at which openings are looked for.
 const STEPS: usize = 24;
@@ -28,16 +28,6 @@ pub struct Coverage {
     pub opening: f64,
     /// Its middle, mm.
     pub opening_at: Vec3,
-}
-
-/// Steps from the corners of a triangle, and where points of a triangle are in that list.
-fn grid(steps: usize) -> Vec<[usize; 3]> {
-    (0..=steps).flat_map(|i| (0..=i).map(move |j| [steps - i, i - j, j])).collect()
-}
-
-fn index([_, j, k]: [usize; 3]) -> usize {
-    let i = j + k;
-    i * (i + 1) / 2 + k
 }
 
 /// The coordinates in a tetrahedron of a point of one of its faces.
@@ -90,12 +80,12 @@ impl Coverage {
 /// The number of ports on the triangles of a net, of those that no rod reaches, and where one of these is.
 fn ports(tiling: &Tiling, rods: &Rods) -> (usize, usize, Option<Vec3>) {
     let (net, map) = (&rods.net, &tiling.map);
-    let (grid, faces) = (grid(STEPS), map.boundary_faces());
+    let (grid, faces) = (FaceGrid::new(STEPS), map.boundary_faces());
     let drawn: BTreeSet<[u32; 2]> = net.drawn.iter().copied().collect();
     let on_lines: BTreeSet<usize> = net.lines.iter().flat_map(along).collect();
     let solid = |i: &usize| {
         let (t, f) = faces[*i];
-        tiling.solid_in(t, &grid.iter().map(|k| bary(f, *k)).collect::<Vec<_>>())
+        tiling.solid_in(t, &grid.points.iter().map(|k| bary(f, *k)).collect::<Vec<_>>())
     };
     let solid: Vec<Vec<bool>> = net.faces.par_iter().map(solid).collect();
     // Numbers of the points that are solid; those on edges are the same for both triangles.
@@ -105,7 +95,7 @@ fn ports(tiling: &Tiling, rods: &Rods) -> (usize, usize, Option<Vec3>) {
         let (t, f) = faces[*i];
         let nodes = f.map(|i| map.tet(t)[i]);
         let mut number = |n: usize| {
-            let k = grid[n];
+            let k = grid.points[n];
             let mut corners: Vec<(u32, usize)> = nodes.into_iter().zip(k).filter(|c| c.1 > 0).collect();
             corners.sort_unstable();
             let rod = on_lines.contains(&n);
@@ -128,15 +118,8 @@ fn ports(tiling: &Tiling, rods: &Rods) -> (usize, usize, Option<Vec3>) {
             reached[at as usize] |= rod || edge;
             at
         };
-        let numbers: Vec<Option<u32>> = (0..grid.len()).map(|n| solid[n].then(|| number(n))).collect();
-        for (n, [a, b, c]) in grid.iter().copied().enumerate() {
-            let next = [[a.wrapping_sub(1), b + 1, c], [a.wrapping_sub(1), b, c + 1], [a, b.wrapping_sub(1), c + 1]];
-            for m in next.into_iter().filter(|k| k.iter().all(|v| *v <= STEPS)) {
-                if let (Some(p), Some(q)) = (numbers[n], numbers[index(m)]) {
-                    pairs.push([p, q]);
-                }
-            }
-        }
+        let numbers: Vec<Option<u32>> = (0..grid.points.len()).map(|n| solid[n].then(|| number(n))).collect();
+        pairs.extend(grid.edges().filter_map(|[n, m]| Some([numbers[n]?, numbers[m]?])));
     }
     let mut root: Vec<u32> = (0..places.len() as u32).collect();
     for [p, q] in pairs {
@@ -160,7 +143,7 @@ fn along([p, q]: &[[f64; 3]; 2]) -> Vec<usize> {
         let l = [0, 1, 2].map(|i| n * (p[i] + s * (q[i] - p[i])));
         let [j, k] = [l[1].round() as usize, l[2].round() as usize];
         let j = j.min(STEPS - k.min(STEPS));
-        index([STEPS - j - k.min(STEPS), j, k.min(STEPS)])
+        FaceGrid::index([STEPS - j - k.min(STEPS), j, k.min(STEPS)])
     };
     (0..=2 * STEPS).map(point).collect()
 }
@@ -168,7 +151,7 @@ fn along([p, q]: &[[f64; 3]; 2]) -> Vec<usize> {
 /// The diameter of the largest disc on the triangles of a net that is free of rods, and its middle.
 fn opening(tiling: &Tiling, rods: &Rods) -> (f64, Vec3) {
     let (net, map) = (&rods.net, &tiling.map);
-    let (grid, faces) = (grid(WIDE), map.boundary_faces());
+    let (grid, faces) = (FaceGrid::new(WIDE), map.boundary_faces());
     let mut near: HashMap<u32, Vec<usize>> = HashMap::new();
     for (i, owner) in net.owners.iter().enumerate() {
         BTreeSet::from(*owner).into_iter().for_each(|n| near.entry(n).or_default().push(i));
@@ -180,7 +163,7 @@ fn opening(tiling: &Tiling, rods: &Rods) -> (f64, Vec3) {
         if around.is_empty() {
             around.extend(0..net.rods.len());
         }
-        let points = grid.iter().map(|k| map.place(t, bary(f, *k)));
+        let points = grid.points.iter().map(|k| map.place(t, bary(f, *k)));
         let free = |p: Vec3| (around.iter().map(|i| rods.distance(*i, p)).fold(f64::INFINITY, f64::min), p);
         points.map(free).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, [0.0; 3]))
     };

@@ -3,7 +3,7 @@
 //! The trace is the same on all faces of a tetrahedron and symmetric in its three coordinates, so a port and the one across an edge of
 //! the face are mirror images, and a line from a port to the edge goes on to the other's.
 
-use super::{Level, Tiling};
+use super::{FaceGrid, Level, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
 use geometry::math::{cross, norm, sub};
@@ -28,11 +28,8 @@ pub struct Ports {
 impl Ports {
     /// The ports of a part of a cell at level `iso`.
     pub fn new(cell: &TetCell, part: Part, iso: f64) -> Ports {
-        let index = |i: usize, j: usize| i * (i + 1) / 2 + j;
-        let mut at: Vec<[usize; 3]> = Vec::new();
-        for i in 0..=STEPS {
-            at.extend((0..=i).map(|j| [STEPS - i, i - j, j]));
-        }
+        let grid = FaceGrid::new(STEPS);
+        let at = &grid.points;
         let share = |k: &[usize; 3]| k.map(|v| v as f64 / STEPS as f64);
         let barys: Vec<Bary> = at.iter().map(share).map(|[a, b, c]| [a, b, c, 0.0]).collect();
         let (mut f, mut slopes) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
@@ -46,15 +43,8 @@ impl Ports {
             })
             .collect();
         let mut root: Vec<u32> = (0..at.len() as u32).collect();
-        for i in 0..STEPS {
-            for j in 0..=i {
-                let corners = [index(i, j), index(i + 1, j), index(i + 1, j + 1)];
-                for (a, b) in [(0, 1), (0, 2), (1, 2)].map(|(a, b)| (corners[a], corners[b])) {
-                    if solid[a] && solid[b] {
-                        unite(&mut root, a as u32, b as u32);
-                    }
-                }
-            }
+        for [a, b] in grid.edges().filter(|e| e.iter().all(|n| solid[*n])) {
+            unite(&mut root, a as u32, b as u32);
         }
         // For each port: sum of weights and of places, and the greatest number of coordinates that are zero.
         let mut found: Vec<(u32, f64, [f64; 3], usize)> = Vec::new();

@@ -26,14 +26,8 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         writeln!(out, "*ELEMENT, TYPE={kind}, ELSET={name}")?;
         lines(out, of.len(), |k, text| {
             let i = of[k];
-            push(text, i + 1);
-            let middles = mesh.middles.get(i);
-            let nodes = mesh.tets[i].into_iter().chain(middles.into_iter().flat_map(|m| MIDDLES.map(|k| m[k])));
-            for n in nodes {
-                text.push_str(", ");
-                push(text, n as usize + 1);
-            }
-            text.push('\n');
+            let middles = mesh.middles.get(i).into_iter().flat_map(|m| MIDDLES.map(|k| m[k]));
+            element(text, i, mesh.tets[i].into_iter().chain(middles));
         })?;
     }
     sets(&mesh.sets, &FACE, out)?;
@@ -56,6 +50,16 @@ pub(super) fn nodes(title: &str, nodes: &[Vec3], out: &mut dyn Write) -> io::Res
         }
         text.push('\n');
     })
+}
+
+/// The line of an element: its number and those of its nodes, from 1.
+pub(super) fn element(text: &mut String, i: usize, nodes: impl Iterator<Item = u32>) {
+    push(text, i + 1);
+    for n in nodes {
+        text.push_str(", ");
+        push(text, n as usize + 1);
+    }
+    text.push('\n');
 }
 
 /// Sets of nodes, elements and faces; `numbers` are the solver's of an element's faces, none where it has no names for them.
@@ -118,7 +122,7 @@ fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
 /// The forces at nodes of a load on a set.
 pub(super) type Forces<'a> = dyn Fn(&str, Vec3) -> Option<Vec<(u32, Vec3)>> + 'a;
 
-/// What is held, and one step with the loads; results are displacements, stresses, reactions, and energies of the domains, with
+/// What is held, and one step with the loads, if there are any; results are displacements, stresses, reactions, and energies of the domains, with
 /// the number of degrees of freedom of their nodes.
 pub(super) fn step(
     text: &FeText,
@@ -126,6 +130,9 @@ pub(super) fn step(
     of: &Forces,
     out: &mut dyn Write,
 ) -> io::Result<()> {
+    if text.held.is_empty() && text.loads.is_empty() {
+        return Ok(());
+    }
     text.held.iter().try_for_each(|name| writeln!(out, "*BOUNDARY\n{name}, 1, {freedoms}"))?;
     writeln!(out, "*STEP\n*STATIC")?;
     // A node of several sets has one line for each direction: what a second one means differs between programs.

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::{FeText, abaqus, lines, nastran, push, rows};
+use super::{FeText, abaqus, lines, nastran, rows};
 use crate::fe_mesh::BeamMesh;
 use crate::formats::nastran_fields::{check_numbers, real};
 use crate::formats::vtu::{Array, Cells};
@@ -23,18 +23,13 @@ fn write_inp(mesh: &BeamMesh, text: &FeText, out: &mut dyn Write) -> io::Result<
     let kind = match (mesh.middles.is_empty(), text.abaqus) {
         (true, _) => "B31",
         (false, true) => "B32",
-        // Fully integrated ones are too stiff in bending: each is a solid of twenty nodes.
+        // Each is a solid of twenty nodes; fully integrated ones are stiffer in bending.
         (false, false) => "B32R",
     };
     writeln!(out, "*ELEMENT, TYPE={kind}, ELSET=BEAMS")?;
     lines(out, mesh.elements.len(), |i, text| {
-        push(text, i + 1);
         let [a, b] = mesh.elements[i];
-        for n in [Some(a), mesh.middles.get(i).copied(), Some(b)].into_iter().flatten() {
-            text.push_str(", ");
-            push(text, n as usize + 1);
-        }
-        text.push('\n');
+        abaqus::element(text, i, [Some(a), mesh.middles.get(i).copied(), Some(b)].into_iter().flatten());
     })?;
     abaqus::sets(&mesh.sets, &[], out)?;
     let [e, nu] = text.elastic(0);
@@ -47,9 +42,6 @@ fn write_inp(mesh: &BeamMesh, text: &FeText, out: &mut dyn Write) -> io::Result<
         rows(out, &section.elements, 16, ", ")?;
         writeln!(out, "*BEAM SECTION, ELSET=SECTION_{}, MATERIAL=SOLID, SECTION=CIRC", s + 1)?;
         writeln!(out, "{size:?}\n{x:?}, {y:?}, {z:?}")?;
-    }
-    if text.held.is_empty() && text.loads.is_empty() {
-        return Ok(());
     }
     let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
     abaqus::step(text, (&["BEAMS"], 6), &forces, out)

@@ -20,12 +20,7 @@ fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result
     let kind = if mesh.middles.is_empty() { "S3" } else { "S6" };
     writeln!(out, "*ELEMENT, TYPE={kind}, ELSET=SHELL")?;
     lines(out, mesh.triangles.len(), |i, text| {
-        push(text, i + 1);
-        for n in mesh.nodes_of(i) {
-            text.push_str(", ");
-            push(text, n as usize + 1);
-        }
-        text.push('\n');
+        abaqus::element(text, i, mesh.nodes_of(i));
     })?;
     // Edges of shells have other names in each program: sets of nodes serve all.
     abaqus::sets(&mesh.sets, &[], out)?;
@@ -39,9 +34,6 @@ fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result
         abaqus::decimal(text, mesh.thickness[i]);
         text.push('\n');
     })?;
-    if text.held.is_empty() && text.loads.is_empty() {
-        return Ok(());
-    }
     let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
     abaqus::step(text, (&["SHELL"], 6), &forces, out)
 }

@@ -24,14 +24,7 @@ fn write_inp(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
     let classes = fraction_classes(&mesh.fraction);
     for (name, of) in &classes {
         writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET={name}")?;
-        lines(out, of.len(), |k, text| {
-            push(text, of[k] + 1);
-            for n in mesh.hexes[of[k]] {
-                text.push_str(", ");
-                push(text, n as usize + 1);
-            }
-            text.push('\n');
-        })?;
+        lines(out, of.len(), |k, text| abaqus::element(text, of[k], mesh.hexes[of[k]].into_iter()))?;
     }
     let names: Vec<&str> = classes.iter().map(|c| c.0.as_str()).collect();
     writeln!(out, "*ELSET, ELSET=SOLID")?;
