@@ -9,7 +9,7 @@ pub struct FaceGrid {
 }
 
 impl FaceGrid {
-    /// The grid of so many steps along an edge.
+    /// The grid of `steps` along an edge.
     pub fn new(steps: usize) -> FaceGrid {
         let points = (0..=steps).flat_map(|i| (0..=i).map(move |j| [steps - i, i - j, j])).collect();
         FaceGrid { steps, points }
