@@ -12,7 +12,7 @@ use geometry::union_find::{find, singles, unite};
 use rayon::prelude::*;
 
 use crate::conforming_tets::{
-    GONE, MOST, Partition, Shaping, SurfaceSet, Tet, components, images, interfaces, only, prepared,
+    GONE, Partition, Shaping, SurfaceSet, Tet, components, images, interfaces, only, prepared,
 };
 use crate::region::Region;
 use crate::solid::Solid;
@@ -89,13 +89,6 @@ pub struct Named<'a> {
 pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
     let by_patches = (!options.periodic).then_some(options.edge);
     let domains = Domains::new(solid, options.of, by_patches).map_err(Stopped::Refused)?;
-    if domains.own > MOST {
-        let count = domains.own;
-        let m = format!(
-            "the design has {count} surfaces; a volume mesh takes at most {MOST}: unite keep zones, or mesh a part of it"
-        );
-        return Err(Stopped::Refused(Fault::new("design", m)));
-    }
     let bounds = solid.region.bounds();
     let planes = bounding_planes(&domains, &bounds);
     let cubes = Cubes::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);

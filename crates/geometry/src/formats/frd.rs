@@ -184,6 +184,16 @@ impl File<'_> {
 
     /// Refuses an array that has no numbers at a node of an element; other nodes get zero.
     fn complete(&self, array: &mut Array) -> Result<(), Fault> {
+        // Another length comes of a block without a line of numbers, and of nodes that follow a result.
+        if array.values.len() != array.components * self.elements.points.len() {
+            let nodes = counted(self.elements.points.len(), "node");
+            return Err(fault(format!(
+                "{} has {} in {} for {nodes}; the file is cut or its blocks are out of order",
+                array.name,
+                counted(array.values.len(), "number"),
+                counted(array.components, "component")
+            )));
+        }
         let mut used = vec![false; self.elements.points.len()];
         self.elements.connectivity.iter().for_each(|n| used[*n as usize] = true);
         let mut missing = 0;
@@ -343,6 +353,13 @@ mod tests {
         let cut =
             text.lines().filter(|l| !l.starts_with(" -1         3") || l.len() < 60).collect::<Vec<_>>().join("\n");
         assert!(refused(&cut).contains("STRESS has no numbers at 1 node of elements"), "{}", refused(&cut));
+        let (before, after) = text.split_once(" -4  STRESS").expect("a result");
+        let empty: String = after.lines().filter(|l| !l.starts_with(" -1")).map(|l| format!("{l}\n")).collect();
+        let refusal = refused(&format!("{before} -4  STRESS{empty}"));
+        assert!(refusal.contains("has 0 numbers in 6 components for 14 nodes"), "{refusal}");
+        let late = format!("    2C{:>30}{:>38}\n -1{:>10}{}\n -3\n 9999\n", 1, 1, 9999, columns(&[0.0; 3]));
+        let refusal = refused(&text.replace(" 9999\n", &late));
+        assert!(refusal.contains("has 84 numbers in 6 components for 15 nodes"), "{refusal}");
         for n in (0..text.len() - 5).step_by(37) {
             assert!(read(&text.as_bytes()[..n], "STRESS").is_err(), "{n} of {}", text.len());
         }

@@ -374,7 +374,26 @@ fn blocks(bytes: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
     Ok(out)
 }
 
-/// Base64 up to the first byte that is none; headers and data are encoded apart and joined.
+/// How many bytes an array takes of which these are the first: of its header, until that is whole.
+fn extent(bytes: &[u8], layout: &Layout) -> Result<usize, Fault> {
+    let width = if layout.wide { 8 } else { 4 };
+    let cut = || fault("its data end early: truncated");
+    let sum = |from: usize, sizes: core::ops::Range<usize>| {
+        sizes.into_iter().try_fold(from, |s, i| s.checked_add(header(bytes, i, layout)?).ok_or_else(cut))
+    };
+    if bytes.len() < width {
+        return Ok(width);
+    }
+    if !layout.zlib {
+        return sum(width, 0..1);
+    }
+    let count = header(bytes, 0, layout)?;
+    let heads = count.checked_add(3).and_then(|n| n.checked_mul(width)).ok_or_else(cut)?;
+    if bytes.len() < heads { Ok(heads) } else { sum(heads, 3..3 + count) }
+}
+
+/// One array in base64, which ends where its header says or at the first byte that is none; headers and data are encoded apart and
+/// joined.
 fn unbase64(text: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
     let digit = |b: u8| match b {
         b'A'..=b'Z' => Some(b - b'A'),
@@ -385,6 +404,7 @@ fn unbase64(text: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
         _ => None,
     };
     let mut out = Vec::new();
+    let mut end = extent(&out, layout)?;
     let (mut bits, mut held, mut begun) = (0u32, 0, false);
     for &b in text.iter().filter(|b| !b.is_ascii_whitespace()) {
         if b == b'=' {
@@ -405,9 +425,12 @@ fn unbase64(text: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
             out.push((bits >> held) as u8);
             bits &= (1 << held) - 1;
         }
-        // More than one array may follow in appended data.
-        if layout.appended.is_some() && out.len() > text.len() {
-            break;
+        // Other arrays may follow in appended data.
+        if out.len() == end {
+            end = extent(&out, layout)?;
+            if out.len() == end {
+                break;
+            }
         }
     }
     Ok(out)
@@ -477,6 +500,20 @@ mod tests {
             .replace(&plain, &text)
             .replace("version=\"0.1\"", "version=\"0.1\" compressor=\"vtkZLibDataCompressor\"");
         assert_eq!(read_vtk(zlib.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
+        // Arrays that follow each other in base64: each is read to its own end.
+        for (text, compressor) in [(&plain, ""), (&text, " compressor=\"vtkZLibDataCompressor\"")] {
+            let offset = format!("format=\"appended\" offset=\"{}\"/></PointData>", text.len());
+            let appended = HEX
+                .replace("format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>", &offset)
+                .replace("version=\"0.1\"", &format!("version=\"0.1\"{compressor}"))
+                .replace(
+                    "</VTKFile>",
+                    &format!("<AppendedData encoding=\"base64\">_{text}{text}</AppendedData></VTKFile>"),
+                );
+            let layout = Layout { appended: None, big: false, wide: false, zlib: !compressor.is_empty() };
+            assert_eq!(unbase64(format!("{text}{text}").as_bytes(), &layout), unbase64(text.as_bytes(), &layout));
+            assert_eq!(read_vtk(appended.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
+        }
         let raw = HEX.replace(
             "format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>",
             "format=\"appended\" offset=\"0\"/></PointData>",

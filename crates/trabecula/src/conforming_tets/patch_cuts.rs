@@ -42,20 +42,22 @@ impl Patched {
     pub const NARROW: f64 = 0.05;
 
     /// The meshes among surfaces, whose groups are added to these. `size` is that of tetrahedra (mm), and patches are at least as wide as
-    /// the fraction `narrow` of it; wider where there are more groups than a node can know.
+    /// the fraction `narrow` of it; wider where there are more groups than a node can know, and no groups where even one of all is more.
     pub fn of(surfaces: &mut Vec<Surface>, size: f64, narrow: f64) -> Vec<Patched> {
         let mut found = Vec::new();
         for mesh in 0..surfaces.len() {
             let Some(of) = surfaces[mesh].mesh.clone() else { continue };
             let first = surfaces.len();
+            let widest = norm((*of).as_ref().bounds().size());
             let mut least = narrow * size;
-            let groups = loop {
-                let groups = patch_groups((*of).as_ref(), size, least);
-                if first + groups.len() <= MOST {
-                    break groups;
-                }
+            let mut groups = patch_groups((*of).as_ref(), size, least);
+            while first + groups.len() > MOST && least < widest {
                 least *= 2.0;
-            };
+                groups = patch_groups((*of).as_ref(), size, least);
+            }
+            if first + groups.len() > MOST {
+                groups.clear();
+            }
             if groups.is_empty() {
                 continue;
             }

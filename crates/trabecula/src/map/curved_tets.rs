@@ -16,7 +16,9 @@ use super::surface_feet::{EdgeFaces, edge_feet, feet};
 use super::tet_map::{NONE, Tets};
 use crate::field::Field;
 use crate::region::Region;
-use geometry::math::{Mat3, Vec3, add, apply, cross, dot, inverse, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::math::{
+    IDENTITY, Mat3, Vec3, add, apply, cross, dot, inverse, norm, scale, spectral_norm, sub, transpose, unit,
+};
 use geometry::tetmesh::EDGES;
 
 /// The greatest norm κ of the derivative of A.
@@ -63,9 +65,9 @@ struct Bent {
     shift: [[f64; 4]; 6],
     /// The norm κ.
     contraction: f64,
-    /// How far it reaches beyond its flat faces, and how far any of its points is moved at most, in barycentric coordinates.
-    reach: f64,
-    sway: f64,
+    /// How far it reaches beyond each of its flat faces, and how far any of its points is moved at most, in barycentric coordinates.
+    reach: [f64; 4],
+    sway: [f64; 4],
 }
 
 /// The nearest point to `l` of all whose coordinates are at least −`by` and whose sum is one.
@@ -73,8 +75,7 @@ pub(crate) fn within(l: [f64; 4], by: f64) -> [f64; 4] {
     if l.iter().all(|v| *v >= -by) {
         return l;
     }
-    let mut sorted = l.map(|v| v + by);
-    sorted.sort_unstable_by(|a, b| b.total_cmp(a));
+    let sorted = descending(l.map(|v| v + by));
     let (mut sum, mut cut) = (-(1.0 + 4.0 * by), 0.0);
     for (k, v) in sorted.into_iter().enumerate() {
         sum += v;
@@ -84,6 +85,14 @@ pub(crate) fn within(l: [f64; 4], by: f64) -> [f64; 4] {
         }
     }
     l.map(|v| (v + by - cut).max(0.0) - by)
+}
+
+/// Four numbers, the greatest first.
+fn descending(mut v: [f64; 4]) -> [f64; 4] {
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
+        (v[i], v[j]) = (v[i].max(v[j]), v[i].min(v[j]));
+    }
+    v
 }
 
 impl Bent {
@@ -110,46 +119,67 @@ impl Bent {
         };
         let contraction = (0..4).map(at_corner).fold(0.0, f64::max);
         // The hull of the corners and the control points: middles of edges plus 2δ.
-        let control = EDGES.iter().zip(&shift).map(|(pair, s)| {
-            let l: [f64; 4] = core::array::from_fn(|i| 2.0 * s[i] + if pair.contains(&i) { 0.5 } else { 0.0 });
-            l.iter().fold(0.0f64, |m, v| m.max(-v))
-        });
-        let reach = control.fold(0.0, f64::max);
-        // 2 λ_i λ_j are shares, together below one.
-        let sway = shift.iter().flatten().fold(0.0f64, |m, s| m.max(2.0 * s.abs()));
+        let (mut reach, mut sway) = ([0.0f64; 4], [0.0f64; 4]);
+        for (pair, s) in EDGES.iter().zip(&shift) {
+            for k in 0..4 {
+                let control = 2.0 * s[k] + if pair.contains(&k) { 0.5 } else { 0.0 };
+                reach[k] = reach[k].max(-control);
+                // 2 λ_i λ_j are shares, together below one.
+                sway[k] = sway[k].max(2.0 * s[k].abs());
+            }
+        }
         Bent { moved, shift, contraction, reach, sway }
     }
 
-    fn shifted(&self, l: [f64; 4]) -> [f64; 4] {
-        let l = within(l, 0.0);
-        let mut out = [0.0; 4];
-        for ([i, j], s) in EDGES.iter().zip(&self.shift) {
-            let w = 4.0 * l[*i] * l[*j];
-            out.iter_mut().zip(s).for_each(|(o, s)| *o += w * s);
-        }
-        out
-    }
-}
-
-impl Bent {
-    /// The step n with n + A′(l) n = d, of coordinates in the tetrahedron.
-    fn newton(&self, l: &[f64; 4], d: &[f64; 4]) -> Option<[f64; 4]> {
-        if l.iter().any(|v| *v < 0.0) {
-            return None;
-        }
-        // Columns of A′ by three of the coordinates; the fourth is one less their sum, in all vectors zero less their sum.
+    /// The iteration at coordinates `l`, for the flat coordinates `flat`.
+    fn iterate(&self, flat: &[f64; 4], l: [f64; 4]) -> Iterate {
+        let nearest = within(l, 0.0);
         let mut columns = [[0.0; 4]; 4];
         for ([i, j], s) in EDGES.iter().zip(&self.shift) {
             for k in 0..4 {
-                columns[*i][k] += 4.0 * l[*j] * s[k];
-                columns[*j][k] += 4.0 * l[*i] * s[k];
+                columns[*i][k] += 4.0 * nearest[*j] * s[k];
+                columns[*j][k] += 4.0 * nearest[*i] * s[k];
             }
         }
-        let m: Mat3 = core::array::from_fn(|r| {
-            core::array::from_fn(|c| f64::from(u8::from(r == c)) + columns[c][r] - columns[3][r])
-        });
+        // A is of the second degree, so it is half of A′ times the coordinates.
+        let by = |k: usize| 0.5 * (0..4).map(|i| nearest[i] * columns[i][k]).sum::<f64>();
+        let change = core::array::from_fn(|k| flat[k] - by(k) - l[k]);
+        let left = change.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Iterate { l, nearest, columns, change, left }
+    }
+}
+
+/// Coordinates, π of them, the columns of A′ there, by how much the next coordinates differ, and the norm of that.
+struct Iterate {
+    l: [f64; 4],
+    nearest: [f64; 4],
+    columns: [[f64; 4]; 4],
+    change: [f64; 4],
+    left: f64,
+}
+
+impl Iterate {
+    /// Newton's next coordinates, l + n with n + A′(π(l)) π′(l) n = change. π′ subtracts from the coordinates that π leaves above zero
+    /// their mean, and has the others at zero.
+    fn newton(&self) -> [f64; 4] {
+        let Iterate { l, nearest, columns, change: d, .. } = self;
+        let inside = nearest == l;
+        let free = nearest.map(|v| f64::from(u8::from(inside || v > 0.0)));
+        let mean = 1.0 / free.iter().sum::<f64>();
+        // By three of the coordinates; the fourth of a step is minus their sum.
+        let mut m: Mat3 = IDENTITY;
+        for c in 0..3 {
+            let by = (free[c] - free[3]) * mean;
+            for k in 0..4 {
+                let along = f64::from(u8::from(k == c)) - f64::from(u8::from(k == 3));
+                let moved = free[k] * (along - by);
+                for (r, row) in m.iter_mut().enumerate() {
+                    row[c] += moved * columns[k][r];
+                }
+            }
+        }
         let n = apply(&inverse(&m), [d[0], d[1], d[2]]);
-        Some([n[0], n[1], n[2], -n[0] - n[1] - n[2]])
+        [l[0] + n[0], l[1] + n[1], l[2] + n[2], l[3] - n[0] - n[1] - n[2]]
     }
 }
 
@@ -262,14 +292,19 @@ impl Curves {
         edges.fold([0.0; 3], |s, ([i, j], d)| add(s, scale(*d, 4.0 * l[*i] * l[*j])))
     }
 
-    /// How far a tetrahedron reaches beyond its flat faces, in barycentric coordinates.
-    pub fn reach(&self, t: usize) -> f64 {
-        self.of(t).map_or(0.0, |b| b.reach)
+    /// How far a tetrahedron reaches beyond each of its flat faces, in barycentric coordinates.
+    pub fn reach(&self, t: usize) -> [f64; 4] {
+        self.of(t).map_or([0.0; 4], |b| b.reach)
     }
 
-    /// By how much bending changes a coordinate at most.
-    pub fn sway(&self, t: usize) -> f64 {
-        self.of(t).map_or(0.0, |b| b.sway)
+    /// By how much bending changes each coordinate at most.
+    pub fn sway(&self, t: usize) -> [f64; 4] {
+        self.of(t).map_or([0.0; 4], |b| b.sway)
+    }
+
+    /// Whether a tetrahedron is bent.
+    pub fn bends(&self, t: usize) -> bool {
+        self.of(t).is_some()
     }
 
     /// The factor of Lipschitz constants of what is a function of the coordinates.
@@ -277,30 +312,25 @@ impl Curves {
         self.of(t).map_or(1.0, |b| 1.0 / (1.0 - b.contraction))
     }
 
-    /// The coordinates where those of the flat tetrahedron are `flat`.
-    pub fn bary(&self, t: usize, flat: [f64; 4]) -> [f64; 4] {
+    /// The coordinates where those of the flat tetrahedron are `flat`; coordinates with one below `least`, if the right ones have one.
+    pub fn bary(&self, t: usize, flat: [f64; 4], least: f64) -> [f64; 4] {
         let Some(bent) = self.of(t) else { return flat };
-        // By how much the next coordinates of the iteration differ.
-        let change = |l: &[f64; 4]| -> [f64; 4] {
-            let by = bent.shifted(*l);
-            core::array::from_fn(|i| flat[i] - by[i] - l[i])
-        };
-        let size = |v: &[f64; 4]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let (mut l, mut d) = (flat, change(&flat));
+        let mut at = bent.iterate(&flat, flat);
         for _ in 0..ROUNDS {
-            let left = size(&d);
-            if left < NEAR {
+            // The fixed point of a contraction is this near.
+            let off = at.left / (1.0 - bent.contraction);
+            if at.left < NEAR || at.l.iter().any(|v| v + off < least) {
                 break;
             }
             // Newton's step, where it contracts more than the iteration is sure to.
-            let newton = bent.newton(&l, &d).map(|n| core::array::from_fn(|i| l[i] + n[i]));
-            let newton = newton.map(|n| (n, change(&n))).filter(|n| size(&n.1) < bent.contraction * left);
-            (l, d) = newton.unwrap_or_else(|| {
-                let next = core::array::from_fn(|i| l[i] + d[i]);
-                (next, change(&next))
-            });
+            let newton = bent.iterate(&flat, at.newton());
+            at = if newton.left < bent.contraction * at.left {
+                newton
+            } else {
+                bent.iterate(&flat, core::array::from_fn(|i| at.l[i] + at.change[i]))
+            };
         }
-        l
+        at.l
     }
 
     /// The gradients (per mm) of the first three coordinates at coordinates `l`, where the tetrahedron is bent; `to` has the edges from

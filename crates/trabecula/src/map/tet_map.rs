@@ -13,7 +13,8 @@ use geometry::tetmesh::{FACES, TetMesh};
 /// No tetrahedron.
 pub const NONE: u32 = u32::MAX;
 
-/// Maximum number of boxes of the index.
+/// Boxes of the index for each tetrahedron, and their maximum number.
+const BOXES: f64 = 32.0;
 const MOST: f64 = 4e6;
 
 /// A tetrahedral mesh with point location.
@@ -151,7 +152,7 @@ impl Tets {
 
     /// Whether any tetrahedron is bent.
     pub fn is_bent(&self) -> bool {
-        self.curves.as_ref().is_some_and(|c| (0..self.len()).any(|t| c.sway(t) > 0.0))
+        self.curves.as_ref().is_some_and(|c| (0..self.len()).any(|t| c.bends(t)))
     }
 
     /// The distance of the bent boundary from the surface of the region, in edges of its triangles, at most; `None` if the mesh
@@ -168,7 +169,7 @@ impl Tets {
     /// Sorts tetrahedra into boxes; empty boxes refer to a nearest non-empty one.
     fn index(&mut self) {
         let size = self.bounds.size();
-        let wanted = (4.0 * self.tets.len() as f64).min(MOST);
+        let wanted = (BOXES * self.tets.len() as f64).min(MOST);
         let edge = (size.iter().product::<f64>() / wanted).cbrt();
         let longest = size.iter().fold(0.0f64, |m, s| m.max(*s));
         let edge = edge.max(longest / 1000.0);
@@ -240,9 +241,12 @@ impl Tets {
     /// The vertices of a tetrahedron enlarged by the overlap, and so that it holds its bends.
     fn grown(&self, t: usize) -> [Vec3; 4] {
         let corners = self.corners(t);
-        let middle = scale(corners.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
-        let by = 1.0 + 4.0 * (self.overlap + self.reach(t));
-        corners.map(|p| add(middle, scale(sub(p, middle), by)))
+        let by = self.curves.as_ref().map_or([0.0; 4], |c| c.reach(t)).map(|r| r + self.overlap);
+        let all: f64 = by.iter().sum();
+        core::array::from_fn(|i| {
+            let weight = |k: usize| if k == i { 1.0 + all - by[k] } else { -by[k] };
+            (0..4).fold([0.0; 3], |s, k| add(s, scale(corners[k], weight(k))))
+        })
     }
 
     /// Number of tetrahedra.
@@ -316,11 +320,6 @@ impl Tets {
         self.curves.as_ref().map_or(1.0, |c| c.steeper(t))
     }
 
-    /// How far a tetrahedron reaches beyond its flat faces, in barycentric coordinates.
-    fn reach(&self, t: usize) -> f64 {
-        self.curves.as_ref().map_or(0.0, |c| c.reach(t))
-    }
-
     /// The point (mm) whose barycentric coordinates in a tetrahedron as it is bent are `l`.
     pub fn place(&self, t: usize, l: [f64; 4]) -> Vec3 {
         let flat = self.corners(t).iter().zip(l).fold([0.0; 3], |s, (p, v)| add(s, scale(*p, v)));
@@ -388,7 +387,7 @@ impl Tets {
     #[inline]
     pub fn bary(&self, t: usize, p: Vec3) -> [f64; 4] {
         let flat = self.flat_bary(t, p);
-        self.curves.as_ref().map_or(flat, |c| c.bary(t, flat))
+        self.curves.as_ref().map_or(flat, |c| c.bary(t, flat, f64::NEG_INFINITY))
     }
 
     /// Barycentric coordinates of a point with respect to a flat tetrahedron.
@@ -403,20 +402,32 @@ impl Tets {
     /// The tetrahedron that contains a point, and the barycentric coordinates; outside the mesh, a nearby tetrahedron,
     /// with some coordinates negative.
     pub fn locate(&self, p: Vec3) -> (usize, [f64; 4]) {
-        let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
         let lowest = |l: &[f64; 4]| l.iter().copied().fold(f64::INFINITY, f64::min);
-        for &t in self.boxes.of(self.boxes.index(self.boxes.box_at(p))) {
-            let mut l = self.flat_bary(t as usize, p);
-            if let Some(curves) = &self.curves {
-                if lowest(&l) + curves.sway(t as usize) < best.0 {
-                    continue;
+        let near = self.boxes.of(self.boxes.index(self.boxes.box_at(p)));
+        let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
+        for &t in near {
+            let l = self.flat_bary(t as usize, p);
+            if lowest(&l) > best.0 {
+                best = (lowest(&l), t as usize, l);
+                if best.0 >= 0.0 {
+                    break;
                 }
-                l = curves.bary(t as usize, l);
             }
-            let least = lowest(&l);
-            if least > best.0 {
-                best = (least, t as usize, l);
-                if least >= 0.0 {
+        }
+        let Some(curves) = &self.curves else { return (best.1, best.2) };
+        // That of the flat mesh is mostly that of the bent one too, so others are soon ruled out.
+        let first = best.1 as u32;
+        best = (f64::NEG_INFINITY, 0, best.2);
+        for &t in std::iter::once(&first).chain(near.iter().filter(|t| **t != first)) {
+            let flat = self.flat_bary(t as usize, p);
+            let sway = curves.sway(t as usize);
+            if (0..4).any(|k| flat[k] + sway[k] < best.0) {
+                continue;
+            }
+            let l = curves.bary(t as usize, flat, best.0);
+            if lowest(&l) > best.0 {
+                best = (lowest(&l), t as usize, l);
+                if best.0 >= 0.0 {
                     break;
                 }
             }

@@ -1,6 +1,6 @@
 //! What is meshed: domains over common surfaces, and whose each surface is.
 
-use crate::conforming_tets::Patched;
+use crate::conforming_tets::{MOST, Patched};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::solid::{Solid, Space};
@@ -79,6 +79,12 @@ impl Domains {
         let filled: Vec<CsgSolid> = if solid.field.is_some() { solid.filled.clone() } else { Vec::new() };
         let lattice = region + filled.iter().map(|b| b.surfaces.len()).sum::<usize>();
         let own = surfaces.len();
+        if own > MOST {
+            let m = format!(
+                "the design has {own} surfaces; a volume mesh takes at most {MOST}: unite keep zones, or mesh a part of it"
+            );
+            return Err(Fault::new("design", m));
+        }
         let patched = edge.map(|edge| Patched::of(&mut surfaces, edge, Patched::NARROW)).unwrap_or_default();
         Ok(Domains { names, surfaces, own, patched, trees, region, lattice, filled })
     }
