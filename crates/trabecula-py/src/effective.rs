@@ -25,15 +25,15 @@ pub struct Cell {
 }
 
 impl Cell {
-    fn report<'py, T: Serialize + Send>(
+    fn report<'py, T: Serialize + Send, E: Into<Stopped> + Send>(
         &self,
         py: Python<'py>,
         class: &str,
         (threads, progress): Work,
-        work: impl FnOnce(&UnitCell, &dyn Progress) -> Result<T, Stopped> + Send,
+        work: impl FnOnce(&UnitCell, &dyn Progress) -> Result<T, E> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
         let cell = &self.cell;
-        let made = run(py, threads, progress, |p| work(cell, p))?.map_err(error::stopped)?;
+        let made = run(py, threads, progress, |p| work(cell, p).map_err(Into::into))?.map_err(error::stopped)?;
         report(py, class, &made)
     }
 }

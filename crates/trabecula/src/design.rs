@@ -38,6 +38,7 @@ mod unit_cell;
 mod volume_error;
 mod warn;
 
+use std::cell::RefCell;
 use std::io;
 use std::sync::{Arc, OnceLock};
 
@@ -337,7 +338,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
         build::region_of(&Design::from_node(node)?, loader)
     } else {
         let alone = RegionFile::read(&At::root(node))?;
-        environment::region(&alone.region, "region", loader, None, &mut crate::region::Notes::default())
+        environment::region(&alone.region, "region", loader, None, &RefCell::default())
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));

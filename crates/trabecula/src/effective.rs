@@ -56,8 +56,32 @@ const ACROSS: f64 = 3.0;
 /// Voxels along an edge beyond which none are recommended.
 const MOST: f64 = 10_000.0;
 
+/// Why a cell has no such tensor.
+#[derive(Debug)]
+pub enum NoTensor {
+    /// It is in pieces and carries nothing, or its voxels hold no flow: the tensor is at its limit.
+    Degenerate(Fault),
+    /// It was not found.
+    Stopped(Stopped),
+}
+
+impl From<Stopped> for NoTensor {
+    fn from(why: Stopped) -> NoTensor {
+        NoTensor::Stopped(why)
+    }
+}
+
+impl From<NoTensor> for Stopped {
+    fn from(why: NoTensor) -> Stopped {
+        match why {
+            NoTensor::Degenerate(fault) => Stopped::Refused(fault),
+            NoTensor::Stopped(why) => why,
+        }
+    }
+}
+
 /// A tensor of a cell of voxels.
-type Solve<'a, T> = dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, Stopped> + 'a;
+type Solve<'a, T> = dyn Fn(&VoxelCell, &dyn Progress) -> Result<Homogenised<T>, NoTensor> + 'a;
 
 impl UnitCell {
     /// The shapes of the grids: n, and a half and a quarter of it where that is enough.
@@ -146,7 +170,7 @@ impl UnitCell {
         resolution: Resolution,
         progress: &dyn Progress,
         solve: &Solve<T>,
-    ) -> Result<Vec<(VoxelCell, Homogenised<T>)>, Stopped> {
+    ) -> Result<Vec<(VoxelCell, Homogenised<T>)>, NoTensor> {
         let shapes = self.shapes(resolution.n);
         let total: f64 = shapes.iter().map(work).sum();
         let (mut made, mut done) = (Vec::new(), 0.0);
@@ -173,14 +197,14 @@ impl UnitCell {
         material: &Material,
         resolution: Resolution,
         progress: &dyn Progress,
-    ) -> Result<StiffnessReport, Stopped> {
+    ) -> Result<StiffnessReport, NoTensor> {
         self.check(resolution.n)?;
         let apart = |why: &str| {
             let message = format!(
                 "at a solid fraction of {:.4} the cell falls apart and carries no load{why}",
                 self.fraction.unwrap_or_default()
             );
-            Stopped::Refused(Fault::new(format!("{}.level", self.path), message))
+            NoTensor::Degenerate(Fault::new(format!("{}.level", self.path), message))
         };
         if let Some(why) = self.apart() {
             return Err(apart(&why));
@@ -188,9 +212,9 @@ impl UnitCell {
         let made = self.on_grids(resolution, progress, &|voxels, progress| {
             if voxels.endless_directions(0.0) == 0 {
                 let message = "the solid is in pieces that do not touch, and carries no load; take thicker beams or a greater fraction";
-                return Err(Stopped::Refused(Fault::new(&self.path, message)));
+                return Err(NoTensor::Degenerate(Fault::new(&self.path, message)));
             }
-            voxels.stiffness(material, TOLERANCE, progress)
+            Ok(voxels.stiffness(material, TOLERANCE, progress)?)
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, orthonormal(&m.tensor).into_iter().flatten().collect())).collect();
@@ -259,11 +283,11 @@ impl UnitCell {
                 return Ok(Homogenised { tensor: [[0.0; 3]; 3], residual: 0.0, iterations: 0, cases: 0 });
             }
             if pore == 0.0 || resolution.plain {
-                return voxels.conductivity(pore, TOLERANCE, progress);
+                return Ok(voxels.conductivity(pore, TOLERANCE, progress)?);
             }
             let found = interfaces(&self.solid, &self.edges, voxels.shape, &voxels.fractions);
             let cut = voxels.clone().with_interfaces(found).map_err(Stopped::Refused)?;
-            cut.conductivity(pore, TOLERANCE, progress)
+            Ok(cut.conductivity(pore, TOLERANCE, progress)?)
         })?;
         let grids: Vec<([usize; 3], Vec<f64>)> =
             made.iter().map(|(v, m)| (v.shape, m.tensor.iter().flatten().copied().collect())).collect();

@@ -2,6 +2,8 @@
 
 mod picture_stack;
 
+use std::cell::RefCell;
+
 pub use picture_stack::Scan;
 pub(crate) use picture_stack::{names_pictures, picture_stack};
 
@@ -91,12 +93,19 @@ pub(crate) struct Environment<'a> {
     pub filled: &'a [CsgSolid],
     /// The files.
     pub loader: &'a dyn Loader,
+    /// Warnings and repairs of the regions that are made of them.
+    pub notes: &'a RefCell<Notes>,
 }
 
 impl Environment<'_> {
     /// The bytes of a file that is named at the path `at` of the design.
     pub fn load(&self, file: &str, at: &str) -> Result<Vec<u8>, DesignError> {
         self.loader.load(file).map_err(|m| DesignError::new(at, m).found(file))
+    }
+
+    /// The region at the path `at` of the design, which may name faces of the one that the lattice is to fill.
+    pub fn region(&self, kind: &RegionKind, at: &str) -> Result<Region, DesignError> {
+        region(kind, at, self.loader, Some(self.region), self.notes)
     }
 }
 
@@ -119,8 +128,9 @@ pub(crate) fn region(
     path: &str,
     loader: &dyn Loader,
     part: Option<&Region>,
-    notes: &mut Notes,
+    notes: &RefCell<Notes>,
 ) -> Result<Region, DesignError> {
+    let notes = &mut notes.borrow_mut();
     kind.build(&mut Context::new(path, &RegionFiles(loader), part, notes)).map_err(|f| DesignError::fault(path, f))
 }
 

@@ -1,5 +1,6 @@
 //! Data to solid: values are checked, lattices and regions are combined, and likely mistakes are warned of.
 
+use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
 use super::build_cell::cell;
@@ -38,9 +39,9 @@ impl From<PartSpec> for Part {
 /// The region of a design's solid.
 pub(super) fn region_of(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
-    let mut notes = Notes::default();
-    let (region, soup) = given(d, loader, &mut notes)?;
-    let domain = build_tiling::domain(d, &region, soup, loader, &mut notes.warnings)?;
+    let notes = RefCell::default();
+    let (region, soup) = given(d, loader, &notes)?;
+    let domain = build_tiling::domain(d, &region, soup, loader, &notes)?;
     Ok(domain.map_or(region, |d| d.region))
 }
 
@@ -48,7 +49,7 @@ pub(super) fn region_of(d: &Design, loader: &dyn Loader) -> Result<Region, Desig
 fn given(
     d: &Design,
     loader: &dyn Loader,
-    notes: &mut Notes,
+    notes: &RefCell<Notes>,
 ) -> Result<(Region, Option<build_tets::Tets>), DesignError> {
     match environment::region(&d.region, "region", loader, None, notes) {
         Ok(region) => Ok((region, None)),
@@ -62,17 +63,18 @@ fn given(
 /// The solid of a design.
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
-    let mut notes = Notes::default();
-    let (region, soup) = given(d, loader, &mut notes)?;
+    let notes = RefCell::default();
+    let (region, soup) = given(d, loader, &notes)?;
     check_bounds(&region)?;
-    let domain = build_tiling::domain(d, &region, soup, loader, &mut notes.warnings)?;
+    let domain = build_tiling::domain(d, &region, soup, loader, &notes)?;
     let region = domain.as_ref().map_or(region, |d| d.region.clone());
-    let points = sampled(&region, &mut notes.warnings)?;
-    let (filled, skin) = build_skin::filled(d, &region, &points, loader, &mut notes)?;
-    let sets = super::sets_kind::sets(d, &region, loader, &mut notes)?;
-    let Notes { mut warnings, repairs } = notes;
-    let at = |path: String| Environment { path, region: &region, points: &points, filled: &filled, loader };
+    let points = sampled(&region, &mut notes.borrow_mut().warnings)?;
+    let (filled, skin) = build_skin::filled(d, &region, &points, loader, &notes)?;
+    let sets = super::sets_kind::sets(d, &region, loader, &notes)?;
+    let at =
+        |path: String| Environment { path, region: &region, points: &points, filled: &filled, loader, notes: &notes };
 
+    let mut warnings = Vec::new();
     let (mut lattices, mut tilings, mut graphs) = (Vec::new(), Vec::new(), Vec::new());
     let mut nets = Vec::new();
     if let Some(domain) = domain {
@@ -111,6 +113,15 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).chain(core_names).collect();
     let solid = filled.into_iter().chain(nets).chain(cores).fold(solid, Solid::with);
     let figures = OnceLock::new();
+    let Notes { warnings: of_regions, repairs } = notes.into_inner();
+    // A region may be made more than once.
+    let mut all: Vec<Warning> = Vec::new();
+    for warning in of_regions.into_iter().chain(warnings) {
+        if !all.contains(&warning) {
+            all.push(warning);
+        }
+    }
+    let warnings = all;
     Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures })
 }
 

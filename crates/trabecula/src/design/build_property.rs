@@ -8,7 +8,7 @@ use super::built_report::Varied;
 use super::data::AmountSpec;
 use super::unit_cell;
 use crate::cell::{Cell, Part};
-use crate::effective::{Resolution, UnitCell};
+use crate::effective::{NoTensor, Resolution, UnitCell};
 use crate::environment::Environment;
 use crate::grade::{Grade, Remapped, Stops};
 use crate::kind::DesignError;
@@ -17,7 +17,7 @@ use crate::map::{Affine, Map};
 use geometry::fault::number;
 use geometry::math::{Vec3, apply, dot, norm, scale, transpose};
 use geometry::monotone_cubic::monotone;
-use geometry::progress::{Silent, checkpoint};
+use geometry::progress::{Silent, Stopped, checkpoint};
 use homogenise::{Material, Moduli, turned, upper_edges};
 use std::sync::Arc;
 
@@ -98,24 +98,33 @@ impl Property<'_> {
             AmountSpec::Stiffness(of) => {
                 let material = Material::isotropic(1.0, of.nu).map_err(|f| DesignError::fault(&self.path, f))?;
                 let made = cell.stiffness(&material, Resolution { n, plain: false }, &Silent);
-                let own = made.ok().and_then(|made| {
-                    // An axis of the frame along the direction.
-                    let other = if self.along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-                    let third = geometry::math::cross(self.along, other);
-                    let (to, _) = upper_edges(&transpose(&[self.along, other, third]));
-                    let frame = geometry::math::product(&axes, &to);
-                    Moduli::of(&turned(&made.C, &transpose(&frame)))
-                });
-                own.map_or(0.0, |m| m.young[0])
+                let Some(made) = self.unless_degenerate(made)? else { return Ok(0.0) };
+                // An axis of the frame along the direction.
+                let other = if self.along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+                let third = geometry::math::cross(self.along, other);
+                let (to, _) = upper_edges(&transpose(&[self.along, other, third]));
+                let frame = geometry::math::product(&axes, &to);
+                Moduli::of(&turned(&made.C, &transpose(&frame))).map_or(0.0, |m| m.young[0])
             }
             _ => {
                 let made = cell.permeability(n, None, &Silent);
                 let along = apply(&axes, self.along);
                 // On voxels that no wall is seen by, nothing holds the flow.
-                made.map_or(f64::INFINITY, |made| dot(along, apply(&made.k, along)))
+                let Some(made) = self.unless_degenerate(made)? else { return Ok(f64::INFINITY) };
+                dot(along, apply(&made.k, along))
             }
         };
         Ok(found.max(0.0))
+    }
+
+    /// A report, or `None` where the property is at its limit.
+    fn unless_degenerate<T>(&self, made: Result<T, NoTensor>) -> Result<Option<T>, DesignError> {
+        match made {
+            Ok(made) => Ok(Some(made)),
+            Err(NoTensor::Degenerate(_)) => Ok(None),
+            Err(NoTensor::Stopped(Stopped::Refused(fault))) => Err(DesignError::fault(&self.path, fault)),
+            Err(NoTensor::Stopped(_)) => Err(DesignError::new(&self.path, "interrupted")),
+        }
     }
 
     /// Whether the property grows with the fraction.

@@ -1,5 +1,6 @@
 //! Skin and keep zones, which are solid for any lattice: data to solids.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use super::built_report::Varied;
@@ -21,13 +22,13 @@ pub(super) fn filled(
     region: &Region,
     points: &[Vec3],
     loader: &dyn Loader,
-    notes: &mut Notes,
+    notes: &RefCell<Notes>,
 ) -> Result<(Vec<CsgSolid>, Option<f64>), DesignError> {
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
-        let environment = Environment { path: "skin".into(), region, points, filled: &[], loader };
-        let (body, least) = grown(spec, &environment, notes)?;
+        let environment = Environment { path: "skin".into(), region, points, filled: &[], loader, notes };
+        let (body, least) = grown(spec, &environment)?;
         filled.push(body);
         thinnest = Some(least);
     }
@@ -66,8 +67,8 @@ fn is_open(filled: &[CsgSolid], region: &Region, points: &[Vec3]) -> bool {
 }
 
 /// The skin and its least thickness.
-fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Result<(CsgSolid, f64), DesignError> {
-    let Environment { region, points, loader, .. } = *environment;
+fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), DesignError> {
+    let Environment { region, points, .. } = *environment;
     let path = "skin.thickness";
     let thickness = spec.thickness.build(&Quantity::new(path, environment, key_of::<SkinSpec>("thickness")))?;
     let bounds = region.bounds();
@@ -81,7 +82,7 @@ fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Resul
             }
             OpenSpec::Place(OpenPlace::Region(r)) => {
                 let path = format!("{path}.region");
-                let opening = environment::region(&r.region, &path, loader, Some(region), notes)?;
+                let opening = environment.region(&r.region, &path)?;
                 check_zone(&opening, region, points, &path, "there would be no skin")?;
                 openings.push(opening);
                 continue;

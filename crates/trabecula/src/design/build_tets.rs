@@ -2,12 +2,15 @@
 
 mod source;
 
+use std::cell::RefCell;
+
 use super::data::*;
 use super::{Design, Loader, Node, Warning, ZoneNames, sample};
 use crate::environment::{self, Environment};
 use crate::grade::{Quantity, key_of};
 use crate::kind::{At, DesignError, Key, Kind};
 use crate::mesher::{self, Background, Fit, MadeLayers, PrismLayers, background};
+use crate::region::Notes;
 use crate::report::{FitReport, LayersMade, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
@@ -92,8 +95,8 @@ impl Tets {
             let (path, spec) = declared(node, lattice)?;
             spec.check(&Key::NONE).map_err(|f| DesignError::fault(&path, f))?;
             let region_spec = region_of(node)?;
-            let mut notes = crate::region::Notes::default();
-            let region = match environment::region(&region_spec, "region", loader, None, &mut notes) {
+            let notes = RefCell::default();
+            let region = match environment::region(&region_spec, "region", loader, None, &notes) {
                 Ok(region) => region,
                 Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
             };
@@ -107,9 +110,10 @@ impl Tets {
                 return Err(DesignError::new("region", "the region is empty"));
             }
             points.extend(sample::nodes(&region));
-            let environment = Environment { path, region: &region, points: &points, filled: &[], loader };
+            let environment =
+                Environment { path, region: &region, points: &points, filled: &[], loader, notes: &notes };
             let mut made = tets(&spec, &region_spec, &environment)?;
-            made.warnings.splice(0..0, notes.warnings);
+            made.warnings.splice(0..0, notes.into_inner().warnings);
             Ok(made)
         };
         make().map_err(|mut e: DesignError| {
@@ -184,14 +188,13 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let bounds = environment.region.bounds();
     let mut names = Vec::new();
-    let mut notes = crate::region::Notes::default();
     let mut layers = None;
     let (mut mesh, mended, checked, mesher) = match spec {
         TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
             let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsKind>("size")))?;
             if made.mesher == MesherKind::Background {
-                let wanted = made.layers.as_ref().map(|l| prism_layers(l, environment, &mut notes)).transpose()?;
+                let wanted = made.layers.as_ref().map(|l| prism_layers(l, environment)).transpose()?;
                 let made = background(environment.region, &bounds, &size, &inside, wanted.as_ref()).map_err(wrong)?;
                 layers = made.layers;
                 let Background { mesh, left_out, .. } = made;
@@ -218,7 +221,8 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
         }
     };
     if let TetsKind::Made(made) = spec {
-        mesh.zones = zones(&mesh, made, &environment.path, environment.loader, Some(environment.region), &mut notes)?;
+        mesh.zones =
+            zones(&mesh, made, &environment.path, environment.loader, Some(environment.region), environment.notes)?;
     }
     let own = environment.region.volume().unwrap_or_else(|| {
         let (_, share) = sample::inside(environment.region, 25 * sample::COUNT);
@@ -230,7 +234,6 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     let is_made = matches!(spec, TetsKind::Made(_));
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, is_made)?;
     made.warnings.extend(oversized(spec, bounds.size(), &made.report, &environment.path));
-    made.warnings.extend(notes.warnings);
     made.report.region_volume = Some(own);
     made.report.layers = layers;
     made.warnings.extend(layers.and_then(|l| thinned(&l, &environment.path)));
@@ -239,11 +242,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
 }
 
 /// The layers that are asked for.
-fn prism_layers(
-    spec: &LayersSpec,
-    environment: &Environment,
-    notes: &mut crate::region::Notes,
-) -> Result<PrismLayers, DesignError> {
+fn prism_layers(spec: &LayersSpec, environment: &Environment) -> Result<PrismLayers, DesignError> {
     let path = |key: &str| format!("{}.layers.{key}", environment.path);
     let ends = PrismLayers::ends(spec.count, spec.height, spec.growth);
     let depth = ends.last().copied().unwrap_or(0.0);
@@ -260,8 +259,7 @@ fn prism_layers(
         return Err(DesignError::new(path("count"), message));
     }
     let on = path("on");
-    let region = |of| environment::region(of, &on, environment.loader, Some(environment.region), notes);
-    Ok(PrismLayers { ends, on: spec.on.as_ref().map(region).transpose()? })
+    Ok(PrismLayers { ends, on: spec.on.as_ref().map(|of| environment.region(of, &on)).transpose()? })
 }
 
 /// A warning of layers that are much thinner than asked for.
@@ -320,7 +318,7 @@ fn zones(
     path: &str,
     loader: &dyn Loader,
     part: Option<&crate::region::Region>,
-    notes: &mut crate::region::Notes,
+    notes: &RefCell<Notes>,
 ) -> Result<Vec<i64>, DesignError> {
     if made.zones.is_empty() {
         return Ok(Vec::new());
@@ -393,10 +391,10 @@ pub(super) fn of_soup(
         return Err(why);
     };
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
-    let mut notes = crate::region::Notes::default();
-    mesh.zones = zones(&mesh, made, path, loader, None, &mut notes)?;
+    let notes = RefCell::default();
+    mesh.zones = zones(&mesh, made, path, loader, None, &notes)?;
     let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, true)?;
-    made.warnings.extend(notes.warnings);
+    made.warnings.extend(notes.into_inner().warnings);
     let message = format!("no region, so the boundary of the tetrahedra is taken for one: {}", why.message);
     let path = "region.mesh".into();
     made.warnings.push(Warning { path, message });

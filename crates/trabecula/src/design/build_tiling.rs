@@ -1,5 +1,6 @@
 //! Lattices over tetrahedral meshes: data to [`Tiling`], with checks and warnings.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ use crate::grade::Grade;
 use crate::grade::Quantity;
 use crate::kind::DesignError;
 use crate::map::{Ends, Tets};
-use crate::region::{Intersection, MeshRegion, Region};
+use crate::region::{Intersection, MeshRegion, Notes, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
 use geometry::fault::Fault;
 use geometry::mesh::Mesh;
@@ -103,7 +104,7 @@ pub(super) fn domain<'a>(
     region: &Region,
     soup: Option<build_tets::Tets>,
     loader: &dyn Loader,
-    warnings: &mut Vec<Warning>,
+    notes: &RefCell<Notes>,
 ) -> Result<Option<Domain<'a>>, DesignError> {
     let Some((name, spec, spec_of_mesh)) = over_tets(d) else {
         return Ok(None);
@@ -142,11 +143,11 @@ pub(super) fn domain<'a>(
         None => {
             let (mut points, _) = sample::inside(region, sample::COUNT);
             points.extend(sample::nodes(region));
-            let environment = Environment { path: path.clone(), region, points: &points, filled: &[], loader };
+            let environment = Environment { path: path.clone(), region, points: &points, filled: &[], loader, notes };
             (build_tets::tets(spec_of_mesh, &d.region, &environment)?, None)
         }
     };
-    warnings.extend(made.warnings);
+    notes.borrow_mut().warnings.extend(made.warnings);
     let wrong = |f| DesignError::fault(&path, f);
     let (map, region, fit) = match filled {
         Some(region) => (Tets::new(&made.mesh, joined.overlap).map_err(wrong)?, region, MeshFit::Whole),
@@ -157,7 +158,8 @@ pub(super) fn domain<'a>(
                 TetsKind::Made(_) => (bent, region.clone(), MeshFit::Nearly),
                 TetsKind::File(file) => {
                     let flat = Tets::new(&made.mesh, joined.overlap).map_err(wrong)?;
-                    warnings.push(Warning { path: path.clone(), message: cut(&made.report, &file.path) });
+                    let message = cut(&made.report, &file.path);
+                    notes.borrow_mut().warnings.push(Warning { path: path.clone(), message });
                     let common = common(region, &flat, &made.report, &path)?;
                     (flat, common, MeshFit::Cut)
                 }

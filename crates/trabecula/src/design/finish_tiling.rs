@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::sample;
 use super::surface_net::{Net, Rods};
-use crate::environment::{self, Environment};
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::implicit::Implicit;
 use crate::kind::DesignError;
 use crate::map::{Ends, Joined};
-use crate::region::{Notes, Region};
+use crate::region::Region;
 use crate::tiling::{Rounded, Tiling};
 use geometry::fault::number;
 use geometry::math::{Vec3, add, scale, sub};
@@ -66,9 +66,7 @@ impl<'a> Finish<'a> {
             }
             (net, _) => net.as_deref().cloned().unwrap_or_default(),
         };
-        let mut notes = Notes::default();
-        let Environment { loader, region, .. } = *environment;
-        let on = net.on.map(|on| environment::region(&on, &format!("{map}.net.on"), loader, Some(region), &mut notes));
+        let on = net.on.map(|on| environment.region(&on, &format!("{map}.net.on")));
         Ok(Finish {
             ends: joined.surface,
             region: environment.region.clone(),

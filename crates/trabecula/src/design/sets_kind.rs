@@ -1,5 +1,6 @@
 //! Sets of volume meshes that a design names: all surface within a region, to hold or to load.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use super::{Design, Loader};
@@ -44,7 +45,7 @@ pub(super) fn sets(
     d: &Design,
     region: &Region,
     loader: &dyn Loader,
-    notes: &mut Notes,
+    notes: &RefCell<Notes>,
 ) -> Result<Vec<(String, Region)>, DesignError> {
     let mut made = Vec::new();
     for (name, spec) in &d.set.0 {

@@ -1,6 +1,7 @@
 //! The periodic cell of a design.
 
 use serde_json::json;
+use std::cell::RefCell;
 
 use super::data::*;
 use super::tiled_cell::TiledCell;
@@ -98,7 +99,8 @@ fn of_beams(name: &str, design: &Design, loader: &dyn Loader) -> Result<UnitCell
         return no(".map", "cells differ from place to place under this map, and none is periodic; take map.affine");
     }
     let anywhere: Region = Arc::new(Cuboid::new([0.0; 3], [1.0; 3]).map_err(|f| DesignError::fault(&path, f))?);
-    let environment = Environment { path: format!("{path}.map"), region: &anywhere, points: &[], filled: &[], loader };
+    let (at, notes) = (format!("{path}.map"), RefCell::default());
+    let environment = Environment { path: at, region: &anywhere, points: &[], filled: &[], loader, notes: &notes };
     let map = of.map.build(&environment)?;
     let Some(map) = map.affine() else { return no(".map", "this map is not affine") };
     let (corner, edges) = frame(map, [1; 3]);

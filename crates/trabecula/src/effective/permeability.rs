@@ -8,7 +8,7 @@ use homogenise::{Homogenised, VoxelCell};
 use super::fractions::fractions;
 use super::limit::{Limit, limit, modal_limit};
 use super::pore_space::{CubicGrid, PoreSpace, wall_area};
-use super::{LEAST, TOLERANCE, UnitCell, axis, enough, work};
+use super::{LEAST, NoTensor, TOLERANCE, UnitCell, axis, enough, work};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::kind::Warning;
 use crate::report::{CellGrid, PermeabilityReport};
@@ -51,7 +51,7 @@ impl UnitCell {
         n: usize,
         side: Option<Side>,
         progress: &dyn Progress,
-    ) -> Result<PermeabilityReport, Stopped> {
+    ) -> Result<PermeabilityReport, NoTensor> {
         self.check(n)?;
         let solids = self.opposite(side).map_err(Stopped::Refused)?;
         let part = |from, to| Stage { whole: progress, from, to };
@@ -181,7 +181,7 @@ impl UnitCell {
     }
 
     /// The flow on each grid, the finest first.
-    fn flows(&self, n: usize, solids: &[CsgSolid], progress: &dyn Progress) -> Result<Vec<Flow>, Stopped> {
+    fn flows(&self, n: usize, solids: &[CsgSolid], progress: &dyn Progress) -> Result<Vec<Flow>, NoTensor> {
         let grids = self.grids(n);
         // Steps grow with the number of nodes along an edge.
         let cost = |g: &CubicGrid| work(&g.shape).powf(4.0 / 3.0);
@@ -194,7 +194,7 @@ impl UnitCell {
             if space.grid.walls.is_empty() && space.grid.porosity() > 0.0 {
                 let message =
                     format!("no wall is as thick as a step of {} to the cell; take more nodes", grid.shape[0]);
-                return Err(Stopped::Refused(Fault::new("n", message)));
+                return Err(NoTensor::Degenerate(Fault::new("n", message)));
             }
             let porosity = space.grid.porosity();
             let radius = porosity * work(&grid.shape) * grid.step * grid.step / space.area.max(grid.step * grid.step);

@@ -1,9 +1,8 @@
 //! A smooth step across the surface of a region.
 
 use super::{BuildGrade, Depth, Grade, Quantity, Sigmoid};
-use crate::environment;
 use crate::kind::{DesignError, Kind};
-use crate::region::{Notes, Region, RegionKind};
+use crate::region::{Region, RegionKind};
 use geometry::fault::{Fault, number};
 
 /// 1 inside a region and 0 outside, with a smooth step at its surface.
@@ -19,9 +18,7 @@ pub struct WithinKind {
 
 impl BuildGrade for WithinKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        let (path, mut notes) = (format!("{}.of", of.path), Notes::default());
-        let region =
-            environment::region(&self.of, &path, of.environment.loader, Some(of.environment.region), &mut notes)?;
+        let region = of.environment.region(&self.of, &format!("{}.of", of.path))?;
         of.function(region_step(region, self.width))
     }
 }

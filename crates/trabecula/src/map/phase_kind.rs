@@ -5,11 +5,11 @@ use super::{
     Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted,
     given_twice, shared,
 };
-use crate::environment::{self, Environment};
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines};
 use crate::kind::{DesignError, Fault, Key, Kind};
-use crate::region::{Notes, Region, RegionKind};
+use crate::region::{Region, RegionKind};
 use geometry::fault::number;
 use geometry::math::{IDENTITY, Mat3};
 
@@ -315,10 +315,7 @@ impl PhaseKind {
                 "faces are those of the region, and domain = \"box\" leaves it out of account; leave domain out";
             return Err(DesignError::new(format!("{path}.fix"), message));
         }
-        let built = |(i, of): (usize, &RegionKind)| {
-            let Environment { loader, region, .. } = *environment;
-            environment::region(of, &format!("{path}.fix[{i}]"), loader, Some(region), &mut Notes::default())
-        };
+        let built = |(i, of): (usize, &RegionKind)| environment.region(of, &format!("{path}.fix[{i}]"));
         self.fix.iter().enumerate().map(built).collect()
     }
 
