@@ -61,6 +61,7 @@ pub mod math;
 pub mod measure;
 pub mod mesh;
 pub mod monotone_cubic;
+pub mod nearest_points;
 pub mod once;
 pub mod progress;
 pub mod random;

@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use super::Varying;
 use crate::field::Field;
 use geometry::fault::{Fault, counted};
-use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, norm, sub};
+use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, sub};
+use geometry::nearest_points::NearestPoints;
 
 /// Cells of the grid along each side of the blocks whose ranges are kept.
 const BLOCK: usize = 4;
@@ -162,62 +163,22 @@ impl Samples {
         let spread = points.iter().fold(*bounds, |b, p| b.with(*p)).size();
         let apart = (spread.iter().product::<f64>() / points.len() as f64).cbrt();
         let (step, shape) = grid(bounds, 0.5 * apart);
-        // Buckets of about two points.
-        let edge = (2.0 * apart * apart * apart).cbrt().max(1e-9 * norm(spread));
-        let all = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-        let counts = all.size().map(|s| ((s / edge) as usize + 1).min(512));
-        let cell = |p: Vec3| -> [usize; 3] {
-            core::array::from_fn(|a| ((p[a] - all.min[a]) / edge).clamp(0.0, (counts[a] - 1) as f64) as usize)
-        };
-        let mut buckets = vec![Vec::new(); counts.iter().product()];
-        for (n, p) in points.iter().enumerate() {
-            let [i, j, k] = cell(*p);
-            buckets[(k * counts[1] + j) * counts[0] + i].push(n);
-        }
+        let tree = NearestPoints::new(points);
         let wanted = neighbours.clamp(1, points.len());
-        let at = |n: usize| {
+        let at = |near: &mut Vec<(f64, u32)>, n: usize| {
             let index = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
-            let p: Vec3 = core::array::from_fn(|a| bounds.min[a] + step[a] * index[a] as f64);
-            let c = cell(p);
-            let mut near: Vec<(f64, usize)> = Vec::new();
-            let far = *counts.iter().max().unwrap_or(&1);
-            for ring in 0..=far {
-                let span = |a: usize| c[a].saturating_sub(ring)..=(c[a] + ring).min(counts[a] - 1);
-                let mut take = |i: usize, row: usize| {
-                    let of = &buckets[row * counts[0] + i];
-                    near.extend(of.iter().map(|&n| (dot(sub(points[n], p), sub(points[n], p)), n)));
-                };
-                for (k, j) in span(2).flat_map(|k| span(1).map(move |j| (k, j))) {
-                    let row = k * counts[1] + j;
-                    if k.abs_diff(c[2]).max(j.abs_diff(c[1])) == ring {
-                        span(0).for_each(|i| take(i, row));
-                    } else {
-                        // A row through the inside of the ring is in it at its ends.
-                        let ends = [c[0].checked_sub(ring), Some(c[0] + ring).filter(|i| *i < counts[0])];
-                        ends.into_iter().flatten().for_each(|i| take(i, row));
-                    }
-                }
-                // Points outside the rings so far are at least this distance (squared) from p, which may lie outside the buckets.
-                let reach = (ring as f64 * edge - all.distance(p)).max(0.0).powi(2);
-                if near.len() >= wanted {
-                    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                    near.truncate(wanted.max(1));
-                    if near[near.len() - 1].0 <= reach || ring == far {
-                        break;
-                    }
-                }
-            }
+            tree.nearest(core::array::from_fn(|a| bounds.min[a] + step[a] * index[a] as f64), wanted, near);
             let least = 1e-24 * dot(spread, spread);
             let (mut sum, mut weights) = ([0.0; N], 0.0);
-            for (d, n) in near {
+            for (d, n) in near.iter() {
                 let w = 1.0 / d.max(least);
-                sum.iter_mut().zip(&values[n]).for_each(|(s, v)| *s += w * v);
+                sum.iter_mut().zip(&values[*n as usize]).for_each(|(s, v)| *s += w * v);
                 weights += w;
             }
             sum.map(|s| s / weights)
         };
         use rayon::prelude::*;
-        let all: Vec<[f64; N]> = (0..shape.iter().product()).into_par_iter().map(at).collect();
+        let all: Vec<[f64; N]> = (0..shape.iter().product()).into_par_iter().map_init(Vec::new, at).collect();
         let one = |c: usize| Samples::new(bounds.min, step, shape, all.iter().map(|v| v[c]).collect());
         let made = (0..N).map(one).collect::<Result<Vec<Samples>, Fault>>()?;
         made.try_into().map_err(|_| Fault::new("path", "there are no numbers"))

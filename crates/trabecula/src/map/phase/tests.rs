@@ -256,36 +256,6 @@ fn what_cannot_be_solved_is_refused_with_its_place() {
     refused(&about_z("360*tanh(x-5)", Grade::Constant(3.0)), "", "folds");
 }
 
-/// A clock for the solution alone: `cargo test --release -p trabecula phase::tests::solving -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn solving_three_phases_at_128_cubed() {
-    for n in [128, 129] {
-        let grid = Grid::over(&bounds([0.0; 3], [32.0; 3]), [n; 3]);
-        let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| {
-            let wave = |n: usize| {
-                let turn = rotation([0.0, 0.0, 2.0 * grid.node(n)[0]]);
-                [turn[0][i], turn[1][i], turn[2][i]]
-            };
-            (0..grid.len()).map(wave).collect()
-        });
-        let poisson = Poisson::new(grid);
-        let start = std::time::Instant::now();
-        let solved: Vec<Vec<f64>> = k.iter().map(|k| poisson.integrate(k)).collect();
-        println!("{n}: {:.3} s for three phases, {:.6}", start.elapsed().as_secs_f64(), solved[0][77]);
-        let start = std::time::Instant::now();
-        let values = Problem::new(grid, &k, None, 1.0).solve().values;
-        println!("{n}: {:.3} s with means and gauge", start.elapsed().as_secs_f64());
-        let start = std::time::Instant::now();
-        let spline = Spline::through(grid, values);
-        println!(
-            "{n}: {:.3} s for the splines, {:.3}",
-            start.elapsed().as_secs_f64(),
-            spline.lipschitz(&bounds([1.0; 3], [2.0; 3]))
-        );
-    }
-}
-
 /// Where no map can follow, the weight says where the error goes: a map is the best by its own weight.
 #[test]
 fn errors_go_where_they_weigh_least() {
