@@ -290,7 +290,7 @@ def test_beams_of_a_file_that_cross_without_a_node_are_named(tmp_path):
     (tmp_path / "a.csv").write_text("-3,0,0,3,0,0,0.4\n0,-3,0,0,3,0,0.4\n")
     text = 'schema = 1\nregion.box.size = [8, 8, 8]\n[beams.core]\npath = "a.csv"'
     warned = parsed(text, False, "test", str(tmp_path)).build().warnings
-    assert any("1 pair of beams run into" in w["message"] and "(0.000, 0.000, 0.000) mm" in w["message"] for w in warned)
+    assert any("1 pair of beams run into" in w["message"] and "(0, 0, 0) mm" in w["message"] for w in warned)
 
 
 @pytest.mark.filterwarnings("error::trabecula.DesignWarning")

@@ -50,6 +50,13 @@ pub fn number(v: f64) -> String {
     if (1e-5..1e15).contains(&v.abs()) { v.to_string() } else { format!("{v:e}") }
 }
 
+/// A position (mm) as text for a message, to a micrometre.
+pub fn position(p: [f64; 3]) -> String {
+    // Plus zero: −0 is 0.
+    let [x, y, z] = p.map(|v| number((1e3 * v).round() / 1e3 + 0.0));
+    format!("({x}, {y}, {z}) mm")
+}
+
 /// A message with what it quotes shortened: no word is longer than 80 characters, or 240 if it is a path, and no stretch between double
 /// quotes than 1200, the length of the longest list of allowed words.
 pub fn brief(message: &str) -> std::borrow::Cow<'_, str> {

@@ -12,7 +12,7 @@ use crate::kind::{At, DesignError, Key, Kind};
 use crate::mesher::{self, Background, Fit, MadeLayers, PrismLayers, background};
 use crate::region::Notes;
 use crate::report::{FitReport, LayersMade, TetMeshReport};
-use geometry::fault::{Fault, counted, number};
+use geometry::fault::{Fault, counted, number, position};
 use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::surface_fit::{LostFeature, LostKind};
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
@@ -407,7 +407,6 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
     let mut say = |message: String| {
         out.push(Warning { path: path.to_string(), message });
     };
-    let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     let q = &report.quality;
     if checked.turned {
         say("every tetrahedron was numbered the other way round (negative volume), and was turned".into());
@@ -440,7 +439,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
     let strange = !is_made && fit.to_part.max > FAR * q.size.mean;
     let lost = report.lost();
     if !lost.is_empty() && !strange {
-        let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), at(f.at));
+        let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), position(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
         if lost.len() > NAMED {
             named.push(format!("{} more", lost.len() - NAMED));
@@ -456,14 +455,14 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
             "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
             100.0 * fit.uncovered.share,
             fit.uncovered.depth,
-            at(fit.uncovered.at)
+            position(fit.uncovered.at)
         ));
     }
     if fit.to_part.max > FAR * q.size.mean {
         say(format!(
             "the mesh's boundary is {:.3} mm off the region's surface at {}, more than half a tetrahedron",
             fit.to_part.max,
-            at(fit.to_part.at)
+            position(fit.to_part.at)
         ));
     }
     out

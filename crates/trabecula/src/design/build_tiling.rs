@@ -22,7 +22,7 @@ use crate::kind::DesignError;
 use crate::map::{Ends, Tets};
 use crate::region::{Intersection, MeshRegion, Notes, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
@@ -422,9 +422,9 @@ fn at_nodes(grade: &Grade, quantity: &Quantity, map: &Tets) -> Result<Vec<f64>, 
     }
     let mut values = vec![0.0; map.nodes().len()];
     grade.values(map.nodes(), &mut values);
-    for (v, [x, y, z]) in values.iter().zip(map.nodes()) {
+    for (v, p) in values.iter().zip(map.nodes()) {
         let own = if quantity.complement { 1.0 - v } else { *v };
-        let admitted = quantity.key.admit_at(own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"));
+        let admitted = quantity.key.admit_at(own, &format!(" at {}", position(*p)));
         admitted.map_err(|f| DesignError::fault(&quantity.path, f))?;
     }
     Ok(values)

@@ -9,7 +9,7 @@ use crate::field::Field;
 use crate::kind::DesignError;
 use crate::lattice::Lattice;
 use crate::map::Map;
-use geometry::fault::number;
+use geometry::fault::{number, position};
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
 const TURN: f64 = 45.0;
@@ -256,7 +256,6 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
     let mut say = |message: String| {
         warnings.push(Warning { path: format!("{lattice}.map.{}", spec.key()), message });
     };
-    let at = |[x, y, z]: [f64; 3]| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     if let Some(hasty) = phase.hasty() {
         say(hasty.to_string());
     }
@@ -267,7 +266,7 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
             "the orientation turns by {:.0} degrees a cell at {}: above {TURN} neighbouring cells no longer fit \
              together without being torn out of shape; {remedy}, or use smaller cells",
             d.turn,
-            at(d.turn_at)
+            position(d.turn_at)
         ));
     }
     if let (Some(longest), None) = (d.singular.first(), phase.cores()) {
@@ -289,13 +288,13 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         say(exceeded);
     }
     if d.density[0] <= 0.0 {
-        say(format!("the map folds: cells turn inside out at {}", at(d.least_at)));
+        say(format!("the map folds: cells turn inside out at {}", position(d.least_at)));
     } else if d.density[0] < PRESSED {
         say(format!(
             "the map nearly folds: cells are {:.1} % as many in a volume as asked for at {}, where axes may not fit together; let \
              orientation and wavelength vary more slowly, or keep that place out of the part",
             100.0 * d.density[0],
-            at(d.least_at)
+            position(d.least_at)
         ));
     }
 }

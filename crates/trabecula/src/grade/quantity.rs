@@ -4,7 +4,7 @@ use super::complement::Complement;
 use super::{Grade, Stops, Varying};
 use crate::environment::Environment;
 use crate::kind::{DesignError, Key, Table};
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 
 /// A number of a design: its path, environment and limits, and whether its complement, 1 − value, is meant.
 pub(crate) struct Quantity<'a> {
@@ -70,8 +70,7 @@ impl<'a> Quantity<'a> {
         // Not a number comes first or last in this order.
         let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
         for i in ends.into_iter().flatten() {
-            let [x, y, z] = points[i];
-            admit(self.own(values[i]), &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))
+            admit(self.own(values[i]), &format!(" at {}", position(points[i])))
                 .map_err(|f| DesignError::fault(&self.path, f))?;
         }
         Ok(())

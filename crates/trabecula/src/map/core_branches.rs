@@ -6,11 +6,10 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
-use super::frame::in_mm;
 use super::phase::Wanted;
 use super::phase_target::{Laid, Target};
 use super::singular_lines::Alike;
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};
 
 /// The rotations of the axes at the nodes after which they agree from node to node where no cut is, first of all at the nodes that
@@ -122,7 +121,7 @@ fn unlike(at: Vec3, wanted: &Wanted) -> Fault {
     let message = format!(
         "axes do not come back to themselves round a hole of the part, or round a place that is too short for a line, near {}: core covers \
          lines alone; {}, or leave core out",
-        in_mm(at),
+        position(at),
         wanted.smoother()
     );
     Fault::new("core", message)

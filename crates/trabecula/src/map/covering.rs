@@ -5,7 +5,6 @@ use super::branched_solve::{Branched, Numbers};
 use super::core_branches::{labels, rotations};
 use super::cut_cells::{self, CutCells};
 use super::edge_squares::weights;
-use super::frame::in_mm;
 use super::judged::{Judged, fold_at_node, fold_between};
 use super::pace;
 use super::periods::{least, nearest};
@@ -17,7 +16,7 @@ use super::winding::Winding;
 use crate::field::Field;
 use crate::kind::Kind;
 use crate::region::{OutsideTube, Tube, smoothed};
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 
@@ -189,7 +188,7 @@ fn path(line: &SingularLine, laid: &Laid, wanted: &Wanted, settings: &Settings) 
             let message = format!(
                 "a singular line ends within the part at {}, where lines meet or directions are not clear: core covers lines from surface to \
                  surface; {}, or leave core out",
-                in_mm(p),
+                position(p),
                 wanted.smoother()
             );
             return Err(Fault::new("core", message));
@@ -314,7 +313,7 @@ fn torn(branches: &CutCells, part: &dyn Field, radius: f64, wanted: &Wanted) -> 
             "{} mm; cells do not fit together at {}, outside the cores, where lines are near to each other or bend sharply: give a larger \
              core_radius, or {}",
             number(radius),
-            in_mm(p),
+            position(p),
             wanted.smoother()
         );
         Err(Fault::new("core_radius", message))

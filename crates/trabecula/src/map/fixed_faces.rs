@@ -4,14 +4,13 @@
 //! a whole number by a heavy weight in the same least squares: on the largest face to the one nearest to its mean, on others so that as
 //! many cells lie between as is nearest to what there were.
 
-use super::frame::in_mm;
 use super::integral::Problem;
 use super::phase_target::Laid;
 use super::solution::Solution;
 use super::spline::Spline;
 use crate::field::Field;
 use crate::region::Region;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{Vec3, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 use geometry::union_find::{labels, singles, unite};
@@ -112,9 +111,9 @@ fn check_apart(faces: &[Face], laid: &Laid) -> Result<(), Fault> {
                 "only {:.2} cells lie between the face at {} and that of fix[{}] at {}: no whole cell can be there. Use smaller cells, or fix \
                  one of them only",
                 (b.mean - a.mean).abs(),
-                in_mm(laid.nodes[b.nodes[0].node]),
+                position(laid.nodes[b.nodes[0].node]),
                 a.index,
-                in_mm(laid.nodes[a.nodes[0].node])
+                position(laid.nodes[a.nodes[0].node])
             );
             return Err(Fault::new(format!("fix[{}]", b.index), message));
         }
@@ -143,7 +142,7 @@ fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Res
         let message = format!(
             "no axis of the cells is along the normal of the surface at {}: the nearest is {degrees:.0} degrees off, and at most {:.0} can be \
              taken. Turn the cells along it (align = \"surface\", direction), or leave it out",
-            in_mm(laid.nodes[nodes[0].node]),
+            position(laid.nodes[nodes[0].node]),
             ALONG.acos().to_degrees()
         );
         return Err(Fault::new(format!("fix[{index}]"), message));

@@ -13,7 +13,7 @@ use super::singular_lines::Alike;
 use super::smooth_frames::{Averages, LEAST_AVERAGE, Octahedral, Smoothing};
 use super::surface_frames::Surface;
 use crate::grade::Grade;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{
     IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
@@ -314,7 +314,7 @@ fn along(tensors: &[[f64; 6]], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, 
 }
 
 fn no_direction(key: &str, p: Vec3) -> Fault {
-    Fault::new(key, format!("the vector is zero at {}; it needs a direction all over the region's bounds", in_mm(p)))
+    Fault::new(key, format!("the vector is zero at {}; it needs a direction all over the region's bounds", position(p)))
 }
 
 /// The frame between those at the nodes about a point, in the branch of the first of them: their mean, made orthonormal; of the nearest
@@ -346,7 +346,7 @@ fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fau
         let x = sub(x, scale(z, dot(x, z)));
         if norm(x) < 1e-6 {
             let message =
-                format!("the first and the third axis are parallel at {}; give two that differ", in_mm(points[n]));
+                format!("the first and the third axis are parallel at {}; give two that differ", position(points[n]));
             return Err(Fault::new("frame.x", message));
         }
         let x = unit(x);
@@ -368,7 +368,7 @@ pub(super) fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &st
                     format!(
                         "found {} at {}; it must be a finite number all over the region's bounds",
                         number(*v),
-                        in_mm(points[n])
+                        position(points[n])
                     ),
                 ));
             }
@@ -388,10 +388,6 @@ fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fau
         *v = unit(*v);
     }
     Ok(found)
-}
-
-pub(super) fn in_mm([x, y, z]: Vec3) -> String {
-    format!("({x:.4}, {y:.4}, {z:.4}) mm")
 }
 
 /// The frame of the least turn that takes z to `d`.

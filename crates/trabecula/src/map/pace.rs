@@ -5,14 +5,14 @@
 //! h² |K″| / 8 where K is smooth. It is taken at points throughout the region, and for a spacing of 0.618 h as well, so that no period of
 //! K can hide from it: the nodes' own shows at the second.
 
-use super::frame::{Orientation, in_mm};
+use super::frame::Orientation;
 use super::phase::Wanted;
 use super::phase_grid::Grid;
 use super::phase_target::wavelengths;
 use super::spline;
 use crate::field::Field;
 use crate::grade::Grade;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 use geometry::random::low_discrepancy;
@@ -178,7 +178,7 @@ impl Missed {
 
     /// What varies, how much, how fast and where.
     fn words(&self, step: f64) -> String {
-        let (half, place) = (number((self.within * 1000.0).round() / 1000.0), in_mm(self.at));
+        let (half, place) = (number((self.within * 1000.0).round() / 1000.0), position(self.at));
         let step = number((step * 1000.0).round() / 1000.0);
         let what = if self.key == "wavelength" {
             let [a, b] = self.lengths.map(|v| number((v * 1000.0).round() / 1000.0));
@@ -336,13 +336,13 @@ pub(super) fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bo
             format!(
                 "the wavelength jumps from {a} to {b} mm within {apart} mm at {}: faster than the grid can carry at any step; let it change \
                  over several cells",
-                in_mm(p)
+                position(p)
             )
         } else {
             format!(
                 "the wavelength goes from {a} to {b} mm within {apart} mm at {}: faster than the grid can carry; let it change over several \
                  cells, or give a smaller step",
-                in_mm(p)
+                position(p)
             )
         };
         Err(Fault::new("wavelength", message))

@@ -7,13 +7,13 @@
 use rayon::prelude::*;
 
 use super::edge_squares::{gradient, slopes};
-use super::frame::in_mm;
 use super::integral::Problem;
 use super::phase_grid::Grid;
 use super::region_holes::Hole;
 use super::solution::Solution;
 use super::spline::Spline;
 use super::winding::Winding;
+use geometry::fault::position;
 use geometry::math::{Vec3, sub};
 use geometry::progress::checkpoint;
 
@@ -39,7 +39,7 @@ pub struct Period {
 pub(super) fn tried(periods: &[Period]) -> String {
     let one = |p: &Period| {
         let [a, b, c] = p.asked.map(|v| format!("{:.2}", v + 0.0));
-        format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", in_mm(p.at))
+        format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", position(p.at))
     };
     let some: Vec<String> = periods.iter().take(3).map(one).collect();
     match periods.len() - some.len() {

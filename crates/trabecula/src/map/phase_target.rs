@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::frame::{Frames, in_mm};
+use super::frame::Frames;
 use super::phase::Wanted;
 use super::phase_grid::Grid;
 use super::principal_lengths::along_axes;
@@ -10,7 +10,7 @@ use super::smooth_frames::Smoothing;
 use super::surface_frames::Surface;
 use crate::field::Field;
 use crate::grade::Grade;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, Mat3, Vec3, exp, norm, scale};
 use geometry::progress::checkpoint;
 
@@ -98,7 +98,7 @@ impl Laid {
                 let message = format!(
                     "{} at {}; a weight is a finite number from 0 up, all over the region's bounds",
                     number(*w),
-                    in_mm(*p)
+                    position(*p)
                 );
                 return Err(Fault::new("weight", message));
             }
@@ -186,7 +186,7 @@ pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>,
                     format!(
                         "{} mm at {}; a wavelength is a positive, finite length all over the region's bounds",
                         number(*v),
-                        in_mm(*p)
+                        position(*p)
                     ),
                 ));
             }

@@ -1,10 +1,10 @@
 //! What is advised where a map folds, or where directions wind round lines that no core covers.
 
 use super::covering;
-use super::frame::{Orientation, in_mm};
+use super::frame::Orientation;
 use super::phase::Wanted;
 use super::singular_lines::{Alike, SingularLine};
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::Vec3;
 
 impl Wanted {
@@ -59,7 +59,7 @@ pub(super) fn remedy(wanted: &Wanted, longest: f64, covered: bool, singular: &[S
 pub(super) fn folded(p: Vec3, remedy: &str, tried: &str) -> Fault {
     let message = format!(
         "the map folds at {}: cells turn inside out there{tried}. {remedy}, or allow it with folds = true",
-        in_mm(p)
+        position(p)
     );
     Fault::new("", message)
 }

@@ -13,12 +13,11 @@ use rayon::prelude::*;
 
 use super::distortion::{Distortion, stretch};
 use super::edge_squares::gradient;
-use super::frame::in_mm;
 use super::grid_cells::GridCells;
 use super::integral::Problem;
 use super::solution::Solution;
 use super::spline::Spline;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{
     Mat3, Vec3, add, apply, cross, determinant, dot, eigen, inverse, norm, product, scale, sub, transpose,
 };
@@ -103,7 +102,7 @@ impl Stretch {
         Some(format!(
             "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map that keeps to that range \
              without folding was found. Give a wider range, or let orientation and wavelength vary more slowly",
-            in_mm(at)
+            position(at)
         ))
     }
 

@@ -6,7 +6,7 @@ use std::collections::{HashMap, VecDeque};
 
 use super::curved_tets::{Curves, settled};
 use crate::region::Region;
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
 use geometry::tetmesh::{FACES, TetMesh};
 
@@ -97,10 +97,8 @@ impl Tets {
             let to = columns(&corners);
             let m = inverse(&to);
             if !positive || m.as_flattened().iter().any(|v| !v.is_finite()) {
-                let [x, y, z] = corners[0];
-                let message = format!(
-                    "tetrahedron {n}, at ({x:.4}, {y:.4}, {z:.4}) mm, is inverted or flat; mesh the part again"
-                );
+                let message =
+                    format!("tetrahedron {n}, at {}, is inverted or flat; mesh the part again", position(corners[0]));
                 return Err(Fault::new("tets", message));
             }
             *flip = swaps % 2 == 1;

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, Vec3};
 use geometry::union_find::{find, unite};
 
@@ -117,10 +117,8 @@ impl Components {
         let short = |v: f64| number(format!("{v:.2e}").parse().unwrap_or(v));
         // Rounded downwards: what is not all of it is never 100 %.
         let share = number((1e4 * self.share()).floor() / 100.0);
-        // Plus zero: −0 is 0.
-        let [x, y, z] = second.center().map(|v| number((1e3 * v).round() / 1e3 + 0.0));
         let (volume, largest) = (short(self.volume), short(second.volume));
-        let place = format!("about ({x}, {y}, {z}) mm");
+        let place = format!("about {}", position(second.center()));
         let sentence = match (self.others, self.border) {
             (1, b) => format!(
                 "1 connected component besides the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",

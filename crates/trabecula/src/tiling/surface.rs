@@ -39,7 +39,7 @@ pub use bending::Bending;
 use bent_nodes::{BentNodes, Places};
 use component_links::ComponentLinks;
 pub use connectivity::{Connectivity, ZonePair, connectivity, steps_enough};
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::formats::stl;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::{Progress, Stopped};
@@ -120,10 +120,10 @@ fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
         let rounding = 4.0 * 3f64.sqrt() * largest * f64::from(f32::EPSILON) / 2.0;
         let apart = MARGIN * height / n as f64;
         if apart < rounding {
-            let [x, y, z] = c[0];
             let message = format!(
-                "the tetrahedron at ({x:.3}, {y:.3}, {z:.3}) mm is {height:.2e} mm high: in {n} steps its surface is lost in the rounding \
-                 of single precision; use a larger edge, or a mesh without such flat tetrahedra, or move the part nearer the origin"
+                "the tetrahedron at {} is {height:.2e} mm high: in {n} steps its surface is lost in the rounding \
+                 of single precision; use a larger edge, or a mesh without such flat tetrahedra, or move the part nearer the origin",
+                position(c[0])
             );
             return Err(Fault::new("edge", message));
         }

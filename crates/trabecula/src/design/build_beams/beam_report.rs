@@ -9,8 +9,7 @@ use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
 use ::beams::pattern::PatternField;
 use ::beams::quador::{Fillet, Shortfall};
-use geometry::fault::{counted, number};
-use geometry::math::Vec3;
+use geometry::fault::{counted, number, position};
 
 /// An angle between beams (degrees) below which it is warned of.
 const NARROW: f64 = 15.0;
@@ -35,7 +34,6 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
     let mut say = |message: String| {
         warnings.push(Warning { path: environment.path.clone(), message });
     };
-    let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
     if truss.dangling > 0 && truss.cleaned.dangling == 0 {
         say(format!(
             "{} inside the region with a single beam; dangling = \"drop\" leaves such beams out",
@@ -52,7 +50,7 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
             "{} cannot have {target}, only the largest that fits; the tightest has {:.3} mm, at {}",
             counted(truss.shortfalls.len(), "hub"),
             tightest.fillets.radius[0],
-            at(truss.quadors.center(tightest.hub))
+            position(truss.quadors.center(tightest.hub))
         ));
     }
     let over: Vec<_> = (truss.quadors.overlaps().iter()).filter(|o| inside(o.hub)).collect();
@@ -60,7 +58,7 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
         say(format!(
             "{} of beams still overlap halfway along, the first at {}: no fillet is made between them; make them thinner",
             counted(over.len(), "pair"),
-            at(truss.quadors.center(o.hub))
+            position(truss.quadors.center(o.hub))
         ));
     }
     if let Some(c) = truss.collisions.first() {
@@ -68,16 +66,20 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
             "{} of beams run into or touch each other without a common node, the first at {}: they are joined there, but not \
              filleted, and no exact figures of the whole are given; make them thinner, or put nodes there",
             counted(truss.collisions.len(), "pair"),
-            at(c.at)
+            position(c.at)
         ));
     }
     if let Some((n, p)) = truss.graph.contained_beams() {
         let lie = if n == 1 { "lies" } else { "lie" };
-        say(format!("{} {lie} within another one of the same hub, the first about {}", counted(n, "beam"), at(p)));
+        say(format!(
+            "{} {lie} within another one of the same hub, the first about {}",
+            counted(n, "beam"),
+            position(p)
+        ));
     } else if let Some((angle, p)) = truss.report.min_angle.filter(|a| a.0 < NARROW) {
         say(format!(
             "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
-            at(p)
+            position(p)
         ));
     }
 }

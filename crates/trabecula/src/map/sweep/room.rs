@@ -5,7 +5,7 @@ use super::Sweep;
 use super::line::{FINE, Line, SamplePoint};
 use crate::field::Field;
 use crate::map::Mapping;
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 impl Line {
@@ -43,12 +43,11 @@ impl Line {
 impl Sweep {
     /// Refuses a map that folds or tears at one of the positions `samples` in the region.
     pub(super) fn refuse_folds(&mut self, region: &dyn Field, samples: &[Vec3]) -> Result<(), Fault> {
-        let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
         let fold = |p: Vec3, radius: f64| {
             let message = format!(
                 "the lattice folds at {}: the line bends there with a radius of {radius:.3} mm, and the region reaches its \
                  centre; bend the line less, or keep the region nearer to it",
-                at(p)
+                position(p)
             );
             Err(Fault::new("points", message))
         };
@@ -90,7 +89,7 @@ impl Sweep {
                     let message = format!(
                         "the lattice tears at {}: two places of the line are as near, {apart:.3} mm apart along it; keep the \
                          region nearer to the line, or the line farther from itself",
-                        at(*p)
+                        position(*p)
                     );
                     return Err(Fault::new("points", message));
                 }

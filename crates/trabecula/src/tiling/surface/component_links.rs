@@ -8,7 +8,7 @@ use super::tet_surface::{NONE as NOBODY, Run, TetSurface};
 use crate::map::Tets;
 use crate::map::tet_map::NONE;
 use crate::surface_maker::{ComponentGraph, Totals};
-use geometry::fault::Fault;
+use geometry::fault::{Fault, position};
 use geometry::tetmesh::EDGES;
 use geometry::union_find::{find, unite};
 
@@ -159,10 +159,7 @@ pub(super) fn manifold(map: &Tets) -> Result<(), Fault> {
             *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
     }
-    let at = |v: u32| {
-        let [x, y, z] = boundary.vertices[v as usize];
-        format!("({x:.4}, {y:.4}, {z:.4}) mm")
-    };
+    let at = |v: u32| position(boundary.vertices[v as usize]);
     let touching = |what: &str, v: u32| {
         let message = format!(
             "tetrahedra meet in {what} alone, at {}: solids would touch there without being joined; mesh the part again, or \
