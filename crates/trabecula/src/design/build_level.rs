@@ -65,13 +65,13 @@ pub(super) fn level(
 ) -> Result<Level, DesignError> {
     let path = |key: &str| format!("{}.{key}", environment.path);
     let (key, value) = (spec.amount.key(), spec.amount.grade());
-    if key == "thickness" {
+    if let AmountSpec::Thickness(_) = spec.amount {
         check_sheet(part, key, &path(key))?;
     }
     let quantity = spec.amount.quantity(path(key), environment);
     let amount = value.build(&quantity)?;
     let length = spec.amount.length();
-    if !matches!(key, "fraction" | "porosity") || length.is_some() {
+    if !matches!(spec.amount, AmountSpec::Fraction(_) | AmountSpec::Porosity(_)) || length.is_some() {
         let found = length.map_or(key.to_string(), |(length, _)| format!("a {length}, too"));
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
@@ -83,20 +83,34 @@ pub(super) fn level(
     if let (Some(length @ ("thickness", _)), PartSpec::Sheet) = (length, part) {
         return Ok(Level::Thickness(length_grade(length, environment)?));
     }
-    if key == "pore" {
-        return pore(&amount, part.into(), cell, map, environment);
+    match &spec.amount {
+        AmountSpec::Thickness(_) => {
+            within_wavelength(value, &amount, &quantity, map.longest())?;
+            mid_surface(cell, path(key))?;
+            Ok(Level::Thickness(amount))
+        }
+        AmountSpec::Pore(_) => pore(&amount, part.into(), cell, map, environment),
+        AmountSpec::Iso(_) => Ok(Level::Iso(amount)),
+        AmountSpec::Stiffness(_) | AmountSpec::Permeability(_) => {
+            build_property::level(&spec.amount, &amount, part.into(), cell, map, environment)
+        }
+        AmountSpec::Fraction(_) | AmountSpec::Porosity(_) => {
+            of_fraction(spec, amount, (part, name), cell, map, environment)
+        }
     }
-    if matches!(key, "stiffness" | "permeability") {
-        return build_property::level(&spec.amount, &amount, part.into(), cell, map, environment);
-    }
-    if key == "iso" {
-        return Ok(Level::Iso(amount));
-    }
-    if key == "thickness" {
-        within_wavelength(value, &amount, &quantity, map.longest())?;
-        mid_surface(cell, path(key))?;
-        return Ok(Level::Thickness(amount));
-    }
+}
+
+/// The level of a fraction (or a porosity) of the cell or of the part.
+fn of_fraction(
+    spec: &LevelSpec,
+    amount: Grade,
+    (part, name): (PartSpec, Option<&str>),
+    cell: &Arc<Cell>,
+    map: &Map,
+    environment: &Environment,
+) -> Result<Level, DesignError> {
+    let path = |key: &str| format!("{}.{key}", environment.path);
+    let key = spec.amount.key();
     match (spec.of, spec.fit) {
         (Of::Cell, Fit::Table) => Ok(Level::Fraction(amount)),
         (Of::Part, Fit::Table) => {
