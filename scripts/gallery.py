@@ -10,26 +10,26 @@ import trabecula as lt
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES, PICTURES = ROOT / "examples", ROOT / "docs" / "images" / "gallery"
 STAMP = "<!-- Made by scripts/gallery.py; do not edit. -->"
-#: Pixels of a picture, and of one of a tall part.
-WIDE, TALL = (800, 640), (560, 800)
+#: Pixels of a picture; of one of a tall part, and of a long one.
+WIDE, TALL, LONG = (800, 640), (560, 800), (800, 480)
 #: Example, samples on the smallest wavelength (beams alone are meshed by their own patches), azimuth and elevation of the camera
 #: (degrees), pixels.
 SHOWN = (
     ("hybrid_stem", 20, 70, 12, TALL),
     ("kelvin_stem", None, 240, 12, TALL),
-    ("stress_bracket", 20, 300, 20, WIDE),
+    ("stress_bracket", 20, 300, 20, LONG),
     ("heat_exchanger", 24, 30, 35, WIDE),
     ("helmet_liner", 20, 30, -20, WIDE),
     ("octet_filleted", None, 30, 25, WIDE),
     ("diamond_cylinder", None, 30, 25, WIDE),
     ("swirl", 16, 30, 25, WIDE),
-    ("hybrid_bar", 24, 290, 25, WIDE),
+    ("hybrid_bar", 24, 290, 25, LONG),
     ("hybrid_rbf_gyroid", 16, 270, 55, WIDE),
     ("oriented_vortex", 20, 270, 55, WIDE),
     ("pressure_tube", 24, 30, 50, WIDE),
-    ("swept_beam", 20, 280, 40, WIDE),
+    ("swept_beam", 20, 280, 40, LONG),
     ("wrapped_tube", 24, 30, 35, WIDE),
-    ("wavy_panel", 24, 300, 35, WIDE),
+    ("wavy_panel", 24, 300, 35, LONG),
     ("bracket", 24, 40, -30, WIDE),
     ("user_series", 32, 30, 25, WIDE),
 )
