@@ -10,26 +10,28 @@ import trabecula as lt
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES, PICTURES = ROOT / "examples", ROOT / "docs" / "images" / "gallery"
 STAMP = "<!-- Made by scripts/gallery.py; do not edit. -->"
-SIZE = (640, 520)
-#: Example, samples on the smallest wavelength, azimuth and elevation of the camera (degrees).
+#: Pixels of a picture; of one of a tall part, and of a long one.
+WIDE, TALL, LONG = (800, 640), (560, 800), (800, 480)
+#: Example, samples on the smallest wavelength (beams alone are meshed by their own patches), azimuth and elevation of the camera
+#: (degrees), pixels.
 SHOWN = (
-    ("hybrid_stem", 20, 70, 12),
-    ("kelvin_stem", 32, 240, 12),
-    ("stress_bracket", 20, 300, 20),
-    ("heat_exchanger", 24, 30, 35),
-    ("helmet_liner", 20, 30, -20),
-    ("octet_filleted", 32, 30, 25),
-    ("diamond_cylinder", 32, 30, 25),
-    ("swirl", 16, 30, 25),
-    ("hybrid_bar", 24, 290, 25),
-    ("hybrid_rbf_gyroid", 16, 270, 55),
-    ("oriented_vortex", 20, 270, 55),
-    ("pressure_tube", 24, 30, 50),
-    ("swept_beam", 20, 280, 40),
-    ("wrapped_tube", 24, 30, 35),
-    ("wavy_panel", 24, 300, 35),
-    ("bracket", 24, 40, -30),
-    ("user_series", 32, 30, 25),
+    ("hybrid_stem", 20, 70, 12, TALL),
+    ("kelvin_stem", None, 240, 12, TALL),
+    ("stress_bracket", 20, 300, 20, LONG),
+    ("heat_exchanger", 24, 30, 35, WIDE),
+    ("helmet_liner", 20, 30, -20, WIDE),
+    ("octet_filleted", None, 30, 25, WIDE),
+    ("diamond_cylinder", None, 30, 25, WIDE),
+    ("swirl", 16, 30, 25, WIDE),
+    ("hybrid_bar", 24, 290, 25, LONG),
+    ("hybrid_rbf_gyroid", 16, 270, 55, WIDE),
+    ("oriented_vortex", 20, 270, 55, WIDE),
+    ("pressure_tube", 24, 30, 50, WIDE),
+    ("swept_beam", 20, 280, 40, LONG),
+    ("wrapped_tube", 24, 30, 35, WIDE),
+    ("wavy_panel", 24, 300, 35, LONG),
+    ("bracket", 24, 40, -30, WIDE),
+    ("user_series", 32, 30, 25, WIDE),
 )
 
 
@@ -44,16 +46,19 @@ def about(path):
     return " ".join(lines)
 
 
-def entry(name, per_cell, azimuth, elevation):
+def entry(name, per_cell, azimuth, elevation, size):
     """A section: what it is, its picture, what came out. The picture is made on the way."""
     path = EXAMPLES / f"{name}.toml"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", lt.DesignWarning)
-        mesh = lt.load(path).build().mesh(per_cell=per_cell)
-    mesh.render(PICTURES / f"{name}.png", SIZE, azimuth, elevation)
+        solid = lt.load(path).build()
+        mesh = solid.mesh(per_cell=per_cell)
+    to_scale = {"projection": "orthographic", "scale_bar": True}
+    mesh.render(PICTURES / f"{name}.png", size, azimuth, elevation, solid=solid, **to_scale)
     pieces = "one piece" if mesh.pieces == 1 else f"{mesh.pieces} pieces"
     count = f"{mesh.counts[1]:,}".replace(",", " ")
     figures = f"{count} triangles, {mesh.volume:.4g} mm³, solid fraction {mesh.solid_fraction:.3f}, {pieces}"
+    fine = f"{per_cell} samples on the smallest wavelength" if per_cell else f"chord error {mesh.chord_error:.2g} mm"
     return [
         f"## [{name}.toml](../examples/{name}.toml)",
         "",
@@ -61,7 +66,7 @@ def entry(name, per_cell, azimuth, elevation):
         "",
         f"![{name}](images/gallery/{name}.png)",
         "",
-        f"{figures}; {per_cell} samples on the smallest wavelength.",
+        f"{figures}; {fine}.",
         "",
     ]
 

@@ -1,10 +1,11 @@
 // The page's side of the worker: requests and answers, files that it has to have again when it is started anew.
 "use strict";
 
-// Bytes of base64 of a DEFLATE stream.
-async function inflated(text) {
-  const packed = await (await fetch(`data:application/octet-stream;base64,${text.trim()}`)).blob();
-  return new Response(packed.stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
+// The module in base64 of a DEFLATE stream, compiled while it is unpacked.
+async function compiled(text) {
+  const packed = await fetch(`data:application/octet-stream;base64,${text.trim()}`);
+  const bytes = packed.body.pipeThrough(new DecompressionStream("deflate"));
+  return WebAssembly.compileStreaming(new Response(bytes, { headers: { "Content-Type": "application/wasm" } }));
 }
 
 class Core {
@@ -19,7 +20,7 @@ class Core {
   async start() {
     // The core is the last thing on the page.
     if (document.readyState === "loading") await new Promise((done) => addEventListener("DOMContentLoaded", done, { once: true }));
-    this.module ??= await WebAssembly.compile(await inflated(document.getElementById("core").textContent));
+    this.module ??= await compiled(document.getElementById("core").textContent);
     this.worker = new Worker(this.source);
     this.worker.onmessage = ({ data }) => {
       if ("progress" in data) return this.onprogress(data.progress);

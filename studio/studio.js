@@ -32,7 +32,8 @@ const state = { name: "design", stale: false, busy: false, meshing: false, cells
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 // What controls have changed and the text does not have yet: of each value the last change.
 const pending = new Map();
-const rays = screen_ && rayMarcher();
+// What marches through designs by rays, made when it is first wished; null where the graphics card does not take its program.
+let rays;
 const controls = new Controls((changes) => {
   for (const change of changes) {
     const place = change.path.join(".");
@@ -42,14 +43,19 @@ const controls = new Controls((changes) => {
   changed();
 });
 
-// Null where the graphics card does not take the program; meshes are drawn then.
-function rayMarcher() {
-  try {
-    return marcher(screen_.gl);
-  } catch (error) {
-    console.error(error);
-    return null;
+// Whether rays are wished and can be had.
+function byRays() {
+  if ($("by").value !== "rays") return false;
+  if (rays === undefined) {
+    try {
+      rays = screen_ && marcher(screen_.gl);
+    } catch (error) {
+      console.error(error);
+      rays = null;
+    }
   }
+  if (!rays) $("by").value = "mesh";
+  return !!rays;
 }
 
 function write(words) {
@@ -137,7 +143,7 @@ async function show() {
 // Draws the design by rays, where that is wished and the graphics card can march through it. It keeps the textures of a cell and of a
 // region.
 async function marched(data) {
-  if (!rays || $("by").value !== "rays") return false;
+  if (!byRays()) return false;
   const lattices = Object.values(data.lattice || {});
   if (lattices.length !== 1) return false;
   const [{ map, level, ...rest }] = lattices;
@@ -432,8 +438,9 @@ async function begin() {
   text.addEventListener("scroll", lines);
   $("mesh").addEventListener("click", () => mesh().catch(broken));
   document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); });
-  // Without a graphics card meshes are drawn faster.
-  $("by").value = rays && !drawnBySoftware() ? "rays" : "mesh";
+  // Without a graphics card meshes are drawn faster. The card makes its program while the core is unpacked.
+  $("by").value = screen_ && !drawnBySoftware() ? "rays" : "mesh";
+  byRays();
   $("by").addEventListener("input", (e) => { e.stopPropagation(); changed(); });
   $("cancel").addEventListener("click", () => stop().catch(broken));
   $("stl").addEventListener("click", () => save("stl").catch(broken));

@@ -13,8 +13,8 @@ from trabecula.camera import VIEWS, section_plane, towards
 from trabecula.turntable import SIGNATURE, animated
 
 
-def read(png, kinds=(b"IDAT",)):
-    """Control of the frames and rows (h, w, 3) of the first picture of these chunks."""
+def read(png, channels=3):
+    """Control of the frames, and the pictures (h, w, channels)."""
     assert png.startswith(SIGNATURE)
     at, head, frames, data = len(SIGNATURE), None, [], {}
     while at < len(png):
@@ -32,17 +32,17 @@ def read(png, kinds=(b"IDAT",)):
     width, height = head
     pictures = []
     for raw in data.values():
-        rows = np.frombuffer(zlib.decompress(raw), np.uint8).reshape(height, 1 + 3 * width)
-        pictures.append(unfiltered(rows).reshape(height, width, 3))
+        rows = np.frombuffer(zlib.decompress(raw), np.uint8).reshape(height, 1 + channels * width)
+        pictures.append(unfiltered(rows, channels).reshape(height, width, channels))
     return frames, pictures
 
 
-def unfiltered(rows):
-    """Rows of bytes without their filters (PNG, section 9), three bytes a pixel."""
+def unfiltered(rows, wide):
+    """Rows of bytes without their filters (PNG, section 9), so many bytes a pixel."""
     above, out = [0] * (rows.shape[1] - 1), []
     for kind, *line in rows.tolist():
         for i, v in enumerate(line):
-            left, corner = (line[i - 3], above[i - 3]) if i > 2 else (0, 0)
+            left, corner = (line[i - wide], above[i - wide]) if i >= wide else (0, 0)
             up = above[i]
             guess = left + up - corner
             paeth = min((left, up, corner), key=lambda c: abs(guess - c))

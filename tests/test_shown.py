@@ -5,11 +5,14 @@ import zlib
 import numpy as np
 import pytest
 import trabecula as lt
+from conftest import in_process
 from trabecula.camera import towards
 from trabecula.shown import SHOWN, look
 from trabecula.trajectories import trajectories
 
 EYE = (30, 40)
+BOX_FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+BOX_FACES = np.concatenate([BOX_FACES[:, [0, 1, 2]], BOX_FACES[:, [0, 2, 3]]])
 
 
 def solid(map=None, region=None, **more):
@@ -200,14 +203,109 @@ def test_lattices_of_a_blend_have_their_colours():
     assert not (picture[:, :, 0] - picture[:, :, 2] > 10).any()
 
 
+def graded(**more):
+    """A gyroid whose fraction rises along x, from 0.2 to 0.5."""
+    level = lt.level.fraction(lt.grade.linear(along=[1, 0, 0], stops=[[0, 0.2], [12, 0.5]]))
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(**{"wavelength": 4} | more), level=level)
+    return lt.Design(region=lt.region.box(min=[0, 0, 0], max=[12, 10, 8]), lattice=core).build()
+
+
+def test_a_fraction_is_a_colour_on_the_surface_and_in_a_section():
+    part = graded()
+    given, mesh = shown(part, "fraction")
+    assert given["label"] == "solid fraction of the cell"
+    assert np.allclose(given["color"], 0.2 + 0.025 * mesh.vertices[:, 0], atol=1e-6)
+    draw = {"size": (160, 130), "azimuth": -90, "elevation": 90, "section": "z=4", "projection": "orthographic"}
+    seen = pixels(mesh.png(**draw, **given, span=(0.2, 0.5)))
+    # Seen from above with x to the right, 92 % of the width: what is cut has the colour of the fraction in its column.
+    for share in (0.25, 0.5, 0.75):
+        column = round(80 + 0.92 * 160 * (share - 0.5))
+        here = 0.2 + 0.3 * share
+        alone = pixels(mesh.png(**draw, color=lambda points, here=here: np.full(len(points), here), span=(0.2, 0.5)))
+        bare = pixels(mesh.png(**draw, color=np.full(len(mesh.vertices), here), span=(0.2, 0.5)))
+        cut = (np.abs(alone[:, column] - bare[:, column]).max(axis=1) > 40).nonzero()[0]
+        assert len(cut) > 10
+        assert np.abs(seen[cut, column] - alone[cut, column]).max() <= 8
+
+
+def test_stiffness_is_by_the_law_of_the_cell():
+    part = graded()
+    given, mesh = shown(part, "stiffness", per_cell=4)
+    known = lt.law("gyroid", "sheet", 0.2, 0.5, 4, n=32, properties=["stiffness"])
+    at = np.clip(0.2 + 0.025 * mesh.vertices[:, 0], 0.2, 0.5)
+    # Both are cubics through points of the law: 8 and 4 of them.
+    assert np.allclose(given["color"], known.at("E", at), rtol=0.02)
+    assert given["label"] == "E of the cell along its axes, over that of the solid"
+    even = solid()
+    constant, _ = shown(even, "stiffness", per_cell=4)
+    assert np.ptp(constant["color"]) < 1e-9
+    for wrong, words in (
+        (graded(wavelength=[4, 4, 5]), "edges differ by up to 25%"),
+        (graded(skew={"xz": 20}), "the cells of lattice.core are none"),
+        (blended(), "that of one lattice; the design has core, rim"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            look(wrong, "stiffness")
+    beams = lt.Design(
+        region=lt.region.box(size=[8, 8, 8]), beams=lt.Beams("octet", lt.map.affine(wavelength=4), radius=0.4)
+    ).build()
+    for name in ("fraction", "stiffness"):
+        with pytest.raises(ValueError, match="the design has no lattice"):
+            look(beams, name)
+
+
+def test_overhang_is_told_by_the_build_direction(tmp_path):
+    """A box from below: its lower face hangs over, by 0 degrees to the layers; no other face faces down."""
+    box = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
+    draw = {"size": (160, 130), "azimuth": 30, "elevation": -40, "background": "white"}
+    grey = pixels(box.png(**draw, color=np.full(8, np.nan)))
+    for up, count in (((0, 0, 1), 1), ((0, 0, 5), 1), ((0, 0, -1), 0), ((-1, 0, 0), 1), ((0, 1, -1e-9), 0)):
+        seen = pixels(box.png(**draw, color="overhang", up=up))
+        lower = (np.abs(seen - grey).max(axis=2) > 30) & (seen[:, :, 1] < 90)
+        assert (lower.sum() > 500) == bool(count), up
+    for up, words in (((0, 0, 0), "it must be a direction"), ((0, 1), "three numbers"), ("z", "three numbers")):
+        with pytest.raises(ValueError, match=words):
+            box.png((60, 50), color="overhang", up=up)
+    box.write(tmp_path / "box.stl")
+    command = ("render", tmp_path / "box.stl", "-o", tmp_path / "a.png", "--size", "200x160", "--elevation", -40)
+    in_process(*command, "--show", "overhang")
+    assert (tmp_path / "a.png").read_bytes() == lt.Mesh.read(tmp_path / "box.stl").png((200, 160), 30, -40, color="overhang")
+    in_process(*command, "--show", "overhang", "--up", "0,0,-1")
+    assert (tmp_path / "a.png").read_bytes() != lt.Mesh.read(tmp_path / "box.stl").png((200, 160), 30, -40, color="overhang")
+    in_process(*command, "--up", "0,0,1", status=2)
+    for wrong in ("0,0,0", "1,2", "z"):
+        with pytest.raises(SystemExit):
+            in_process(*command, "--show", "overhang", "--up", wrong)
+    in_process(*command, "--show", "fraction", status=2)
+
+
+def test_a_view_of_a_solid_is_saved_as_it_is_rendered(tmp_path):
+    part = graded()
+    mesh = part.mesh(per_cell=8)
+    view = lt.view(part, "fraction", per_cell=8, section="z=4")
+    assert view.label == "solid fraction of the cell" and view.color == "values"
+    assert np.allclose(view.values, 0.2 + 0.025 * view._light.vertices[:, 0], atol=1e-6)
+    given = look(part, "fraction")(mesh, (0, 0, 1))
+    view.save(tmp_path / "a.png", size=(200, 160))
+    assert (tmp_path / "a.png").read_bytes() == mesh.png((200, 160), section="z=4", solid=part, **given)
+    view.color, view.overhang = "overhang", 60
+    view.save(tmp_path / "a.png", size=(200, 160))
+    wanted = mesh.png((200, 160), section="z=4", solid=part, color="overhang", span=(0, 60))
+    assert (tmp_path / "a.png").read_bytes() == wanted != mesh.png((200, 160), section="z=4", color="overhang", span=(0, 60))
+    view.save(tmp_path / "a.svg", size=(200, 160))
+    assert "overhang, degrees" in (tmp_path / "a.svg").read_text()
+    with pytest.raises(ValueError, match="no number at points"):
+        lt.view(blended(), "lattice", per_cell=4)
+    height = mesh.view(lambda points: points[:, 2], "height, mm")
+    assert np.array_equal(height.values, height._light.vertices[:, 2])
+
+
 def test_what_there_is_not_is_refused():
     plain = solid()
-    for name in set(SHOWN) - {"thickness"}:  # every solid has one
+    for name in set(SHOWN) - {"thickness", "overhang", "fraction", "stiffness"}:  # every lattice has these
         with pytest.raises(ValueError, match="no blend" if name == "lattice" else "solved for"):
             look(plain, name)
-    with pytest.raises(
-        ValueError, match="one of angle, spacing, density, axes, trajectories, singularities, lattice, thickness"
-    ):
+    with pytest.raises(ValueError, match=f"one of {', '.join(SHOWN)}"):
         look(plain, "stress")
     mesh = plain.mesh(edge=1)
     n = len(mesh.vertices)

@@ -106,8 +106,10 @@ def test_what_cannot_be_served_is_one_sentence(a_page, tmp_path):
     with pytest.raises(FileNotFoundError):
         studio.Studio(str(tmp_path / "none.toml"))
     in_process("studio", tmp_path / "none.toml", "--no-open", status=1)
-    with pytest.raises(SystemExit):
-        in_process("studio", "part.stl")
+    in_process("view", tmp_path / "none.toml", "--no-open", status=1)
+    for words in (["studio", "part.stl"], ["view"]):
+        with pytest.raises(SystemExit):
+            in_process(*words)
     with pytest.raises(SystemExit):
         in_process("studio", "--port", "70000")
 

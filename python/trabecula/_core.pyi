@@ -527,9 +527,10 @@ class Mesh:
         seen: tuple[int, int, float, float, bool],
         cut: tuple[tuple[tuple[float, float, float], float] | None, bool, bool],
         solid: Solid | None = None,
-        tint: tuple[str, Sequence[float], tuple[float, float]] | None = None,
+        tint: tuple[str, Sequence[float], tuple[float, float], Sequence[float] | None] | None = None,
         shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
         lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
+        inside: tuple[Sequence[float], Sequence[Sequence[float]], Sequence[int], Sequence[float]] | None = None,
         background: str = "shaded",
         dpi: float | None = None,
     ) -> tuple[bytes, bool]: ...
@@ -540,4 +541,8 @@ class Mesh:
         size: Sequence[float],
         unit: str,
         solid: Solid | None = None,
+        tint: tuple[str, Sequence[float], tuple[float, float], Sequence[float] | None] | None = None,
+        shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
+        lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
+        inside: tuple[Sequence[float], Sequence[Sequence[float]], Sequence[int], Sequence[float]] | None = None,
     ) -> tuple[str, bool]: ...

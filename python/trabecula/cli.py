@@ -141,6 +141,17 @@ def exposure(text: str) -> tuple[float, float]:
     return layer, first
 
 
+def direction(text: str) -> list[float]:
+    """A direction by its three parts."""
+    try:
+        found = [float(v) for v in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
+        raise argparse.ArgumentTypeError(f"expected a direction, such as 0,0,1, found {text!r}")
+    return found
+
+
 def parts(text: str) -> list[str]:
     """Names of parts by commas."""
     try:
@@ -262,6 +273,11 @@ MEASURED = file(
     stdin=True,
 )
 JSON = option("--json", action="store_true", help="print the figures as JSON on stdout")
+#: How the studio is served.
+SERVED = (
+    option("--port", type=PORT, default=0, metavar="N", help="port to serve it at (default: any that is free)"),
+    option("--no-open", dest="open", action="store_false", help="open no browser: print the address alone"),
+)
 THREADS = option("--threads", type=COUNT, metavar="N", help="threads (default: all); the result is the same for any number")
 PROGRESS = option(
     "--progress",
@@ -718,8 +734,13 @@ COMMANDS = {
         "Design in the browser: a page of this machine with live picture, figures, mesh and files.",
         "The page needs no network.\n\nexamples:\n  trabecula studio\n  trabecula studio part.toml",
         file("design", DESIGNS, "design file to open (.toml, .json)", "DESIGN", nargs="?"),
-        option("--port", type=PORT, default=0, metavar="N", help="port to serve it at (default: any that is free)"),
-        option("--no-open", dest="open", action="store_false", help="open no browser: print the address alone"),
+        *SERVED,
+    ),
+    "view": (
+        "Open a design in the studio, to turn it, cut it and change it.",
+        "The same as `trabecula studio DESIGN`.\n\nexample:\n  trabecula view part.toml",
+        file("design", DESIGNS, "design file to open (.toml, .json)", "DESIGN"),
+        *SERVED,
     ),
     "report": (
         "Write a report of a design as one HTML page: the part to turn, with sections; figures, wall thickness, warnings.",
@@ -771,9 +792,10 @@ COMMANDS = {
         option(
             "--show",
             choices=SHOWN,
-            help="local thickness of walls; of a solved map: angle, spacing or density off, the axes asked for, lines along "
-            "them, its singular lines; of a blend: which lattice is where",
+            help="local thickness of walls, overhang, solid fraction or E of the cell; of a solved map: angle, spacing or "
+            "density off, the axes asked for, lines along them, its singular lines; of a blend: which lattice is where",
         ),
+        option("--up", type=direction, metavar="X,Y,Z", help="along what layers are stacked, of overhang (default: 0,0,1)"),
         *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),
 }

@@ -36,7 +36,7 @@ from .volumes import check_case, check_order, check_solver, check_steps
 # fmt: off
 __all__ = [
     "cells", "check", "conductivity", "doctor", "faces", "law", "measure", "mesh", "new", "permeability", "render", "report",
-    "schema", "simplify", "slice", "stiffness", "studio", "sweep", "tets", "volume", "voxels",
+    "schema", "simplify", "slice", "stiffness", "studio", "sweep", "tets", "view", "volume", "voxels",
 ]
 # fmt: on
 
@@ -423,6 +423,11 @@ def studio(args) -> None:
             server.serve_forever()
         except KeyboardInterrupt:
             say("ended")
+
+
+def view(args) -> None:
+    """``trabecula view``: the studio with a design."""
+    studio(args)
 
 
 def doctor(args) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .camera import NO_SCALE, VIEWS, section_plane, towards
+from .drawn import WALL
 from .errors import Refused, WrongUsage
 from .files import check_place, kind_of, write_bytes
 from .formats import is_design
@@ -26,7 +27,7 @@ def render(args) -> None:
     solid = None
     if not is_design(args.file):
         if args.show is not None and args.show not in OF_MESH:
-            words = f"--show {args.show} is for a design with a solved map (map.phase) or a blend"
+            words = f"--show {args.show} is for a design"
             raise WrongUsage(f"{args.file} is a mesh; {words}")
         made, shown = surface(args), dict(OF_MESH.get(args.show, {}))
     else:
@@ -38,13 +39,14 @@ def render(args) -> None:
         made = meshed(solid, args)
         shown = dict(seen(made, towards(*angles)))
     settle()
-    always = {"projection": args.projection, "scale_bar": args.scale_bar, "axes": args.axes, "solid": solid}
+    shown |= {"projection": args.projection, "scale_bar": args.scale_bar, "axes": args.axes, "solid": solid}
+    shown |= {"up": args.up} if args.up else {}
     if line_art:
         # Not a whole number of pixels an inch, so that the width is the one asked for.
         exact = 25.4 * pixels[0] / args.size[0] if args.size[2] == "mm" else dpi
-        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, **always)
+        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, **shown)
     else:
-        shown |= {"background": args.background or "shaded", "dpi": dpi, **always}
+        shown |= {"background": args.background or "shaded", "dpi": dpi}
         if args.turn is None:
             made.render(args.output, pixels, *angles, section=args.section, **shown)
         else:
@@ -79,7 +81,7 @@ def drawn_in_lines(args) -> bool:
     """Whether a line drawing is asked for; refused with what it cannot show."""
     if kind_of(args.output) != "svg":
         return False
-    for name in ("show", "turn", "background"):
+    for name in ("turn", "background"):
         if getattr(args, name) is not None:
             raise WrongUsage(f"--{name} is for a .png; an .svg is a drawing in lines of one view, on no background")
     return True
@@ -91,6 +93,8 @@ def camera(args) -> tuple[float, float]:
         raise WrongUsage("--view says from where; leave out --azimuth and --elevation")
     if args.scale_bar and args.projection != "orthographic":
         raise WrongUsage(f"--scale-bar needs --projection orthographic: {NO_SCALE}")
+    if args.up is not None and args.show != "overhang":
+        raise WrongUsage("--up is the build direction of --show overhang: give that too, or leave it out")
     if args.seconds is not None and args.turn is None:
         raise WrongUsage("--seconds is the time of a turn: give --turn too, or leave it out")
     azimuth, elevation = VIEWS[args.view] if args.view else (30.0, 25.0)
@@ -111,6 +115,8 @@ def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, floa
     """Pictures from all round as one that is animated."""
     from .turntable import animated
 
+    if shown.get("color") == "thickness":
+        shown |= {"color": made.thickness_at_vertices(), "label": WALL}  # once for all pictures
     frames = []
     with Progress("drawing", args.progress) as progress:
         for i in range(args.turn):

@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Mapping
 from functools import cached_property
 
 from . import _core
-from .camera import BACKGROUNDS, NO_SCALE, PROJECTIONS, section_plane, towards
+from .drawn import Drawn
 from .errors import DesignWarning
-from .files import extension, read_text, whole_file, write_bytes
+from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
-from .given import fixed, number, positive, thread_count, whole
+from .given import fixed, positive, thread_count, whole
 from .machine import file_size, fits
 from .thickness import Thickness
 from .transforms import Transformed, determinant
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
     from typing import Any
 
     import numpy as np
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
         VoidReport,
     )
     from .solid import Solid
-    from .viewer import View
 
 __all__ = ["Mesh"]
 
@@ -47,21 +45,7 @@ MANY = 1_000_000
 TITLE = "Lattice part"
 
 
-class Picture:
-    """Things that show themselves as a picture in a notebook."""
-
-    def _picture(self) -> Mesh:
-        raise NotImplementedError
-
-    @cached_property
-    def _png(self) -> bytes:
-        return self._picture().png((640, 480))
-
-    def _repr_png_(self) -> bytes:
-        return self._png
-
-
-class Mesh(Picture, Transformed):
+class Mesh(Drawn, Transformed):
     """A triangle mesh. Made by ``Solid.mesh``, read from a file by ``Mesh.read``, or ``Mesh.of`` arrays.
 
     It never changes, and its arrays are read-only: ``moved``, ``scaled`` and ``rotated`` give another. So a copy is the mesh
@@ -457,227 +441,12 @@ class Mesh(Picture, Transformed):
         with whole_file(path) as temporary:
             self._core.write(temporary, kind, TITLE)
 
-    def png(
-        self,
-        size: tuple[int, int] = (1600, 1200),
-        azimuth: float = 30,
-        elevation: float = 25,
-        color: ArrayLike | str | None = None,
-        label: str = "",
-        span: tuple[float, float] | None = None,
-        shares: Mapping[str, ArrayLike] | None = None,
-        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
-        width: float | None = None,
-        section: str | None = None,
-        background: str = "shaded",
-        dpi: float | None = None,
-        projection: str = "perspective",
-        scale_bar: bool = False,
-        axes: bool = False,
-        solid: Solid | None = None,
-    ) -> bytes:
-        """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
-
-        ``color`` is a number for each vertex, shown on a scale that says ``label`` and goes over ``span``, or from the least
-        to the greatest; or ``"thickness"``, see ``thickness_at_vertices``. ``shares`` are instead numbers from 0 to 1 for each
-        vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm, by a name; they
-        are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is pale unless it has
-        colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed surface, ``"z<10"``,
-        ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched. ``background`` is
-        ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in print. ``projection`` is
-        ``"perspective"``, by a lens, or ``"orthographic"``, by parallel rays: lengths across the view are then to scale at any
-        depth, and ``scale_bar`` draws a bar of a round length. ``axes`` draws the directions of x, y and z. ``solid``, of which
-        this is the mesh, gives the normals that the surface is shaded by: its facets do not show then. ValueError for what
-        cannot be drawn; a DesignWarning where the picture is too small for legend, bar or axes.
-        """
-        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
-        if background not in BACKGROUNDS:
-            raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
-        inch = None if dpi is None else positive("dpi", dpi)
-        if color is not None and shares is not None:
-            raise ValueError("give color or shares, not both")
-        tint = None if color is None else self._tint(color, label, span)
-        mixed = None if shares is None else self._shares(shares, label)
-        drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
-        made, fits_foot = self._core.png(seen, cut, solid and solid._core, tint, mixed, drawn, background, inch)
-        if not fits_foot:
-            _warn_small(seen, "legend, scale bar or axes" if scale_bar or axes else "its legend")
-        return made
-
-    def svg(
-        self,
-        size: tuple[int, int] = (1600, 1200),
-        azimuth: float = 30,
-        elevation: float = 25,
-        section: str | None = None,
-        dpi: float | None = None,
-        projection: str = "perspective",
-        scale_bar: bool = False,
-        axes: bool = False,
-        solid: Solid | None = None,
-    ) -> str:
-        """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
-        where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
-        without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
-        in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
-        scale_bar are a path each, by these names. ValueError for what cannot be drawn.
-        """
-        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
-        pixels = seen[:2]
-        made, fits_foot = self._core.svg(seen, cut, *_paper(pixels, dpi), solid and solid._core)
-        if not fits_foot:
-            _warn_small(seen, "scale bar or axes")
-        return made
-
-    def _camera(
-        self,
-        size: tuple[int, int],
-        azimuth: float,
-        elevation: float,
-        section: str | None,
-        projection: str,
-        scale_bar: bool,
-        axes: bool,
-    ) -> tuple[tuple, tuple]:
-        """How a picture is seen, as pixels, angles and whether by parallel rays; the plane of its section, and its marks."""
-        wide, high = (whole("size", v, 1, 16384) for v in size)
-        angles = number("azimuth", azimuth), number("elevation", elevation)
-        if not all(map(math.isfinite, angles)):
-            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
-        if abs(angles[1]) > 90:
-            raise ValueError(f"elevation is {angles[1]:g}; it must be from -90 to 90 degrees above the xy plane")
-        if projection not in PROJECTIONS:
-            raise ValueError(f"projection is {projection!r}; it must be one of {', '.join(PROJECTIONS)}")
-        parallel = projection == "orthographic"
-        if scale_bar and not parallel:
-            raise ValueError(f"scale_bar needs an orthographic projection: {NO_SCALE}")
-        plane = None if section is None else self._plane(section, towards(*angles))
-        return (wide, high, *angles, parallel), (plane, bool(scale_bar), bool(axes))
-
-    def _plane(self, section: str, eye: tuple[float, float, float]) -> tuple[tuple[float, float, float], float]:
-        """The plane of a section; a ValueError where it leaves nothing, or all because it lies outside."""
-        normal, offset = section_plane(section, eye)
-        axis = [abs(n) for n in normal].index(1)
-        low, high = (end[axis] for end in self.bounds)
-        place, slack = normal[axis] * offset, 1e-6 * math.dist(*self.bounds)
-        nothing = min(normal[axis] * low, normal[axis] * high) >= offset
-        if nothing or not low - slack <= place <= high + slack:
-            what = "leaves nothing" if nothing else "cuts nothing off"
-            raise ValueError(f'section "{section}" {what}: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}')
-        return normal, offset
-
-    def _tint(self, color: ArrayLike | str, label: str, span: tuple[float, float] | None) -> tuple:
-        import numpy as np
-
-        if isinstance(color, str):
-            if color != "thickness":
-                raise ValueError(f'color is "{color}"; it must be numbers, one for each vertex, or "thickness"')
-            color, label = self.thickness_at_vertices(), label or "wall thickness, mm"
-        values = self._at_vertices("color", color)
-        if span is None:
-            finite = values[np.isfinite(values)]
-            span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-        low, high = (number("span", v) for v in span)
-        if not -math.inf < low <= high < math.inf:
-            raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
-        return label, values.tolist(), (low, high if high > low else low + 1.0)
-
-    def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
-        import numpy as np
-
-        if not shares:
-            raise ValueError("shares has no names; give numbers for each vertex by at least one")
-        values = np.stack([self._at_vertices(f"shares[{name!r}]", of) for name, of in shares.items()], axis=1)
-        return label, list(shares), values.ravel().tolist()
-
-    def _at_vertices(self, what: str, given: ArrayLike) -> NDArray[np.float64]:
-        import numpy as np
-
-        values = np.asarray(given, dtype=np.float64)
-        if values.shape != (self.counts[0],):
-            raise ValueError(f"{what} must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
-        return values
-
-    def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> tuple:
-        import numpy as np
-
-        found = []
-        if not isinstance(lines, Mapping):
-            raise TypeError(f"lines must be polylines by name, {{name: [points (n, 3), …]}}, found {lines!r:.80}")
-        for kind, (name, some) in enumerate(lines.items()):
-            for line in some:
-                points = np.asarray(line, dtype=np.float64)
-                if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-                    raise ValueError(f"lines[{name!r}] must be arrays (n, 3) of finite numbers, found shape {points.shape}")
-                found.append((kind, points.tolist()))
-        wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
-        return label, list(lines), found, wide / 2
-
-    def view(self, values: ArrayLike | str | None = None, label: str = "", **look: Any) -> View:
-        """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
-        for each vertex by which it is coloured, ``label`` says what they are, with their unit; or ``"thickness"``. Keywords
-        are how it is seen at first, such as ``section="z<4"``. Raises ValueError for any other number of values.
-        """
-        from .viewer import View
-
-        return View(self, values, label, **look)
-
-    def render(
-        self,
-        path: str | os.PathLike[str],
-        size: tuple[int, int] = (1600, 1200),
-        azimuth: float = 30,
-        elevation: float = 25,
-        color: ArrayLike | str | None = None,
-        label: str = "",
-        span: tuple[float, float] | None = None,
-        shares: Mapping[str, ArrayLike] | None = None,
-        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
-        width: float | None = None,
-        section: str | None = None,
-        background: str = "shaded",
-        dpi: float | None = None,
-        projection: str = "perspective",
-        scale_bar: bool = False,
-        axes: bool = False,
-        solid: Solid | None = None,
-    ) -> None:
-        """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
-
-        Raises ValueError for another suffix, for what cannot be drawn, and for an .svg with colours or lines.
-        """
-        if extension(path, ("png", "svg")) == "svg":
-            if color is not None or shares is not None or lines is not None:
-                raise ValueError("an .svg is a line drawing, without colours or lines: leave them out, or write a .png")
-            made = self.svg(size, azimuth, elevation, section, dpi, projection, scale_bar, axes, solid).encode()
-        else:
-            marks = {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": solid}
-            made = self.png(
-                size, azimuth, elevation, color, label, span, shares, lines, width, section, background, dpi, **marks
-            )
-        write_bytes(path, made)
-
     def _picture(self) -> Mesh:
         return self
 
     def _spacing(self) -> float:
         low, high = self.bounds
         return max(b - a for a, b in zip(low, high, strict=True)) / 200
-
-
-def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:
-    """The size of a drawing, and its unit: mm where pixels are so many an inch."""
-    if dpi is None:
-        return [float(n) for n in pixels], "px"
-    wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
-    if not 0.1 <= wide <= 1e5:
-        raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
-    return [wide, round(wide * pixels[1] / pixels[0], 2)], "mm"
-
-
-def _warn_small(seen: tuple, what: str) -> None:
-    words = f"a picture of {seen[0]} × {seen[1]} pixels is too small for {what}: none is drawn"
-    warnings.warn(words, DesignWarning, stacklevel=3)
 
 
 def _revived(state: tuple, known: dict) -> Mesh:

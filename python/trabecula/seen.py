@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 
 from .camera import towards
+from .drawn import Picture
 from .given import positions
-from .mesh import Mesh, Picture
+from .mesh import Mesh
 from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
     from typing import Any
 
     import numpy as np
@@ -103,11 +105,14 @@ class Seen(Picture):
         projection: str = "perspective",
         scale_bar: bool = False,
         axes: bool = False,
+        up: Sequence[float] = (0, 0, 1),
     ) -> None:
         """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file, or a line drawing to an .svg
         file; camera, section, background, dpi, projection, scale bar and axes as for ``Mesh.png``.
 
-        ``show`` is what it shows beside the form: ``thickness``, the local thickness of walls. Of a solved map
+        ``show`` is what it shows beside the form: ``thickness``, the local thickness of walls; ``overhang``, see ``Mesh.png``,
+        of layers stacked along ``up``; ``fraction``, the solid fraction of the cell; ``stiffness``, Young's modulus of the cell
+        along its axes by its fraction, over that of the solid, of cubic cells with a name (see ``law``). Of a solved map
         (``map.phase``): ``angle``, ``spacing``, ``density``, the deviation from the one asked for, see ``map_error``;
         ``axes``, the directions asked for, at places on the region's surface; ``trajectories``, lines along them on that
         surface; ``singularities``, the lines round which they do not come back to themselves. Of a blend: ``lattice``, which
@@ -116,19 +121,23 @@ class Seen(Picture):
         seen = None if show is None else look(self, show)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
         shown = dict(seen(made, towards(azimuth, elevation))) if seen else {}
-        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": self}
+        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": self, "up": up}
         made.render(path, size, azimuth, elevation, section=section, background=background, dpi=dpi, **shown)
 
     def view(
         self,
-        values: ArrayLike | str | None = None,
+        values: ArrayLike | Callable[[NDArray], ArrayLike] | str | None = None,
         label: str = "",
         edge: float | None = None,
         per_cell: float | None = None,
         **look: Any,
     ) -> View:
-        """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``."""
-        return self.mesh(edge=edge, per_cell=per_cell).view(values, label, **look)
+        """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``. ``values`` may also be what ``render``
+        shows as a number: ``"fraction"``, ``"stiffness"``, ``"angle"``, ``"spacing"`` or ``"density"``.
+        """
+        from .viewer import view
+
+        return view(self, values, label, edge, per_cell, **look)
 
     def _solved(self, lattice: str | None) -> str:
         """The lattice of that name, or else the first whose map was solved for."""

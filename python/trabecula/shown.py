@@ -1,9 +1,12 @@
-"""What pictures of a solid show besides form: deviations, axes and singular lines of a solved map, lattices of a blend."""
+"""What pictures of a solid show besides form: fractions and stiffness, deviations, axes and singular lines of a solved map,
+lattices of a blend.
+"""
 
 from __future__ import annotations
 
 import math
 
+from .local_fields import fields_at
 from .trajectories import trajectories
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -25,19 +28,95 @@ __all__ = ["SHOWN", "look"]
 PLACES, LINES = 24, 30
 #: Length and width of the bars of axes, in distances between places; widths of trajectories and singular lines, in diagonals.
 LONG, THICK, THIN, STRONG = 0.78, 0.1, 0.005, 0.013
+#: Voxels along a cell whose law is told in a picture; by what share edges of a cube may differ.
+VOXELS, CUBE = 32, 0.05
+
+
+def _number(at: Callable[[NDArray], NDArray], label: str) -> Look:
+    """The look that shows a number at points."""
+    return lambda mesh, _: {"color": at(mesh.vertices), "inside": at, "label": label}
 
 
 def _error(key: str, label: str) -> Callable[[Solid], Look]:
     def prepared(solid: Solid) -> Look:
         name = solid._solved(None)
-        return lambda mesh, _: {"color": solid.map_error(mesh.vertices, name)[key], "label": label}
+        return _number(lambda points: solid.map_error(points, name)[key], label)
 
     return prepared
 
 
+def _fraction(solid: Solid) -> Look:
+    def at(points: NDArray) -> NDArray:
+        return fields_at(solid, ["fraction"], points)["solid_fraction"]
+
+    _lattices_of(solid, "fraction")
+    at(_corner(solid))
+    return _number(at, "solid fraction of the cell")
+
+
+def _stiffness(solid: Solid) -> Look:
+    """Young's modulus by the law of the cell: of cubes, told by their fraction alone."""
+    import numpy as np
+
+    from .design import parsed
+    from .laws import law
+
+    names = _lattices_of(solid, "stiffness")
+    if len(names) > 1:
+        raise ValueError(f"stiffness is that of one lattice; the design has {', '.join(names)}")
+    (name,) = names
+    given = parsed(solid._core.design, False, "the design", solid._folder).to_dict()["lattice"][name]
+    if not isinstance(given["cell"], str):
+        raise ValueError(f"stiffness is by the law of a cell with a name; lattice.{name}.cell has none")
+    _check_cubes(solid, name)
+    low, high = np.broadcast_to(solid.report().lattices[name].fraction, 2)
+    # Fractions a twentieth apart: between them the law is a monotone cubic. One alone has another close by.
+    start, stop = (float(low), float(high)) if high > 1.01 * low else (0.99 * float(low), min(1.01 * float(high), 0.999))
+    found = law(given["cell"], given["part"], start, stop, 2 + int(20 * (stop - start)), n=VOXELS, properties=["stiffness"])
+    found.at("E", start)  # a ValueError where it falls apart
+
+    def at(points: NDArray) -> NDArray:
+        known = fields_at(solid, ["fraction"], points)["solid_fraction"]
+        return found.at("E", np.clip(known, start, stop))
+
+    return _number(at, "E of the cell along its axes, over that of the solid")
+
+
+def _check_cubes(solid: Solid, name: str) -> None:
+    """Raises ValueError where cells are no cubes."""
+    import numpy as np
+
+    low, high = np.asarray(solid.bounds)
+    shares = np.stack(np.meshgrid(*[np.linspace(0, 1, 9)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = solid.cell_at(low + shares * (high - low), name)
+    long, axes = cells["wavelength"], cells["axes"]
+    stretch = float(np.nanmax(long.max(axis=1) / long.min(axis=1))) - 1
+    skew = max(float(np.nanmax(np.abs((axes[:, i] * axes[:, (i + 1) % 3]).sum(axis=1)))) for i in range(3))
+    if max(stretch, skew) > CUBE:
+        found = f"edges differ by up to {stretch:.0%}" if stretch > CUBE else "their axes are not at right angles"
+        raise ValueError(f"stiffness is by the law of cubic cells; the cells of lattice.{name} are none: {found}")
+
+
+def _lattices_of(solid: Solid, what: str) -> list[str]:
+    names = list(solid.report().lattices)
+    if not names:
+        raise ValueError(f"{what} is that of a lattice's cell; the design has no lattice")
+    return names
+
+
+def _corner(solid: Solid) -> NDArray:
+    import numpy as np
+
+    return np.array([solid.bounds[0]])
+
+
 def _lattices(solid: Solid) -> Look:
-    solid.shares([solid.bounds[0]])
-    return lambda mesh, _: {"shares": solid.shares(mesh.vertices), "label": "which lattice is where"}
+    solid.shares(_corner(solid))
+    return lambda mesh, _: {
+        "shares": solid.shares(mesh.vertices),
+        "inside": solid.shares,
+        "label": "which lattice is where",
+    }
 
 
 def _singularities(solid: Solid) -> Look:
@@ -87,10 +166,12 @@ def _trajectories(solid: Solid) -> Look:
 
 
 #: What a mesh shows without its design.
-OF_MESH: dict[str, dict[str, Any]] = {"thickness": {"color": "thickness"}}
+OF_MESH: dict[str, dict[str, Any]] = {"thickness": {"color": "thickness"}, "overhang": {"color": "overhang"}}
 
 #: What can be shown: of a solid (a ValueError where it has none) the look of its meshes.
 SHOWN: dict[str, Callable[[Solid], Look]] = {
+    "fraction": _fraction,
+    "stiffness": _stiffness,
     "angle": _error("angle", "angle off, degrees"),
     "spacing": _error("spacing", "spacing off, ratio"),
     "density": _error("density", "cells for each one asked for"),

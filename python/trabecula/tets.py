@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from . import _core
 from .design import Design
+from .drawn import Picture
 from .errors import DesignError, DesignWarning
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
 from .given import fixed, thread_count
-from .mesh import Mesh, Picture
+from .mesh import Mesh
 from .transforms import Transformed
 
 if TYPE_CHECKING:

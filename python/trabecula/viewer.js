@@ -144,10 +144,15 @@ function roundLength(of) {
 }
 
 // Whether the processor draws: smoothing edges then takes as long as all else.
+let bySoftware;
 function drawnBySoftware() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const known = gl && gl.getExtension("WEBGL_debug_renderer_info");
-  return !!known && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
+  if (bySoftware === undefined) {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const known = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    bySoftware = !!known && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+  return bySoftware;
 }
 
 // Colours by number, as Python names them.

@@ -11,6 +11,7 @@ from html import escape
 from importlib.resources import files
 
 from .camera import section_plane, towards
+from .drawn import WALL
 from .files import extension, write_text
 from .given import number
 
@@ -22,10 +23,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .mesh import Mesh
+    from .seen import Seen
     from .solid import Solid
     from .widget import Widget
 
     Progress = Callable[[int, int], Any]
+    #: Numbers at points (n, 3) in mm.
+    At = Callable[[NDArray], ArrayLike]
 
 __all__ = ["View", "script", "style", "view"]
 
@@ -49,32 +53,48 @@ def style() -> str:
 NAMES = ("section", "azimuth", "elevation", "zoom", "overhang", "color")
 LIMITS = {"azimuth": (-1e6, 1e6), "elevation": (-90.0, 90.0), "zoom": (0.2, 200.0), "overhang": (0.0, 90.0)}
 COLORS = ("faces", "overhang", "values")
-#: The word for values that are computed, and what they are then.
-THICKNESS, WALL = "thickness", "wall thickness, mm"
+#: The word for values that are computed of any mesh.
+THICKNESS = "thickness"
 
 
 def view(
     shape: Mesh | Solid,
-    values: ArrayLike | str | None = None,
+    values: ArrayLike | At | str | None = None,
     label: str = "",
     edge: float | None = None,
     per_cell: float | None = None,
     **look: Any,
 ) -> View:
-    """A mesh or a solid to turn in a notebook; see ``View``. A solid is meshed at a spacing as for ``Solid.mesh``.
+    """A mesh or a solid to turn in a notebook; see ``View``. A solid is meshed at a spacing as for ``Solid.mesh``, and has more
+    words for ``values``, see ``Solid.view``.
 
     Raises TypeError for anything else, ValueError for values that are not one number for each vertex.
     """
     from .mesh import Mesh
     from .seen import Seen
 
+    solid = None
     if isinstance(shape, Seen):
-        shape = shape.mesh(edge=edge, per_cell=per_cell)
+        solid, shape = shape, shape.mesh(edge=edge, per_cell=per_cell)
+        if isinstance(values, str) and values != THICKNESS:
+            values, label = _of_solid(solid, shape, values, label)
     elif edge is not None or per_cell is not None:
         raise ValueError("edge and per_cell are for a solid, which is meshed; this is a mesh")
     if not isinstance(shape, Mesh):
         raise TypeError(f"view takes a Mesh or a Solid, found {type(shape).__name__}")
-    return View(shape, values, label, **look)
+    made = View(shape, values, label, **look)
+    made._solid = solid
+    return made
+
+
+def _of_solid(solid: Seen, mesh: Mesh, show: str, label: str) -> tuple[At, str]:
+    """What a solid shows as a number at points, and what it is. A ValueError for what is none."""
+    from .shown import look
+
+    given = look(solid, show)(mesh, (0.0, 0.0, 1.0))
+    if "color" not in given or "inside" not in given:
+        raise ValueError(f'values is "{show}", which is no number at points; `render` shows it')
+    return given["inside"], label or given["label"]
 
 
 def checked(view: View, name: str, value: Any) -> Any:
@@ -114,11 +134,12 @@ def _part(name: str, words: str) -> property:
 
 class View:
     """A mesh to turn: by the pointer, fingers or arrow keys; with a section plane, and colours by the faces that the region
-    cut, by the angle of overhang, or by ``values``: a number for each vertex that ``label`` names, or ``"thickness"`` for the
-    local thickness of walls. A notebook shows it, with anywidget (extra ``notebook``) as a widget; ``save`` makes a page or a
-    picture. Of a mesh of more than 150,000 triangles, without values, a lighter one is shown; while it is made
-    ``progress(done, total)`` is called. ``section``, ``azimuth``, ``elevation``, ``zoom``, ``overhang`` and ``color`` are how
-    it is seen at first; in a widget what is set is shown at once, and what the user turns can be read.
+    cut, by the angle of overhang, or by ``values``: a number for each vertex that ``label`` names, a function of points (n, 3)
+    in mm that gives such numbers, or ``"thickness"`` for the local thickness of walls. A notebook shows it, with anywidget
+    (extra ``notebook``) as a widget; ``save`` makes a page or a picture. Of a mesh of more than 150,000 triangles, without
+    values at vertices, a lighter one is shown; while it is made ``progress(done, total)`` is called. ``section``, ``azimuth``,
+    ``elevation``, ``zoom``, ``overhang`` and ``color`` are how it is seen at first; in a widget what is set is shown at once,
+    and what the user turns can be read.
 
     Raises ValueError for values that are not one number for each vertex, and for a look that cannot be.
     """
@@ -126,7 +147,7 @@ class View:
     def __init__(
         self,
         mesh: Mesh,
-        values: ArrayLike | str | None = None,
+        values: ArrayLike | At | str | None = None,
         label: str = "",
         progress: Progress | None = None,
         **look: Any,
@@ -134,9 +155,13 @@ class View:
         self.mesh = mesh
         self._computed = isinstance(values, str)
         if self._computed and values != THICKNESS:
-            raise ValueError(f'values is "{values}"; it must be numbers, one for each vertex, or "{THICKNESS}"')
+            words = f'numbers, one for each vertex, a function of points, or "{THICKNESS}"'
+            raise ValueError(f'values is "{values}"; it must be {words}')
         self.label = label or (WALL if self._computed else "")
-        self._values = None if values is None or self._computed else mesh._at_vertices("values", values)
+        self._at: At | None = values if callable(values) else None
+        known = values is None or self._computed or self._at is not None
+        self._values = None if known else mesh._at_vertices("values", values)
+        self._solid: Seen | None = None
         self._progress = progress
         self._widget: Widget | None = None
         self.look: dict[str, Any] = {
@@ -164,7 +189,7 @@ class View:
     @property
     def colored(self) -> bool:
         """Whether it has values."""
-        return self._computed or self._values is not None
+        return self._computed or self._at is not None or self._values is not None
 
     @property
     def widget(self) -> Widget:
@@ -183,6 +208,8 @@ class View:
     @cached_property
     def values(self) -> NDArray | None:
         """The values at the vertices of the mesh that is shown, None without."""
+        if self._at is not None:
+            return self._light._at_vertices("values", self._at(self._light.vertices))
         return self._light.thickness_at_vertices(progress=self._progress) if self._computed else self._values
 
     @cached_property
@@ -277,7 +304,8 @@ class View:
 
     def save(self, path: str | os.PathLike[str], title: str = "Part", size: tuple[int, int] = (1600, 1200)) -> None:
         """Writes the page to an .html file; or a picture of the whole mesh to a .png or .svg file, ``size`` pixels large,
-        with the section, the colours and from the side that are seen now.
+        with the section, the colours and from the side that are seen now; the view of a solid is shaded by the normals of its
+        field.
 
         Raises OSError if it cannot be written, ValueError for another suffix.
         """
@@ -285,10 +313,19 @@ class View:
         if kind == "html":
             write_page(path, self.html(title))
             return
-        colors = {}
-        if self.color == "values" and kind == "png":
-            colors = {"color": THICKNESS if self._computed else self._values, "label": self.label}
-        self.mesh.render(path, size, self.azimuth, self.elevation, section=self.section or None, **colors)
+        colors: dict[str, Any] = {}
+        if self.color == "values":
+            colors = {"color": self._shown(), "label": self.label}
+        elif self.color == "overhang":
+            colors = {"color": "overhang", "span": (0.0, self.overhang or 1e-3)}
+        cut = self.section or None
+        self.mesh.render(path, size, self.azimuth, self.elevation, section=cut, solid=self._solid, **colors)
+
+    def _shown(self) -> Any:
+        """Its values, as ``Mesh.png`` takes them."""
+        if self._computed:
+            return THICKNESS
+        return self._values if self._at is None else self._at
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         # Where no widget is known, such as on a site that shows notebooks, the still picture stands for it.

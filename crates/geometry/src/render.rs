@@ -21,6 +21,7 @@ mod section;
 mod shade;
 mod shares;
 mod space_lines;
+mod svg_legend;
 mod tint;
 mod visible_parts;
 
@@ -33,11 +34,11 @@ pub use marks::Marks;
 use paper::Paper;
 pub use png::png;
 use raster::{BAND, Projected, Raster};
-pub use section::Section;
 use section::SeenSection;
+pub use section::{PlaneGrid, Section};
 use shade::{Finish, Shader};
-pub use shares::{Colours, Shares};
-pub use tint::Tint;
+pub use shares::{Colours, SectionColours, Shares};
+pub use tint::{Amount, Tint};
 
 /// What lies behind a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,6 +68,8 @@ pub struct Look {
     pub lines: Option<Lines>,
     /// What is left out, of a closed surface; what the plane cuts is hatched.
     pub section: Option<Section>,
+    /// The colours of what the plane cuts, where the surface has some.
+    pub section_colours: Option<SectionColours>,
     /// Unit normals at the corners of the surface's triangles, three for each, by which it is shaded and its contours are found; those of
     /// the mesh where they are zero or none is given.
     pub normals: Option<Vec<[f32; 3]>>,
@@ -103,36 +106,59 @@ pub fn render(surface: &SurfaceMesh, view: &View, look: &Look) -> Vec<u8> {
 
 /// Draws about `samples` samples at once.
 fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usize) -> Vec<u8> {
+    let channels = look.background.channels();
+    let mut paper = Paper { size: view.size, channels, bytes: Vec::new() };
+    let legend = legend::rows(look, view, &paper);
+    let foot = legend::height(&legend, &paper) * OVER;
+    let Some((bytes, per_mm)) = picture(surface, view, look, (foot, true), samples) else {
+        return Vec::new();
+    };
+    paper.bytes = bytes;
+    if !legend.is_empty() {
+        legend::draw(&legend, &mut paper, per_mm);
+    }
+    paper.bytes
+}
+
+/// The rows of a picture that leaves `foot` samples free below the part, with a section hatched or not, and how many pixels a mm is, where
+/// that is one number; None for sizes that are none.
+fn picture(
+    surface: &SurfaceMesh,
+    view: &View,
+    look: &Look,
+    (foot, hatched): (usize, bool),
+    samples: usize,
+) -> Option<(Vec<u8>, Option<f64>)> {
     let [w, h] = view.size;
     let pixels = w.saturating_mul(h);
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
-        return Vec::new();
+        return None;
     }
     let bounds = surface.mesh.bounds();
     let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
     let channels = look.background.channels();
-    let mut paper = Paper { size: [w, h], channels, bytes: vec![0u8; channels * pixels] };
-    let legend = legend::rows(look, view, &paper);
+    let mut bytes = vec![0u8; channels * pixels];
     let mut per_mm = None;
     if drawn {
         let size = [w * OVER, h * OVER];
-        let room = [size[0], size[1] - legend::height(&legend, &paper) * OVER];
+        let room = [size[0], size[1].saturating_sub(foot).max(1)];
         let section = look.section.map(|s| s.before_faces(&bounds));
         let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
         let camera = Camera::new(&bounds, &shown, view, room);
         per_mm = Some(camera.samples_per_mm(1.0 / camera.distance) / OVER as f64);
         let finish = match (&look.colours, &look.lines) {
-            (Some(colours), _) => Finish::Coloured(colours),
+            (Some(colours), _) => Finish::Coloured(colours, look.section_colours.as_ref()),
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let body = Layer::new(surface, &camera, size, (finish, look.normals.as_deref()), section);
+        let mut body = Layer::new(surface, &camera, size, (finish, look.normals.as_deref()), section);
+        body.shader.hatched = hatched;
         let tubes = look.lines.as_ref().map(Tubes::of);
         let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, (Finish::Lines(t), None), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
-        for (i, part) in paper.bytes.chunks_mut(rows / OVER * w * channels).enumerate() {
+        for (i, part) in bytes.chunks_mut(rows / OVER * w * channels).enumerate() {
             let (first, count) = (i * rows / BAND, part.len() / (channels * w) * OVER);
             let (raster, mut picture) = body.draw(first, count);
             if let Some((over, drawn)) = lines.as_ref().map(|l| l.draw(first, count)) {
@@ -141,12 +167,9 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
             resolve(&picture, view.size, i * rows / OVER, look.background, part);
         }
     } else {
-        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, look.background, &mut paper.bytes);
+        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, look.background, &mut bytes);
     }
-    if !legend.is_empty() {
-        legend::draw(&legend, &mut paper, per_mm);
-    }
-    paper.bytes
+    Some((bytes, per_mm))
 }
 
 /// A surface in a picture.

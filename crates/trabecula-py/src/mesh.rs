@@ -7,8 +7,8 @@ use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{
-    Background, Colours, Lines, Look, Marks, Projection, Section, Shares, Tint, View, line_drawing, line_drawing_fits,
-    png, render,
+    Amount, Background, Colours, Lines, Look, Marks, PlaneGrid, Projection, Section, SectionColours, Shares, Tint,
+    View, line_drawing, line_drawing_fits, png, render,
 };
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
@@ -43,6 +43,15 @@ pub struct Mesh {
 /// Lines of a picture: a caption, names, the number of the name and the points (mm) of each line, half their width (mm).
 type NamedLines = (String, Vec<String>, Vec<(usize, Vec<[f64; 3]>)>, f64);
 
+/// A scale: its title, a number at each vertex, its ends, and the build direction if it is of overhang.
+type Scale = (String, Vec<f64>, [f64; 2], Option<[f64; 3]>);
+
+/// Shares of named parts: what they are, the names, and those at each vertex.
+type NamedShares = (String, Vec<String>, Vec<f64>);
+
+/// The colours of a section: the first point of a grid, its steps and counts, and the numbers or shares at its points.
+type Inside = ([f64; 3], [[f64; 3]; 2], [usize; 2], Vec<f64>);
+
 /// Pixels across and down, azimuth and elevation, whether by parallel rays.
 type Seen = (usize, usize, f64, f64, bool);
 
@@ -54,9 +63,29 @@ fn view((width, height, azimuth, elevation, parallel): Seen) -> View {
 /// The normal and the offset of a section; whether there is a scale bar, and axes.
 type Cut = (Option<([f64; 3], f64)>, bool, bool);
 
-fn look((section, scale_bar, axes): Cut) -> Look {
-    let section = section.map(|(normal, offset)| Section { normal, offset });
-    Look { section, marks: Marks { scale_bar, axes }, ..Look::default() }
+fn look(
+    (section, scale_bar, axes): Cut,
+    tint: Option<Scale>,
+    shares: Option<NamedShares>,
+    lines: Option<NamedLines>,
+    inside: Option<Inside>,
+) -> Look {
+    let scale = tint.map(|(title, values, span, up)| {
+        let amount = up.map_or_else(|| Amount::AtVertices(values), Amount::Overhang);
+        Colours::Scale(Tint { title, amount, span })
+    });
+    let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
+    Look {
+        colours: scale.or(parts),
+        lines: lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius }),
+        section: section.map(|(normal, offset)| Section { normal, offset }),
+        section_colours: inside.map(|(origin, steps, counts, values)| SectionColours {
+            grid: PlaneGrid { origin, steps, counts },
+            values,
+        }),
+        marks: Marks { scale_bar, axes },
+        ..Look::default()
+    }
 }
 
 /// A row of the table of mesh formats.
@@ -368,10 +397,10 @@ impl Mesh {
     }
 
     /// A picture as PNG bytes: with a number at each vertex to be seen as a colour, between the two ends of a scale, or with shares of
-    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset; with marks; on a
-    /// `background` ("shaded", "white" or "transparent"), `dpi` pixels an inch. And whether there is room for its legend and marks.
+    /// named parts at each vertex; with named lines; without what lies beyond a plane, by its normal and offset, with the colours `inside`
+    /// it; with marks; on a `background` ("shaded", "white" or "transparent"), `dpi` pixels an inch. And whether there is room for its legend and marks.
     /// The field of `solid`, whose surface it is, gives the normals.
-    #[pyo3(signature = (seen, cut, solid=None, tint=None, shares=None, lines=None, background="shaded", dpi=None))]
+    #[pyo3(signature = (seen, cut, solid=None, tint=None, shares=None, lines=None, inside=None, background="shaded", dpi=None))]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn png<'py>(
         &self,
@@ -379,21 +408,19 @@ impl Mesh {
         seen: Seen,
         cut: Cut,
         solid: Option<Py<Solid>>,
-        tint: Option<(String, Vec<f64>, [f64; 2])>,
-        shares: Option<(String, Vec<String>, Vec<f64>)>,
+        tint: Option<Scale>,
+        shares: Option<NamedShares>,
         lines: Option<NamedLines>,
+        inside: Option<Inside>,
         background: &str,
         dpi: Option<f64>,
     ) -> PyResult<(Bound<'py, PyBytes>, bool)> {
-        let scale = tint.map(|(title, values, span)| Colours::Scale(Tint { title, values, span }));
-        let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
-        let lines = lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius });
         let background = match background {
             "white" => Background::White,
             "transparent" => Background::Transparent,
             _ => Background::Shaded,
         };
-        let (view, mut look) = (view(seen), Look { colours: scale.or(parts), lines, background, ..look(cut) });
+        let (view, mut look) = (view(seen), Look { background, ..look(cut, tint, shares, lines, inside) });
         let bytes = run(py, None, None, |_| {
             look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
             png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi)
@@ -401,8 +428,9 @@ impl Mesh {
         Ok((PyBytes::new(py, &bytes), look.fits(&view)))
     }
 
-    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of the view.
-    #[pyo3(signature = (seen, cut, size, unit, solid=None))]
+    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of the view; colours and lines as for `png`.
+    #[pyo3(signature = (seen, cut, size, unit, solid=None, tint=None, shares=None, lines=None, inside=None))]
+    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn svg(
         &self,
         py: Python<'_>,
@@ -411,8 +439,12 @@ impl Mesh {
         size: [f64; 2],
         unit: &str,
         solid: Option<Py<Solid>>,
+        tint: Option<Scale>,
+        shares: Option<NamedShares>,
+        lines: Option<NamedLines>,
+        inside: Option<Inside>,
     ) -> PyResult<(String, bool)> {
-        let (view, mut look) = (view(seen), look(cut));
+        let (view, mut look) = (view(seen), look(cut, tint, shares, lines, inside));
         let text = run(py, None, None, |_| {
             look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
             line_drawing(&self.surface, &view, &look, size, unit)

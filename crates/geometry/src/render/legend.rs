@@ -95,25 +95,43 @@ fn row_height(row: &Row) -> usize {
 
 /// Draws the rows; `per_mm` is how many pixels a mm is, where that is one number.
 pub(super) fn draw(rows: &[Row], paper: &mut Paper, per_mm: Option<f64>) {
-    let [w, h] = paper.size;
     let letter = paper.letter();
-    let mut y = h.saturating_sub(height(rows, paper)) + letter / 2;
-    for row in rows {
+    for (row, y) in places(rows, paper) {
         match row {
-            Row::Words(text) => paper.write(text, w / 2, y, 0.5, INK),
+            Row::Words(text) => paper.write(text, paper.size[0] / 2, y, 0.5, INK),
             Row::Scale(tint) => tint.scale(paper, y),
             Row::Marks(marks) => draw_marks(marks, paper, y, per_mm),
             Row::Names(entries) => {
-                let mut x = (w + letter).saturating_sub(wide(entries, paper)) / 2;
-                for (name, colour) in entries {
-                    paper.fill([x, y], [x + letter, y + letter], *colour);
+                for (name, colour, x) in along(entries, paper) {
+                    paper.fill([x, y], [x + letter, y + letter], colour);
                     paper.write(name, x + 3 * letter / 2, y, 0.0, INK);
-                    x += entry_wide(name, paper);
                 }
             }
         }
-        y += row_height(row) * letter / 2;
     }
+}
+
+/// The rows, and where each begins: pixels from the top.
+pub(super) fn places<'a, 'b>(rows: &'b [Row<'a>], paper: &Paper) -> Vec<(&'b Row<'a>, usize)> {
+    let letter = paper.letter();
+    let mut y = paper.size[1].saturating_sub(height(rows, paper)) + letter / 2;
+    let mut place = |row: &Row| {
+        let at = y;
+        y += row_height(row) * letter / 2;
+        at
+    };
+    rows.iter().map(|row| (row, place(row))).collect()
+}
+
+/// The names of a row with their colours, and where each begins: pixels from the left.
+pub(super) fn along<'a>(entries: &[(&'a str, Colour)], paper: &Paper) -> Vec<(&'a str, Colour, usize)> {
+    let mut x = (paper.size[0] + paper.letter()).saturating_sub(wide(entries, paper)) / 2;
+    let mut place = |name: &str| {
+        let at = x;
+        x += entry_wide(name, paper);
+        at
+    };
+    entries.iter().map(|(name, colour)| (*name, *colour, place(name))).collect()
 }
 
 fn draw_marks(marks: &SeenMarks, paper: &mut Paper, top: usize, per_mm: Option<f64>) {

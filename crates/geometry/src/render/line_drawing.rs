@@ -5,13 +5,12 @@ use std::fmt::Write;
 use rayon::prelude::*;
 
 use super::hatching::hatching;
-use super::marks::{Drawn, SeenMarks};
-use super::paper::Colour;
+use super::paper::Paper;
 use super::raster::Projected;
 use super::section::SeenSection;
 use super::space_lines::{LineKind, SpaceLine, space_lines};
 use super::visible_parts::{Point, Seen, simpler};
-use super::{BAND, Camera, Look, Marks, View};
+use super::{BAND, Background, Camera, Look, Marks, OVER, View, legend, picture, png, svg_legend};
 use crate::surface_mesh::SurfaceMesh;
 use std::borrow::Cow;
 
@@ -22,41 +21,38 @@ const STROKES: [f64; 3] = [1.0 / 340.0, 1.0 / 500.0, 1.0 / 900.0];
 const HATCH: f64 = 1.0 / 75.0;
 /// Of the width of the picture: the length of edges that are too short to be drawn.
 const CRUMB: f64 = 0.012;
-/// The height of a letter, of the shorter side of the picture; that of a capital, of the size of its font.
-const LETTER: f64 = 1.0 / 42.0;
-const CAPITAL: f64 = 0.72;
+/// Pixels of a picture behind lines.
+const LARGEST_BEHIND: f64 = 2.5e7;
 
 /// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
-/// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Of a look, colours, lines and
-/// background are not drawn. `size` is width and height in `unit` (`mm` or `px`), of the same aspect as that of the view. Empty for views
-/// that are no picture (see `render`).
+/// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Colours and lines of a look are
+/// seen in a picture behind that, as large as the view says in pixels, with their legend; the background is not drawn. `size` is width and
+/// height in `unit` (`mm` or `px`), of the same aspect as that of the view. Empty for views that are no picture (see `render`).
 pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, size: [f64; 2], unit: &str) -> String {
     let [w, h] = view.size.map(|n| n as f64);
     let bounds = surface.mesh.bounds();
     if !(w > 0.0 && h > 0.0 && view.azimuth.is_finite() && view.elevation.is_finite()) {
         return String::new();
     }
-    let fine = SAMPLES / w.max(h);
-    let samples = [w, h].map(|n| ((n * fine).round() as usize).max(1));
+    let paper = sheet(view);
+    let samples = paper.size;
     // Pixels of the drawing for each sample.
     let part = size[0] / samples[0] as f64;
     let mut groups: [Vec<Vec<Point>>; 3] = Default::default();
     let mut hatched = Vec::new();
-    // A letter, and the height and the width of the picture, in samples and in letters.
-    let letter = LETTER * samples[0].min(samples[1]) as f64;
-    let wide = samples[0] as f64 / letter;
-    let marks = SeenMarks::new(look.marks, view, wide);
-    let foot = marks.as_ref().map_or(0.0, |m| (m.height() + 1.0) * letter);
-    let mut drawn_marks = Drawn::default();
+    let legend = legend::rows(look, view, &paper);
+    let foot = legend::height(&legend, &paper);
+    let coloured = look.colours.is_some() || look.lines.is_some();
+    let mut per_mm = None;
     if !bounds.is_empty() && bounds.is_finite() {
         let section = look.section.map(|s| s.before_faces(&bounds));
         let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
-        let camera = Camera::new(&bounds, &shown, view, [samples[0], samples[1] - foot as usize]);
+        let camera = Camera::new(&bounds, &shown, view, [samples[0], samples[1].saturating_sub(foot).max(1)]);
         let rows = samples[1].div_ceil(BAND) * BAND;
         let raster = Projected::of(surface, &camera, [samples[0], rows], section).draw(surface, 0, rows);
-        let per_mm = camera.samples_per_mm(1.0 / camera.distance);
-        let lines = space_lines(surface, look.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / per_mm);
+        let scale = camera.samples_per_mm(1.0 / camera.distance);
+        let lines = space_lines(surface, look.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / scale);
         let seen = Seen { camera: &camera, raster: &raster };
         let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
             lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();
@@ -66,55 +62,55 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, size: [f64;
         if section.is_some_and(|s| SeenSection::new(s, &camera).faces_the_eye()) {
             hatched = hatching(&polygons(&lines, &camera), HATCH * samples[0] as f64);
         }
-        if let Some(marks) = &marks {
-            drawn_marks = marks.drawn(wide, Some(per_mm / letter));
-        }
+        per_mm = Some(scale);
     }
     let drawn =
         groups.map(|lines| lines.into_iter().map(|line| line.iter().map(|p| p.map(|c| c * part)).collect()).collect());
     let hatched = hatched.iter().map(|line| line.map(|p| p.map(|c| c * part)).to_vec()).collect();
-    let top = size[1] - (foot - letter / 2.0) * part;
-    text(&drawn, &hatched, &marks_text(&drawn_marks, letter * part, top), size, unit)
+    let behind =
+        if coloured { behind(surface, view, look, foot as f64 / samples[1] as f64, size) } else { String::new() };
+    text(&drawn, &hatched, &behind, &svg_legend::text(&legend, &paper, part, per_mm), size, unit)
 }
 
-/// The elements of marks in a row that begins at `top`, with letters of this height.
-fn marks_text(marks: &Drawn, letter: f64, top: f64) -> String {
-    let digits = (2.0 - letter.log10()).ceil().clamp(0.0, 9.0) as usize;
-    let place = |[x, y]: [f64; 2]| [x * letter, top + y * letter];
-    let hex = |[r, g, b]: Colour| format!("#{r:02x}{g:02x}{b:02x}");
-    let mut out = String::new();
-    let width = 2.0 * marks.thin * letter;
-    for (from, to, colour) in &marks.arms {
-        let line = path(&[vec![place(*from), place(*to)]], digits);
-        let _ = writeln!(
-            out,
-            "<path class=\"axis\" stroke=\"{}\" stroke-width=\"{width:.digits$}\" d=\"{line}\"/>",
-            hex(*colour)
-        );
-    }
-    if let Some([low, high]) = marks.bar.map(|bar| bar.map(place)) {
-        let corners = [low, [high[0], low[1]], high, [low[0], high[1]], low].to_vec();
-        let _ =
-            writeln!(out, "<path id=\"scale_bar\" fill=\"#000\" stroke=\"none\" d=\"{}\"/>", path(&[corners], digits));
-    }
-    for (words, [x, y], anchor, colour) in &marks.words {
-        let anchor = if *anchor > 0.0 { "middle" } else { "start" };
-        let [x, y] = place([*x, *y + 1.0]);
-        let _ = writeln!(
-            out,
-            "<text x=\"{x:.digits$}\" y=\"{y:.digits$}\" font-family=\"sans-serif\" font-size=\"{:.digits$}\" text-anchor=\"{anchor}\" \
-             fill=\"{}\" stroke=\"none\">{words}</text>",
-            letter / CAPITAL,
-            hex(*colour)
-        );
+/// The paper that lines are judged on, as fine as that takes.
+fn sheet(view: &View) -> Paper {
+    let [w, h] = view.size.map(|n| n as f64);
+    let fine = SAMPLES / w.max(h);
+    Paper { size: [w, h].map(|n| ((n * fine).round() as usize).max(1)), channels: 3, bytes: Vec::new() }
+}
+
+/// A picture of the surface with its colours, as an element of a drawing; `foot` is the share of the height that is free below the part.
+fn behind(surface: &SurfaceMesh, view: &View, look: &Look, foot: f64, [w, h]: [f64; 2]) -> String {
+    let pixels = view.size.map(|n| n as f64);
+    let less = (LARGEST_BEHIND / (pixels[0] * pixels[1])).sqrt().min(1.0);
+    let view = View { size: pixels.map(|n| ((n * less) as usize).max(1)), ..*view };
+    let look = Look { background: Background::Transparent, ..look.clone() };
+    let foot = (foot * (view.size[1] * OVER) as f64).round() as usize;
+    let Some((rows, _)) = picture(surface, &view, &look, (foot, false), super::SAMPLES) else {
+        return String::new();
+    };
+    let bytes = png(&rows, view.size, Background::Transparent.channels(), None);
+    format!("<image width=\"{w}\" height=\"{h}\" xlink:href=\"data:image/png;base64,{}\"/>\n", base64(&bytes))
+}
+
+/// Bytes as text, by RFC 4648.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let bits = (0..3).fold(0u32, |bits, i| bits << 8 | u32::from(three.get(i).copied().unwrap_or(0)));
+        for i in 0..4 {
+            let letter = LETTERS[(bits >> (18 - 6 * i) & 63) as usize];
+            out.push(if i <= three.len() { char::from(letter) } else { '=' });
+        }
     }
     out
 }
 
-/// Whether a line drawing is wide enough for the marks of its look.
+/// Whether a line drawing has room for the legend and the marks of its look.
 pub fn line_drawing_fits(look: &Look, view: &View) -> bool {
-    let [w, h] = view.size.map(|n| n as f64);
-    look.marks == Marks::default() || SeenMarks::new(look.marks, view, w / (LETTER * w.min(h))).is_some()
+    let bare = look.colours.is_none() && look.lines.is_none() && look.marks == Marks::default();
+    bare || !legend::rows(look, view, &sheet(view)).is_empty()
 }
 
 /// The outlines of the section in the picture.
@@ -128,14 +124,22 @@ fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<Point>> {
 }
 
 /// The file.
-fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, marks: &str, [w, h]: [f64; 2], unit: &str) -> String {
+fn text(
+    groups: &[Vec<Vec<Point>>; 3],
+    hatched: &Vec<Vec<Point>>,
+    behind: &str,
+    foot: &str,
+    [w, h]: [f64; 2],
+    unit: &str,
+) -> String {
     let [contours, edges, section] = groups;
     let [strong, thin, fine] = STROKES.map(|share| share * w);
     // A hundredth of a stroke.
     let digits = (4.0 - w.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let link = if behind.is_empty() { "" } else { " xmlns:xlink=\"http://www.w3.org/1999/xlink\"" };
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}{unit}\" height=\"{h}{unit}\" viewBox=\"0 0 {w} {h}\">\n\
-         <g fill=\"none\" stroke=\"#000\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\"{link} width=\"{w}{unit}\" height=\"{h}{unit}\" viewBox=\"0 0 {w} {h}\">\n\
+         {behind}<g fill=\"none\" stroke=\"#000\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
     );
     for (name, width, lines) in [
         ("hatching", fine, hatched),
@@ -148,12 +152,12 @@ fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, marks: &str, [
                 writeln!(out, "<path id=\"{name}\" stroke-width=\"{width:.digits$}\" d=\"{}\"/>", path(lines, digits));
         }
     }
-    out.push_str(marks);
+    out.push_str(foot);
     out.push_str("</g>\n</svg>\n");
     out
 }
 
-fn path(lines: &[Vec<Point>], digits: usize) -> String {
+pub(super) fn path(lines: &[Vec<Point>], digits: usize) -> String {
     let mut out = String::new();
     for line in lines {
         let closed = line.len() > 2 && line.first() == line.last();

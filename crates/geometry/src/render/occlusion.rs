@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::raster::Projected;
+use super::raster::{INSIDE, Projected, Raster, weights};
+use super::shade::{Normals, area};
 use super::{Camera, SAMPLES, Section};
-use crate::math::{Vec3, cross, dot, sub, unit};
+use crate::math::{Vec3, dot, scale, sub};
 use crate::surface_mesh::SurfaceMesh;
 
 /// Samples of the sky about each point.
@@ -27,14 +28,24 @@ pub(super) struct Occlusion {
 
 impl Occlusion {
     /// Of a picture of `size` samples across and down.
-    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2], section: Option<&Section>) -> Occlusion {
+    pub(super) fn of(
+        surface: &SurfaceMesh,
+        normals: &Normals,
+        camera: &Camera,
+        size: [usize; 2],
+        section: Option<&Section>,
+    ) -> Occlusion {
         let samples = (size[0] * size[1]) as f64;
         let most = SAMPLES as f64 / (STRIDE * STRIDE);
         let factor = (1.0 / STRIDE).min((most / samples).sqrt());
         let camera = camera.scaled(factor);
         let size = size.map(|n| ((n as f64 * factor).ceil() as usize).max(1));
         let raster = Projected::of(surface, &camera, size, section).draw(surface, 0, size[1]);
-        let raw = estimated(&camera, &raster.near, size);
+        let seen = |p: Vec3, triangle: u32| match section {
+            Some(section) if triangle & INSIDE != 0 => section.normal,
+            _ => facing(surface, normals, &camera, triangle & !INSIDE, p),
+        };
+        let raw = estimated(&camera, &raster, size, seen);
         let open = smoothed(&raw, size, |x, y| raster.near[y * size[0] + x]);
         Occlusion { size, factor, near: raster.near, open }
     }
@@ -51,8 +62,20 @@ impl Occlusion {
     }
 }
 
-/// The estimate at each sample.
-fn estimated(camera: &Camera, near: &[f32], [w, h]: [usize; 2]) -> Vec<f32> {
+/// The normal that a point of a triangle is shaded by, on the side of the eye. By those of its facets a curved surface would have scales.
+fn facing(surface: &SurfaceMesh, normals: &Normals, camera: &Camera, triangle: u32, p: Vec3) -> Vec3 {
+    let n = normals.within(surface, triangle, weights(surface, triangle, p));
+    if dot(area(surface, triangle as usize), camera.to_eye(p)) < 0.0 { scale(n, -1.0) } else { n }
+}
+
+/// The estimate at each sample, by the normal of what is seen there: at a point, of a triangle.
+fn estimated(
+    camera: &Camera,
+    raster: &Raster,
+    [w, h]: [usize; 2],
+    normal: impl Fn(Vec3, u32) -> Vec3 + Sync,
+) -> Vec<f32> {
+    let near = &raster.near;
     let point = |x: usize, y: usize| {
         let near = near[y * w + x];
         (near > 0.0).then(|| camera.unproject(x as f64 + 0.5, y as f64 + 0.5, f64::from(near)))
@@ -64,7 +87,7 @@ fn estimated(camera: &Camera, near: &[f32], [w, h]: [usize; 2]) -> Vec<f32> {
     raw.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
         for (x, out) in row.iter_mut().enumerate() {
             let Some(p) = point(x, y) else { continue };
-            let n = screen_normal(&point, p, x, y, [w, h], camera);
+            let n = normal(p, raster.triangle[y * w + x]);
             // A pattern of 4×4 turns, the same in every picture.
             let turn = ((x & 3) + 4 * (y & 3)) as f64 * 0.618_033_988_75 * core::f64::consts::TAU;
             let mut dark = 0.0;
@@ -93,30 +116,6 @@ fn estimated(camera: &Camera, near: &[f32], [w, h]: [usize; 2]) -> Vec<f32> {
         }
     });
     raw
-}
-
-/// The normal of the surface seen about a sample, from the nearer of its neighbours in depth on each axis.
-fn screen_normal(
-    point: &impl Fn(usize, usize) -> Option<Vec3>,
-    p: Vec3,
-    x: usize,
-    y: usize,
-    [w, h]: [usize; 2],
-    camera: &Camera,
-) -> Vec3 {
-    let pick = |before: Option<Vec3>, after: Option<Vec3>| {
-        let (a, b) = (before.map(|q| sub(p, q)), after.map(|q| sub(q, p)));
-        match (a, b) {
-            (Some(a), Some(b)) => Some(if dot(a, a) < dot(b, b) { a } else { b }),
-            (a, b) => a.or(b),
-        }
-    };
-    let dx = pick(x.checked_sub(1).and_then(|x| point(x, y)), (x + 1 < w).then(|| point(x + 1, y)).flatten());
-    let dy = pick(y.checked_sub(1).and_then(|y| point(x, y)), (y + 1 < h).then(|| point(x, y + 1)).flatten());
-    match (dx, dy) {
-        (Some(dx), Some(dy)) => unit(cross(dy, dx)),
-        _ => camera.axes[2],
-    }
 }
 
 /// Averages 4×4 samples of like depth, which takes out the pattern of the spiral.

@@ -44,6 +44,41 @@ impl Section {
     }
 }
 
+/// Points in a plane: rows of a grid, one after another.
+#[derive(Clone, Debug)]
+pub struct PlaneGrid {
+    /// The first point (mm).
+    pub origin: Vec3,
+    /// From a point to the next of its row, and to that of the next row (mm); orthogonal.
+    pub steps: [Vec3; 2],
+    /// Points of a row, and rows.
+    pub counts: [usize; 2],
+}
+
+impl PlaneGrid {
+    /// The four points about a place, by number, and their weights; beyond the grid those of its border.
+    pub(super) fn weights(&self, p: Vec3) -> [(usize, f64); 4] {
+        let off = sub(p, self.origin);
+        let [(i, s), (j, t)] = [0, 1].map(|k| {
+            let step = self.steps[k];
+            let place = dot(off, step) / dot(step, step);
+            let last = self.counts[k].saturating_sub(1) as f64;
+            let place = if place.is_finite() { place.clamp(0.0, last) } else { 0.0 };
+            let first = place.floor().min((last - 1.0).max(0.0));
+            (first as usize, place - first)
+        });
+        let at = |i: usize, j: usize| {
+            j.min(self.counts[1].saturating_sub(1)) * self.counts[0] + i.min(self.counts[0].saturating_sub(1))
+        };
+        [
+            (at(i, j), (1.0 - s) * (1.0 - t)),
+            (at(i + 1, j), s * (1.0 - t)),
+            (at(i, j + 1), (1.0 - s) * t),
+            (at(i + 1, j + 1), s * t),
+        ]
+    }
+}
+
 /// A section as a camera sees it. The height above the plane, by a lens times the inverse distance, is affine in column, row and depth; `of`
 /// has its coefficients, the constant first.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::lines::Tubes;
 use super::occlusion::Occlusion;
 use super::raster::{INSIDE, NONE, Projected, Raster, weights};
-use super::{Camera, Colours, Projection, Section, View};
+use super::{Camera, Colours, Projection, Section, SectionColours, View};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -19,8 +19,9 @@ const PALE: [[f32; 3]; 2] = [[0.80, 0.79, 0.77], [0.66, 0.68, 0.70]];
 
 /// Of a section, and its hatching.
 const SECTION: [[f32; 3]; 2] = [[0.66, 0.16, 0.09], [0.40, 0.08, 0.05]];
-/// Samples from one line of the hatching to the next, along a row, and the share of a line.
+/// Samples from one line of the hatching to the next, along a row, and the share of a line; its light where a section has colours.
 const HATCH: (usize, usize) = (21, 5);
+const DARKER: f32 = 0.62;
 
 /// What a surface is made of.
 #[derive(Clone, Copy)]
@@ -29,8 +30,8 @@ pub(super) enum Finish<'a> {
     Plain,
     /// Both nearly white.
     Pale,
-    /// In given colours.
-    Coloured(&'a Colours),
+    /// In given colours; and those of a section.
+    Coloured(&'a Colours, Option<&'a SectionColours>),
     /// Lines, which throw no shadows.
     Lines(&'a Tubes),
 }
@@ -52,6 +53,8 @@ pub(super) struct Shader<'a> {
     key: Vec3,
     shade: Option<(Shadows, Occlusion)>,
     section: Option<&'a Section>,
+    /// Whether the section is hatched.
+    pub hatched: bool,
 }
 
 impl<'a> Shader<'a> {
@@ -64,11 +67,12 @@ impl<'a> Shader<'a> {
         section: Option<&'a Section>,
     ) -> Shader<'a> {
         let key = towards(camera, -0.55, 0.75, 0.60);
+        let normals = Normals::of(surface, normals);
         let shade = match finish {
             Finish::Lines(_) => None,
-            _ => Some((Shadows::cast(surface, key, section), Occlusion::of(surface, camera, size, section))),
+            _ => Some((Shadows::cast(surface, key, section), Occlusion::of(surface, &normals, camera, size, section))),
         };
-        Shader { surface, camera, finish, normals: Normals::of(surface, normals), key, shade, section }
+        Shader { surface, camera, finish, normals, key, shade, section, hatched: true }
     }
 
     /// Premultiplied colour and cover of each sample.
@@ -98,31 +102,30 @@ impl<'a> Shader<'a> {
             return self.cut_through(section, [x, y], near, p, eye);
         }
         let cut = is_cut(surface, triangle as usize);
-        let flat = unit(area(surface, triangle as usize));
         let t = surface.mesh.triangles[triangle as usize].map(|v| v as usize);
         let k = weights(surface, triangle, p);
-        let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(self.normals.at_corner(surface, triangle, i, flat), k[i])));
-        let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
-        // An open mesh may show its inside.
-        if dot(flat, eye) < 0.0 {
-            n = scale(n, -1.0);
-        }
+        let outward = self.normals.within(surface, triangle, k);
         let colour = match self.finish {
-            Finish::Coloured(colours) => colours.at(t, k),
+            Finish::Coloured(colours, _) => colours.at(t, k, outward),
             Finish::Lines(tubes) => tubes.colour(t[0]),
             Finish::Pale => PALE[usize::from(cut)],
             Finish::Plain if cut => CUT,
             Finish::Plain => LATTICE,
         };
+        // An open mesh may show its inside.
+        let inside = dot(area(surface, triangle as usize), eye) < 0.0;
+        let n = if inside { scale(outward, -1.0) } else { outward };
         let (sun, open) = self.light([x, y], near, p, n);
         lit([n, eye, self.key], sun, camera, colour, open, cut)
     }
 
     /// The light from the solid that a section cuts.
     fn cut_through(&self, section: &Section, [x, y]: [usize; 2], near: f32, p: Vec3, eye: Vec3) -> [f32; 3] {
+        let line = self.hatched && (x + y) % HATCH.0 < HATCH.1;
         let colour = match self.finish {
             Finish::Lines(_) => SECTION[1],
-            _ => SECTION[usize::from((x + y) % HATCH.0 < HATCH.1)],
+            Finish::Coloured(colours, Some(of)) => colours.inside(of, p).map(|c| if line { DARKER * c } else { c }),
+            _ => SECTION[usize::from(line)],
         };
         let (sun, open) = self.light([x, y], near, p, section.normal);
         lit([section.normal, eye, self.key], sun, self.camera, colour, open, true)
@@ -260,6 +263,13 @@ impl<'a> Normals<'a> {
         Normals { given, smooth: sums, edges }
     }
 
+    /// The unit normal at a point of a triangle, by the weights of its corners.
+    pub(super) fn within(&self, surface: &SurfaceMesh, triangle: u32, weights: [f64; 3]) -> Vec3 {
+        let flat = unit(area(surface, triangle as usize));
+        let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(self.at_corner(surface, triangle, i, flat), weights[i])));
+        if norm(n) > 0.0 { unit(n) } else { flat }
+    }
+
     /// The normal at a corner of a triangle whose own is `flat`.
     pub(super) fn at_corner(&self, surface: &SurfaceMesh, triangle: u32, corner: usize, flat: Vec3) -> Vec3 {
         self.given(triangle, corner).unwrap_or_else(|| self.at(surface, triangle, corner, flat))
@@ -271,7 +281,8 @@ impl<'a> Normals<'a> {
         self.given(triangle, corner).unwrap_or_else(|| self.smooth[vertex].map(f64::from))
     }
 
-    fn given(&self, triangle: u32, corner: usize) -> Option<Vec3> {
+    /// That which is given there, if there is one.
+    pub(super) fn given(&self, triangle: u32, corner: usize) -> Option<Vec3> {
         let n = self.given?[3 * triangle as usize + corner];
         (n != [0.0; 3]).then(|| n.map(f64::from))
     }

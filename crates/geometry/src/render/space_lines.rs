@@ -56,8 +56,9 @@ pub(super) fn space_lines(
     section: Option<&Section>,
     least: f64,
 ) -> Vec<SpaceLine> {
-    let edges = without_crumbs(surface, sharp_edges(surface), least);
-    let mut lines = contours(surface, normals, camera, &edges.iter().copied().collect());
+    let normals = Normals::of(surface, normals);
+    let edges = without_crumbs(surface, sharp_edges(surface, &normals), least);
+    let mut lines = contours(surface, &normals, camera, &edges.iter().copied().collect());
     lines.extend(edge_lines(surface, &edges));
     if let Some(section) = section {
         lines = lines.iter().flat_map(|line| kept(line, section)).collect();
@@ -66,10 +67,11 @@ pub(super) fn space_lines(
     lines
 }
 
-/// Edges where faces meet at more than 35°, where the surface ends, and between the lattice and cuts; ascending. The normal of a thin
+/// Edges where faces meet at more than 35°, where the surface ends, and between the lattice and cuts; ascending. Where normals are given they
+/// say how faces meet: a beam of few facets has no edges along itself. The normal of a thin
 /// triangle says little: of edges that hang together, one has to lie between triangles that are not thin, and
 /// others are left out where they lead nowhere.
-fn sharp_edges(surface: &SurfaceMesh) -> Vec<EdgeKey> {
+fn sharp_edges(surface: &SurfaceMesh, normals: &Normals) -> Vec<EdgeKey> {
     let triangles = &surface.mesh.triangles;
     let mut all: Vec<(EdgeKey, u32)> = triangles
         .par_iter()
@@ -81,7 +83,10 @@ fn sharp_edges(surface: &SurfaceMesh) -> Vec<EdgeKey> {
     let thin = |i: u32| norm(area(surface, i as usize)) < THIN * longest(surface, i as usize).powi(2);
     // Whether the edge is sharp, and whether that is certain.
     let sharp = |group: &[(EdgeKey, u32)]| match group {
-        [(_, s), (_, t)] if cut(*s) == cut(*t) => {
+        [(edge, s), (_, t)] if cut(*s) == cut(*t) => {
+            if let (Some(m), Some(n)) = (along(surface, normals, *edge, *s), along(surface, normals, *edge, *t)) {
+                return (dot(m, n) < Normals::EDGE * norm(m) * norm(n)).then_some(true);
+            }
             let (m, n) = (area(surface, *s as usize), area(surface, *t as usize));
             let turned = dot(m, n) < Normals::EDGE * norm(m) * norm(n);
             turned.then(|| !thin(*s) && !thin(*t))
@@ -97,6 +102,13 @@ fn sharp_edges(surface: &SurfaceMesh) -> Vec<EdgeKey> {
     let certain: HashSet<u32> = found.iter().filter(|e| e.1).map(|((a, _), _)| find(&mut joined, *a)).collect();
     found.retain(|((a, _), _)| certain.contains(&find(&mut joined, *a)));
     without_loose_ends(found, surface.mesh.vertices.len())
+}
+
+/// The sum of the normals that are given for a triangle at the two ends of an edge; None without either.
+fn along(surface: &SurfaceMesh, normals: &Normals, (a, b): EdgeKey, i: u32) -> Option<Vec3> {
+    let t = surface.mesh.triangles[i as usize];
+    let at = |v: u32| t.iter().position(|w| *w == v).and_then(|k| normals.given(i, k));
+    Some(add(at(a)?, at(b)?))
 }
 
 /// The edges, but for those that are not certain and lead nowhere.
@@ -189,13 +201,7 @@ impl Crossings {
     }
 }
 
-fn contours(
-    surface: &SurfaceMesh,
-    normals: Option<&[[f32; 3]]>,
-    camera: &Camera,
-    sharp: &HashSet<EdgeKey>,
-) -> Vec<SpaceLine> {
-    let normals = Normals::of(surface, normals);
+fn contours(surface: &SurfaceMesh, normals: &Normals, camera: &Camera, sharp: &HashSet<EdgeKey>) -> Vec<SpaceLine> {
     let mesh = &surface.mesh;
     let on_edge: HashSet<u32> = sharp.iter().flat_map(|(a, b)| [*a, *b]).collect();
     let mut found = Crossings::default();

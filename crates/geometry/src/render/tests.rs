@@ -334,7 +334,7 @@ fn a_transparent_background_mixes_to_the_same_picture() {
     let legend = Look {
         colours: Some(Colours::Scale(Tint {
             title: "t".into(),
-            values: vec![0.0; s.mesh.vertices.len()],
+            amount: Amount::AtVertices(vec![0.0; s.mesh.vertices.len()]),
             span: [0.0, 1.0],
         })),
         background: Background::Transparent,
@@ -431,4 +431,108 @@ fn a_face_in_the_plane_of_a_section_is_of_one_kind() {
             assert!(below > 4000.0 && (at / below - 1.0).abs() < 0.01, "{at} {below}");
         }
     }
+}
+
+/// A ball that is seen by parallel rays, its normals, and the normal that each pixel sees, where it sees the ball well off its contour.
+fn seen_ball(view: &View) -> (SurfaceMesh, Vec<[f32; 3]>, Vec<(usize, Vec3)>) {
+    let ball = contour(40, |p| norm(sub(p, [0.5; 3])) - 0.4);
+    let out = |v: &u32| unit(sub(ball.mesh.vertices[*v as usize], [0.5; 3])).map(|c| c as f32);
+    let normals = ball.mesh.triangles.as_flattened().iter().map(out).collect();
+    let [w, h] = view.size;
+    let radius = 0.46 * w.min(h) as f64;
+    let [right, up, eye] = view.axes();
+    let normal = |i: usize| {
+        let x = ((i % w) as f64 + 0.5 - w as f64 / 2.0) / radius;
+        let y = (h as f64 / 2.0 - (i / w) as f64 - 0.5) / radius;
+        let n = add(scale(right, x), add(scale(up, y), scale(eye, (1.0 - x * x - y * y).max(0.0).sqrt())));
+        (x.hypot(y) < 0.93).then_some((i, n))
+    };
+    let seen = (0..w * h).filter_map(normal).collect();
+    (ball, normals, seen)
+}
+
+/// A pixel of a ball has the colour of the overhang there, for any build direction: that of the same ball in the one colour of that angle.
+/// What faces up is grey, and so is what is steeper than the end of the scale.
+#[test]
+fn a_ball_has_the_colours_of_its_overhang() {
+    let view = View { size: [160, 160], azimuth: 20.0, elevation: -30.0, projection: Projection::Orthographic };
+    let (ball, normals, seen) = seen_ball(&view);
+    let look = |amount: Amount, end: f64| {
+        let colours = Some(Colours::Scale(Tint { title: String::new(), amount, span: [0.0, end] }));
+        render(&ball, &view, &Look { colours, normals: Some(normals.clone()), ..Look::default() })
+    };
+    let [first, second] = [[0.0, 0.0, 1.0], unit([1.0, -2.0, 2.0])];
+    for (up, end) in [(first, 90.0), (first, 45.0), (second, 60.0)] {
+        let drawn = look(Amount::Overhang(up), end);
+        let mut compared = 0;
+        for angle in [20.0, 40.0, 50.0, 70.0, 110.0] {
+            let number = if angle < end { angle } else { f64::NAN };
+            let alone = look(Amount::AtVertices(vec![number; ball.mesh.vertices.len()]), end);
+            for (i, n) in seen.iter().filter(|(_, n)| ((-dot(*n, up)).acos().to_degrees() - angle).abs() < 0.5) {
+                // Half a degree and the curvature of a facet; between two of six stops a colour changes by 131 at most.
+                let most = 131.0 * 5.0 * 0.6 / end + 2.0;
+                let off = (0..3).map(|k| i32::from(drawn[3 * i + k]).abs_diff(i32::from(alone[3 * i + k]))).max();
+                assert!(off.is_some_and(|off| f64::from(off) <= most), "{angle} of {end}: {off:?} at {n:?}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 200, "{compared}");
+    }
+}
+
+/// A section has the colours of a function there, by four points of the grid to either side; hatched in the same.
+#[test]
+fn a_section_has_the_colours_of_what_is_inside() {
+    let view = View { size: [160, 160], azimuth: 0.0, elevation: 90.0, projection: Projection::Orthographic };
+    let (ball, ..) = seen_ball(&view);
+    let look = |grid: &dyn Fn(usize) -> f64| {
+        let amount = Amount::AtVertices(vec![0.0; ball.mesh.vertices.len()]);
+        let colours = Some(Colours::Scale(Tint { title: String::new(), amount, span: [0.0, 1.0] }));
+        let steps = [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let grid = SectionColours {
+            grid: PlaneGrid { origin: [0.0, 0.0, 0.5], steps, counts: [3, 2] },
+            values: (0..6).map(grid).collect(),
+        };
+        let section = Some(Section { normal: [0.0, 0.0, 1.0], offset: 0.5 });
+        render(&ball, &view, &Look { colours, section, section_colours: Some(grid), ..Look::default() })
+    };
+    // By the x of its point: x at a point of the grid is 0, 1/2 or 1.
+    let ramp = look(&|i| (i % 3) as f64 / 2.0);
+    let mut compared = 0;
+    for share in [0.2, 0.4, 0.5, 0.65, 0.8] {
+        let alone = look(&|_| share);
+        // Seen from above with y to the right, x runs down.
+        for i in 0..160 * 160 {
+            let [x, y] = [i % 160, i / 160].map(|c| (c as f64 + 0.5 - 80.0) / (0.46 * 160.0) * 0.4);
+            if x.hypot(y) < 0.38 && (0.5 + y - share).abs() < 0.01 {
+                let off = (0..3).map(|k| i32::from(ramp[3 * i + k]).abs_diff(i32::from(alone[3 * i + k]))).max();
+                // A hundredth of the scale, between two stops.
+                assert!(off.is_some_and(|off| f64::from(off) <= 131.0 * 5.0 * 0.01 + 2.0), "{share}: {off:?}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 300, "{compared}");
+}
+
+/// A ball is as dark by what stands around it at all its points that see the same: no facet of a coarse mesh shows.
+#[test]
+fn facets_of_a_ball_throw_no_shade() {
+    let view = View { size: [240, 240], azimuth: 20.0, elevation: 10.0, projection: Projection::Orthographic };
+    let ball = contour(10, |p| norm(sub(p, [0.5; 3])) - 0.4);
+    let out = |v: &u32| unit(sub(ball.mesh.vertices[*v as usize], [0.5; 3])).map(|c| c as f32);
+    let given: Vec<[f32; 3]> = ball.mesh.triangles.as_flattened().iter().map(out).collect();
+    let camera = Camera::new(&ball.mesh.bounds(), &ball.mesh.vertices, &view, view.size.map(|n| n * OVER));
+    let normals = shade::Normals::of(&ball, Some(&given));
+    let open = occlusion::Occlusion::of(&ball, &normals, &camera, view.size.map(|n| n * OVER), None);
+    let raster = Projected::of(&ball, &camera, view.size.map(|n| n * OVER), None).draw(&ball, 0, 240 * OVER);
+    let mut least = 1.0f32;
+    for y in (0..720).step_by(3) {
+        for x in (0..720).step_by(3) {
+            if (x as f64 - 360.0).hypot(y as f64 - 360.0) < 0.8 * 331.0 {
+                least = least.min(open.open(x, y, raster.near[y * 720 + x]));
+            }
+        }
+    }
+    assert!(least > 0.97, "{least}");
 }

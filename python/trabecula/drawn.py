@@ -1,0 +1,361 @@
+"""Pictures of meshes: shaded, in colours, as line drawings; and the mesh to turn."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Mapping
+from functools import cached_property
+
+from .camera import BACKGROUNDS, NO_SCALE, PROJECTIONS, section_plane, towards
+from .errors import DesignWarning
+from .files import extension, write_bytes
+from .given import number, positive, whole
+from .transforms import vector_of
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import Any
+
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from . import _core
+    from .mesh import Mesh
+    from .solid import Solid
+    from .viewer import View
+
+    #: Numbers, or shares by name, at points (n, 3) in mm.
+    At = Callable[[NDArray], Any]
+    #: A plane by its unit normal and offset.
+    Plane = tuple[tuple[float, float, float], float]
+
+__all__ = ["OVERHANG", "WALL", "Drawn", "Picture"]
+
+#: What colours say that are computed.
+WALL, OVERHANG = "wall thickness, mm", "overhang, degrees to the layers (grey: none)"
+#: Points along the longer side of a section at which its colours are computed.
+ACROSS = 240
+
+
+class Picture:
+    """Things that show themselves as a picture in a notebook."""
+
+    def _picture(self) -> Mesh:
+        raise NotImplementedError
+
+    @cached_property
+    def _png(self) -> bytes:
+        return self._picture().png((640, 480))
+
+    def _repr_png_(self) -> bytes:
+        return self._png
+
+
+class Drawn(Picture):
+    """Meshes as they are drawn."""
+
+    _core: _core.Mesh
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        raise NotImplementedError
+
+    @property
+    def bounds(self) -> list[list[float]]:
+        raise NotImplementedError
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        raise NotImplementedError
+
+    def thickness_at_vertices(self) -> NDArray[np.float64]:
+        raise NotImplementedError
+
+    def png(
+        self,
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        color: ArrayLike | At | str | None = None,
+        label: str = "",
+        span: tuple[float, float] | None = None,
+        shares: Mapping[str, ArrayLike] | None = None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
+        width: float | None = None,
+        section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
+        inside: At | None = None,
+        up: Sequence[float] = (0, 0, 1),
+    ) -> bytes:
+        """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
+
+        ``color`` is a number for each vertex, or a function of points (n, 3) in mm that gives such numbers, shown on a scale
+        that says ``label`` and goes over ``span``, or from the least to the greatest; or ``"thickness"``, see
+        ``thickness_at_vertices``; or ``"overhang"``, the angle (degrees) between the surface and layers stacked along ``up``,
+        where it faces down and the angle is less than the end of ``span``, 90 unless given. ``shares`` are instead numbers from
+        0 to 1 for each vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm,
+        by a name; they are ``width`` mm wide (1/100 of the diagonal unless given) and are seen through the surface, which is
+        pale unless it has colours. ``label`` is what colours say, or else lines. ``section`` is what is kept of a closed
+        surface, ``"z<10"``, ``"z>10"`` (mm), or by ``"z=10"`` what is farther from the eye; the solid that is cut is hatched,
+        and coloured where ``color`` is a function, or by ``inside``, a function of points that gives ``color`` or ``shares``
+        there. ``background`` is ``"shaded"``, ``"white"`` or ``"transparent"``, ``dpi`` says how many pixels are an inch in
+        print. ``projection`` is ``"perspective"``, by a lens, or ``"orthographic"``, by parallel rays: lengths across the view
+        are then to scale at any depth, and ``scale_bar`` draws a bar of a round length. ``axes`` draws the directions of x, y
+        and z. ``solid``, of which this is the mesh, gives the normals that the surface is shaded by: its facets do not show
+        then. ValueError for what cannot be drawn; a DesignWarning where the picture is too small for legend, bar or axes.
+        """
+        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
+        if background not in BACKGROUNDS:
+            raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
+        inch = None if dpi is None else positive("dpi", dpi)
+        colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
+        made, fits_foot = self._core.png(seen, cut, solid and solid._core, *colours, background, inch)
+        if not fits_foot:
+            _warn_small(seen, "legend, scale bar or axes" if scale_bar or axes else "its legend")
+        return made
+
+    def svg(
+        self,
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        section: str | None = None,
+        dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
+        color: ArrayLike | At | str | None = None,
+        label: str = "",
+        span: tuple[float, float] | None = None,
+        shares: Mapping[str, ArrayLike] | None = None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
+        width: float | None = None,
+        inside: At | None = None,
+        up: Sequence[float] = (0, 0, 1),
+    ) -> str:
+        """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
+        where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
+        without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
+        in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
+        scale_bar are a path each, by these names. With ``color``, ``shares`` or ``lines``, as for ``png``, a picture of as many
+        pixels lies behind the lines, and a legend in lines and words below. ValueError for what cannot be drawn.
+        """
+        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
+        colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
+        made, fits_foot = self._core.svg(seen, cut, *_paper(seen[:2], dpi), solid and solid._core, *colours)
+        if not fits_foot:
+            _warn_small(seen, "legend, scale bar or axes")
+        return made
+
+    def render(
+        self,
+        path: str | os.PathLike[str],
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        color: ArrayLike | At | str | None = None,
+        label: str = "",
+        span: tuple[float, float] | None = None,
+        shares: Mapping[str, ArrayLike] | None = None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
+        width: float | None = None,
+        section: str | None = None,
+        background: str = "shaded",
+        dpi: float | None = None,
+        projection: str = "perspective",
+        scale_bar: bool = False,
+        axes: bool = False,
+        solid: Solid | None = None,
+        inside: At | None = None,
+        up: Sequence[float] = (0, 0, 1),
+    ) -> None:
+        """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
+
+        Raises ValueError for another suffix, and for what cannot be drawn.
+        """
+        shown = {"color": color, "label": label, "span": span, "shares": shares, "lines": lines, "width": width}
+        shown |= {"inside": inside, "up": up, "section": section, "dpi": dpi, "solid": solid}
+        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes}
+        if extension(path, ("png", "svg")) == "svg":
+            made = self.svg(size, azimuth, elevation, **shown).encode()
+        else:
+            made = self.png(size, azimuth, elevation, background=background, **shown)
+        write_bytes(path, made)
+
+    def view(self, values: ArrayLike | At | str | None = None, label: str = "", **look: Any) -> View:
+        """The mesh to turn, in a notebook or, by ``save(path)``, in a page of its own: see ``View``. ``values`` are a number
+        for each vertex by which it is coloured, or a function of points that gives such numbers, ``label`` says what they are,
+        with their unit; or ``"thickness"``. Keywords are how it is seen at first, such as ``section="z<4"``. Raises ValueError
+        for any other number of values.
+        """
+        from .viewer import View
+
+        return View(self._picture(), values, label, **look)
+
+    def _camera(
+        self,
+        size: tuple[int, int],
+        azimuth: float,
+        elevation: float,
+        section: str | None,
+        projection: str,
+        scale_bar: bool,
+        axes: bool,
+    ) -> tuple[tuple, tuple]:
+        """How a picture is seen, as pixels, angles and whether by parallel rays; the plane of its section, and its marks."""
+        wide, high = (whole("size", v, 1, 16384) for v in size)
+        angles = number("azimuth", azimuth), number("elevation", elevation)
+        if not all(map(math.isfinite, angles)):
+            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        if abs(angles[1]) > 90:
+            raise ValueError(f"elevation is {angles[1]:g}; it must be from -90 to 90 degrees above the xy plane")
+        if projection not in PROJECTIONS:
+            raise ValueError(f"projection is {projection!r}; it must be one of {', '.join(PROJECTIONS)}")
+        parallel = projection == "orthographic"
+        if scale_bar and not parallel:
+            raise ValueError(f"scale_bar needs an orthographic projection: {NO_SCALE}")
+        plane = None if section is None else self._plane(section, towards(*angles))
+        return (wide, high, *angles, parallel), (plane, bool(scale_bar), bool(axes))
+
+    def _plane(self, section: str, eye: tuple[float, float, float]) -> Plane:
+        """The plane of a section; a ValueError where it leaves nothing, or all because it lies outside."""
+        normal, offset = section_plane(section, eye)
+        axis = [abs(n) for n in normal].index(1)
+        low, high = (end[axis] for end in self.bounds)
+        place, slack = normal[axis] * offset, 1e-6 * math.dist(*self.bounds)
+        nothing = min(normal[axis] * low, normal[axis] * high) >= offset
+        if nothing or not low - slack <= place <= high + slack:
+            what = "leaves nothing" if nothing else "cuts nothing off"
+            raise ValueError(f'section "{section}" {what}: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}')
+        return normal, offset
+
+    def _colours(
+        self,
+        plane: Plane | None,
+        color: ArrayLike | At | str | None,
+        label: str,
+        span: tuple[float, float] | None,
+        shares: Mapping[str, ArrayLike] | None,
+        lines: Mapping[str, Iterable[ArrayLike]] | None,
+        width: float | None,
+        inside: At | None,
+        up: Sequence[float],
+    ) -> tuple:
+        """A scale, shares, named lines and the colours of a section, as the core takes them; None for what there is not."""
+        import numpy as np
+
+        if color is not None and shares is not None:
+            raise ValueError("give color or shares, not both")
+        at = inside or (color if callable(color) else None)
+        tint = None if color is None else self._tint(color, label, span, up)
+        mixed = None if shares is None else self._shares(shares, label)
+        drawn = None if lines is None else self._lines(lines, "" if tint or mixed else label, width)
+        if plane is None or at is None or not (tint or mixed):
+            return tint, mixed, drawn, None
+        places, grid = self._on(plane)
+        found = at(places)
+        values = np.stack([found[name] for name in shares], axis=1) if shares else np.asarray(found, dtype=np.float64)
+        return tint, mixed, drawn, (*grid, values.ravel().tolist())
+
+    def _on(self, plane: Plane) -> tuple[NDArray[np.float64], tuple]:
+        """Points of a grid in a plane across the bounds; the first point, the steps along and across rows, and the counts."""
+        import numpy as np
+
+        normal, offset = plane
+        axis = int(np.argmax(np.abs(normal)))
+        low, high = np.array(self.bounds)
+        origin = low.copy()
+        origin[axis] = np.clip(normal[axis] * offset, low[axis], high[axis])
+        others = [k for k in range(3) if k != axis]
+        most = max(high[k] - low[k] for k in others) or 1.0
+        counts = [2 + int(ACROSS * (high[k] - low[k]) / most) for k in others]
+        steps = np.zeros((2, 3))
+        for step, k, count in zip(steps, others, counts, strict=True):
+            step[k] = max(high[k] - low[k], 1e-9 * most) / (count - 1)
+        rows, columns = np.arange(counts[1])[:, None, None], np.arange(counts[0])[None, :, None]
+        places = np.clip((origin + rows * steps[1] + columns * steps[0]).reshape(-1, 3), low, high)
+        return places, (origin.tolist(), steps.tolist(), counts)
+
+    def _tint(
+        self, color: ArrayLike | At | str, label: str, span: tuple[float, float] | None, up: Sequence[float]
+    ) -> tuple[str, list[float], tuple[float, float], list[float] | None]:
+        import numpy as np
+
+        direction, values = None, np.zeros(0)
+        if isinstance(color, str):
+            if color not in ("thickness", "overhang"):
+                words = 'numbers, one for each vertex, a function of points, "thickness" or "overhang"'
+                raise ValueError(f'color is "{color}"; it must be {words}')
+            if color == "thickness":
+                color, label = self.thickness_at_vertices(), label or WALL
+        if isinstance(color, str):
+            length = math.hypot(*vector_of("up", up))
+            if length == 0:
+                raise ValueError("up is [0, 0, 0]; it must be a direction")
+            direction, label, span = [v / length for v in vector_of("up", up)], label or OVERHANG, span or (0.0, 90.0)
+        else:
+            values = self._at_vertices("color", color(self.vertices) if callable(color) else color)
+        if span is None:
+            finite = values[np.isfinite(values)]
+            span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
+            if span[1] > 0 and span[1] - span[0] <= 1e-9 * span[1]:
+                span = (0.0, 2 * span[1])  # one value is in the middle of its scale
+        low, high = (number("span", v) for v in span)
+        if not -math.inf < low <= high < math.inf:
+            raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
+        return label, values.tolist(), (low, high if high > low else low + 1.0), direction
+
+    def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
+        import numpy as np
+
+        if not shares:
+            raise ValueError("shares has no names; give numbers for each vertex by at least one")
+        values = np.stack([self._at_vertices(f"shares[{name!r}]", of) for name, of in shares.items()], axis=1)
+        return label, list(shares), values.ravel().tolist()
+
+    def _at_vertices(self, what: str, given: ArrayLike) -> NDArray[np.float64]:
+        import numpy as np
+
+        values = np.asarray(given, dtype=np.float64)
+        if values.shape != (self.counts[0],):
+            raise ValueError(f"{what} must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
+        return values
+
+    def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> tuple:
+        import numpy as np
+
+        found = []
+        if not isinstance(lines, Mapping):
+            raise TypeError(f"lines must be polylines by name, {{name: [points (n, 3), …]}}, found {lines!r:.80}")
+        for kind, (name, some) in enumerate(lines.items()):
+            for line in some:
+                points = np.asarray(line, dtype=np.float64)
+                if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+                    raise ValueError(f"lines[{name!r}] must be arrays (n, 3) of finite numbers, found shape {points.shape}")
+                found.append((kind, points.tolist()))
+        wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
+        return label, list(lines), found, wide / 2
+
+
+def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:
+    """The size of a drawing, and its unit: mm where pixels are so many an inch."""
+    if dpi is None:
+        return [float(n) for n in pixels], "px"
+    wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+    if not 0.1 <= wide <= 1e5:
+        raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
+    return [wide, round(wide * pixels[1] / pixels[0], 2)], "mm"
+
+
+def _warn_small(seen: tuple, what: str) -> None:
+    words = f"a picture of {seen[0]} × {seen[1]} pixels is too small for {what}: none is drawn"
+    warnings.warn(words, DesignWarning, stacklevel=3)
