@@ -1,4 +1,5 @@
-"""Writes docs/generated/tets_fit.md: how tetrahedral meshes of regions fit them, at a fifteenth of the longest side.
+"""Writes docs/generated/tets_fit.md: how tetrahedral meshes of regions fit them, and the volume of lattices over them, at a fifteenth and an
+eighth of the longest side.
 
 python scripts/tets_fit.py [MESH ...]
 
@@ -7,12 +8,15 @@ The parts are those of the repository and mesh files that are given, such as fan
 
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import trabecula as lt
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated" / "tets_fit.md"
+#: Tetrahedra along the longest side, steps along a cell, and the solid fraction.
+ACROSS, PER_CELL, FRACTION = (15, 8), 12, 0.3
 
 R = lt.region
 
@@ -51,14 +55,21 @@ def longest(region):
     return max(b - a for a, b in zip(low, high, strict=True))
 
 
-def row(name, region):
-    """One of the table."""
-    size = longest(region) / 15
+def row(name, region, across):
+    """One of the table, and what it loses."""
+    size = longest(region) / across
+    core = lt.Lattice(
+        cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=size), level=lt.level.fraction(FRACTION)
+    )
+    design = lt.Design(region=region, lattice={"a": core})
     start = time.process_time()
-    report = lt.TetMesh.of({"region": region, "lattice": {"a": {"map": lt.map.tets(size=size)}}}).report()
+    report = lt.TetMesh.of(design).report()
     seconds = time.process_time() - start
     quality, fit = report["quality"], report["fit"]
     angles = quality["dihedral"]
+    solid = design.build()
+    told = solid.report()["lattices"]["a"]["tets"]
+    mesh = solid.mesh(per_cell=PER_CELL)
     cells = [
         name,
         f"{quality['tets']:,}".replace(",", " "),
@@ -67,26 +78,40 @@ def row(name, region):
         f"{fit['to_part']['p99'] / size:.3f}, {fit['to_part']['max'] / size:.3f}",
         f"{angles['min']:.1f}° to {angles['max']:.1f}°",
         str(quality["pieces"]),
+        str(len(fit["lost"])),
         f"{seconds:.1f}",
+        told["method"],
+        f"{100 * (mesh.volume / (FRACTION * report['region_volume']) - 1):+.3f} %",
+        str(mesh.pieces),
     ]
-    return f"| {' | '.join(cells)} |"
+    return f"| {' | '.join(cells)} |", f"- {name}, {across}: {told['method_reason']}" if told["method_reason"] else None
 
 
 def main():
     """Write the page."""
+    warnings.simplefilter("ignore", lt.DesignWarning)
     given = {Path(p).stem: R.mesh(path=str(Path(p).resolve())) for p in sys.argv[1:]}
-    rows = [row(name, region) for name, region in (regions() | given).items()]
     about = (
         "# Fit of tetrahedral meshes",
         "",
-        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth of the longest side of the part. Volume of the",
+        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth and an eighth of the longest side of the part. Volume of the",
         "flat tetrahedra against the region's; distances from the part to the mesh and back, 99th percentile and greatest, in",
-        "sizes; dihedral angles; processor seconds for the mesh and its fit. See [tetrahedral meshes](../concepts/tets.md).",
-        "",
-        "| part | tetrahedra | volume | part to mesh | mesh to part | angles | pieces | s |",
-        "|---|---|---|---|---|---|---|---|",
+        "sizes; dihedral angles; features that are listed as lost; processor seconds for the mesh and its fit. Then a lattice of `diamond` at a",
+        f"fraction of {FRACTION} over it, in {PER_CELL} steps along a cell: how it is meshed, its volume against {FRACTION} of the region's, its pieces. See",
+        "[tetrahedral meshes](../concepts/tets.md).",
     )
-    OUT.write_text("\n".join([*about, *rows]) + "\n", encoding="utf-8", newline="\n")
+    lines, reasons = list(about), []
+    for across in ACROSS:
+        lines += ["", f"## {across} tetrahedra along the longest side", ""]
+        lines += ["| part | tetrahedra | volume | part to mesh | mesh to part | angles | pieces | lost | s | lattice | its volume | its pieces |"]
+        lines += ["|---|---|---|---|---|---|---|---|---|---|---|---|"]
+        for name, region in (regions() | given).items():
+            line, reason = row(name, region, across)
+            print(line, flush=True)
+            lines.append(line)
+            reasons += [reason] if reason else []
+    lines += ["", "Why lattices are meshed on a grid:", "", *reasons] if reasons else []
+    OUT.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     print(OUT)
 
 

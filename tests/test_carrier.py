@@ -1,6 +1,9 @@
 """The carrier of a lattice over tetrahedra as finite elements: fractions, sets, materials, files."""
 
 import dataclasses
+import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -115,6 +118,121 @@ def test_files_have_domains_materials_and_fractions(tmp_path, order):
         read = meshio.read(tmp_path / "a.msh")
         tets = [v for block, v in zip(read.cells, read.cell_data["fraction"], strict=True) if block.type == "tetra"]
         assert np.array_equal(np.concatenate(tets).ravel(), carrier.fraction)
+
+
+def turned(c, q):
+    """A stiffness (6, 6) in turned axes, as a tensor of fourth order."""
+    place = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+    full = np.einsum("ai,bj,ck,dl,ijkl->abcd", q, q, q, q, c[place[:, :, None, None], place[None, None]])
+    at = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+    return np.array([[full[i + j] for j in at] for i in at])
+
+
+def rotation(rng):
+    """A random rotation."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    return q * np.sign(np.linalg.det(q))
+
+
+def test_axes_are_those_of_the_body_centred_lattice():
+    """Orthonormal everywhere; inside a background mesh, whose tetrahedra are of that lattice, those of the world."""
+    solid = design({"fraction": 0.3}, region=lt.region.box(min=[0, 0, 0], max=[15, 15, 15])).build()
+    carrier = solid.carrier()
+    axes = carrier.axes
+    assert np.allclose(np.einsum("eij,ekj->eik", axes, axes), np.eye(3), atol=1e-12) and (np.linalg.det(axes) > 0).all()
+    middles = carrier.nodes[carrier.elements].mean(axis=1)
+    inner = (np.abs(middles - 7.5) < 4).all(axis=1)
+    largest = np.abs(axes[inner]).max(axis=2)
+    assert inner.sum() > 50 and largest == pytest.approx(1, abs=1e-6)
+    own = np.array(solid.stiffness(n=16, nu=0.3).C)
+    assert np.allclose(carrier.stiffness(n=16)[inner], own, atol=1e-3 * own.max())
+
+
+def test_the_mean_of_oriented_stiffness_is_between_the_bounds_of_the_isotropic_one():
+    """Over all directions the mean of the stiffness is Voigt's, above Hill's, and traces are invariant."""
+    carrier = design(GRADED).build().carrier()
+    c, moduli = carrier.stiffness(n=16), carrier.moduli(n=16)
+    bulk = c[:, :3, :3].sum(axis=(1, 2)) / 9
+    assert bulk == pytest.approx(moduli["young"] / (3 * (1 - 2 * moduli["poisson"])), rel=1e-9)
+    voigt = (np.trace(c[:, :3, :3], axis1=1, axis2=2) - 3 * bulk) / 10 + np.trace(c[:, 3:, 3:], axis1=1, axis2=2) / 5
+    assert (np.linalg.eigvalsh(c) > 0).all()
+    assert (voigt >= moduli["young"] / (2 * (1 + moduli["poisson"])) * (1 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_axes_and_stiffness_turn_with_the_mesh(seed, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    rng = np.random.default_rng(seed)
+    q = rotation(rng)
+    mesh = lt.TetMesh.of(design({"fraction": 0.3}))
+    nodes = mesh.nodes + rng.normal(scale=0.1, size=mesh.nodes.shape)
+    found = []
+    for name, places in (("as_it_is", nodes), ("turned", nodes @ q.T)):
+        meshio.write_points_cells(tmp_path / f"{name}.vtu", places, [("tetra", mesh.tets)])
+        core = lt.Lattice(lt.cell.tet("diamond"), "lower", lt.map.tets(path=str(tmp_path / f"{name}.vtu")), {"fraction": 0.3})
+        found.append(lt.Design(lt.region.sphere(radius=40), core).build().carrier().stiffness(n=16))
+    assert max(np.abs(turned(a, q) - b).max() for a, b in zip(*found, strict=True)) < 1e-9
+
+
+def solved(carrier, stiffness, held, load):
+    """The internal energy of linear tetrahedra under a load, by a solver of our own."""
+    nodes, tets = carrier.nodes, carrier.elements
+    k = np.zeros((3 * len(nodes), 3 * len(nodes)))
+    for t, c in zip(tets, stiffness, strict=True):
+        p = nodes[t]
+        slopes = np.linalg.inv(np.vstack([np.ones(4), p.T]))[:, 1:]
+        b = np.zeros((6, 12))
+        for i, (x, y, z) in enumerate(slopes):
+            b[:, 3 * i : 3 * i + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [0, z, y], [z, 0, x], [y, x, 0]]
+        dofs = (3 * t[:, None] + np.arange(3)).ravel()
+        k[np.ix_(dofs, dofs)] += abs(np.linalg.det(np.diff(p, axis=0))) / 6 * b.T @ c @ b
+    f = np.zeros(3 * len(nodes))
+    at, forces = carrier.forces(*load)
+    f.reshape(-1, 3)[at] = forces
+    free = np.ones(len(f), dtype=bool)
+    free.reshape(-1, 3)[carrier.sets[held].nodes] = False
+    return f[free] @ np.linalg.solve(k[np.ix_(free, free)], f[free]) / 2
+
+
+def test_calculix_solves_a_cantilever_of_oriented_elements(tmp_path):
+    """To the digits that it prints the energy is that of the stiffness of each tetrahedron, which differs from that of its mean."""
+    ccx = shutil.which("ccx")
+    if ccx is None:
+        pytest.skip("CalculiX is not installed")
+    made = design({"fraction": lt.grade.linear(along=[1, 0, 0], stops=[[0, 0.4], [16, 0.2]])}, region=lt.region.box(size=[16, 5, 5]))
+    carrier = made.build().carrier()
+    load = ("X1", (0, 0, -5))
+    energies = {}
+    for oriented in (True, False):
+        carrier.write(tmp_path / "beam.inp", E=1000, hold=["X0"], load=dict([load]), oriented=oriented)
+        done = subprocess.run([ccx, "beam"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0 and "ERROR" not in done.stdout, done.stdout[-2000:]
+        text = (tmp_path / "beam.dat").read_text()
+        energies[oriented] = sum(float(v) for v in re.findall(r"total internal energy .*?\n\n(.*?)\n", text))
+    assert energies[True] == pytest.approx(solved(carrier, 1000 * carrier.stiffness(), "X0", load), rel=2e-6)
+    assert abs(energies[True] / energies[False] - 1) > 0.01
+
+
+def test_files_have_orientation_and_stiffness(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    carrier = design(GRADED).build().carrier()
+    fields = carrier.materials(0.3, "msh")
+    carrier.write(tmp_path / "a.msh", fields=fields | {"height": carrier.nodes[:, 2]})
+    read = meshio.read(tmp_path / "a.msh")
+    own = {"orientation": carrier.axes.reshape(-1, 9), **fields}
+    for name, wanted in own.items():
+        tets = [v for block, v in zip(read.cells, read.cell_data[name], strict=True) if block.type == "tetra"]
+        assert np.array_equal(np.concatenate(tets).reshape(len(carrier.elements), -1), wanted.reshape(len(carrier.elements), -1))
+    assert np.array_equal(read.point_data["height"].ravel(), carrier.nodes[:, 2])
+    carrier.write(tmp_path / "a.vtu", fields=carrier.materials(0.3, "vtu"))
+    read = meshio.read(tmp_path / "a.vtu")
+    assert np.array_equal(read.cell_data["orientation"][0], carrier.axes.reshape(-1, 9))
+    assert np.array_equal(read.cell_data["stiffness"][0].reshape(-1, 6, 6), carrier.stiffness())
+    with pytest.raises(ValueError, match=r"oriented materials are for \.inp"):
+        carrier.write(tmp_path / "a.bdf", oriented=True)
+    with pytest.raises(ValueError, match="1, 3 or 9"):
+        carrier.write(tmp_path / "b.msh", fields={"C": carrier.stiffness().reshape(-1, 36)})
 
 
 def test_a_result_comes_back_as_a_level(tmp_path):

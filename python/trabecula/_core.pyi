@@ -164,6 +164,12 @@ class VolumeMesh:
     def carrier_moduli(
         solid: Solid, nu: float, n: int, threads: int | None = None, progress: Progress | None = None
     ) -> list[list[float]]: ...
+    @staticmethod
+    def carrier_stiffness(
+        solid: Solid, nu: float, n: int, threads: int | None = None, progress: Progress | None = None
+    ) -> list[list[float]]: ...
+    @property
+    def axes(self) -> NDArray[np.float64]: ...
     @property
     def fraction(self) -> NDArray[np.float64]: ...
     @property
@@ -189,6 +195,7 @@ class VolumeMesh:
         held: list[str],
         loads: list[tuple[str, list[float]]],
         fields: list[tuple[str, int, bool, list[float]]],
+        cubic: list[list[float]],
     ) -> None: ...
     def write_poly(self, folder: str) -> list[tuple[str, int]]: ...
 

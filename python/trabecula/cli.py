@@ -475,10 +475,11 @@ COMMANDS = {
             "--fields",
             type=names,
             metavar="NAMES",
-            help="what the design says at nodes, by commas, in .vtu and .xdmf: fraction, share (of each lattice), "
+            help="what the design says at nodes, by commas, in .vtu, .xdmf and .msh: fraction, share (of each lattice), "
             "orientation (unit vectors along the cell's axes), wavelength; and of a carrier's elements stiffness",
         ),
         option("--solver", choices=("calculix", "abaqus"), help="whose .inp of --of beams it is: calculix (default) or abaqus"),
+        option("--oriented", action="store_true", help="of a carrier's .inp: cubic materials along the axes of each tetrahedron"),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(
             "--load",

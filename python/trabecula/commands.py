@@ -175,9 +175,9 @@ def volume(args) -> None:
     fields = fields_at(solid, named, made.nodes)
     if len(named) < len(args.fields or ()):
         with Progress("stiffness", args.progress) as progress:
-            fields |= made.moduli(args.nu, threads=args.threads, progress=progress)
+            fields |= made.materials(args.nu, kind_of(args.output), args.threads, progress)
     settle()
-    solver = {"solver": args.solver or "calculix"} if args.of == "beams" else {}
+    solver = {"solver": args.solver or "calculix"} if args.of == "beams" else {"oriented": True} if args.oriented else {}
     made.write(args.output, args.E, args.nu, args.hold or (), dict(args.load or ()), fields, **solver)
     figures = made.report().to_dict() | {"seconds": round(time.perf_counter() - start, 3)}
     if args.json:
@@ -201,8 +201,11 @@ def volume(args) -> None:
 def check_elements(args) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
     kind = kind_of(args.output)
-    if args.fields and kind not in ("vtu", "xdmf"):
-        raise WrongUsage(f"--fields is for .vtu and .xdmf, not {args.output}")
+    if args.fields and kind not in ("vtu", "xdmf") and (kind != "msh" or args.voxels is not None):
+        of = ".vtu and .xdmf" if args.voxels is not None else ".vtu, .xdmf and .msh"
+        raise WrongUsage(f"--fields is for {of}, not {args.output}")
+    if args.oriented and (args.of != "carrier" or kind != "inp"):
+        raise WrongUsage("--oriented is for --of carrier in an .inp; leave it out")
     check_steps(kind, args.hold or (), dict(args.load or ()))
     if args.hold and args.periodic:
         raise WrongUsage("a periodic mesh has steps of its own; leave out --hold and --load")

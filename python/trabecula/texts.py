@@ -158,7 +158,7 @@ def _finished(it: Report) -> str:
 
 def _tiling(it: Report) -> Iterator[str]:
     yield f"  method     {it.method}, " + (
-        "in each tetrahedron apart" if it.method == "explicit" else "on a grid over the part"
+        "in each tetrahedron apart" if it.method == "explicit" else f"on a grid over the part: {it.method_reason}"
     )
     yield f"  mesh       {it.count} tetrahedra, edges {figure(it.edge)} mm on average, {figure(it.volume)} mm³"
     for zone, z in (it.zones or {}).items():

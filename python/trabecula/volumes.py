@@ -41,6 +41,8 @@ OF = ("solid", "pore", "lower", "upper", "all")
 SHARP, FLAT = 12, 160
 #: Volume left out, as a share of the mesh, and distance from the surface, as a share of the edge, that are warned of.
 LEFT_OUT, FAR = 0.005, 0.3
+#: Numbers that a field of a .msh may have each.
+GMSH = (1, 3, 9)
 #: Bytes for each tetrahedron: the background, the cut mesh and its faces while they are sorted.
 TET_BYTES = 420
 #: Bytes for each voxel of the grid: its fraction, its piece, and nodes and faces of those that are elements.
@@ -63,6 +65,8 @@ class FiniteElements:
 
     #: What a set needs that is held or loaded.
     _of_sets = "faces on the boundary"
+    #: Formats with fields.
+    _with_fields: tuple[str, ...] = ("vtu", "xdmf")
     sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
 
@@ -120,9 +124,14 @@ class FiniteElements:
         if held or loads:
             self._check_loads()
             self._check_held(held, loads)
-        if fields and kind not in ("vtu", "xdmf"):
-            raise ValueError(f"fields are written to .vtu and .xdmf, not .{kind}")
+        if fields and kind not in self._with_fields:
+            *others, last = self._with_fields
+            raise ValueError(f"fields are written to .{', .'.join(others)} and .{last}, not .{kind}")
         further = {name: self._field(name, values) for name, values in (fields or {}).items()}
+        if kind == "msh":
+            for name, values in further.items():
+                if values[0].size not in GMSH:
+                    raise ValueError(f"{name} has {values[0].size} numbers each; fields of .msh have 1, 3 or 9: write .vtu")
         if kind == "xdmf":
             from .xdmf import write
 
@@ -162,7 +171,7 @@ class FiniteElements:
                 f"the field {name} has the shape {found.shape}; it must have a row for each of {counts[0]} nodes or "
                 f"{counts[1]} elements"
             )
-        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "domain", "fraction", "thickness"):
+        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "fraction", "thickness", "domain", *self._of_elements()):
             raise ValueError(f"a field cannot be named {name!r}; use another name")
         return found
 
@@ -172,6 +181,8 @@ class FiniteElements:
 
 class VolumeMesh(FiniteElements):
     """Tetrahedra that conform to a solid's surfaces, edges and corners. Made by ``Solid.volume_mesh``."""
+
+    _with_fields = ("vtu", "xdmf", "msh")
 
     def __init__(self, core: _core.VolumeMesh, design: str = ""):
         self._core = core
@@ -250,7 +261,7 @@ class VolumeMesh(FiniteElements):
         is: that of a periodic mesh, with equations, boundary conditions and six steps, and one with ``load``: resultants (N) of
         uniform tractions by the names of sets, {"X1": (0, 0, -100)}, while the nodes of the sets ``hold`` do not move.
 
-        ``fields`` are numbers by name, (n,) or (n, k) at nodes or in elements, for .vtu and .xdmf:
+        ``fields`` are numbers by name, (n,) or (n, k) at nodes or in elements, for .vtu, .xdmf and, with k of 1, 3 or 9, .msh:
         {"depth": solid.field(mesh.nodes)}.
         """
         kind = extension(path, VOLUME_WRITES)
@@ -259,7 +270,7 @@ class VolumeMesh(FiniteElements):
             if hold or load or fields:
                 raise ValueError("hold, load and fields are not for .foam; give them to the solver")
             return self._write_case(os.fsdecode(path))
-        self._write(path, kind, (E, nu), (hold, load), fields)
+        self._write(path, kind, (E, nu), (hold, load), fields, [])
 
     def _of_elements(self) -> dict[str, NDArray]:
         return {"domain": self.domain}
@@ -301,14 +312,15 @@ class Carrier(VolumeMesh):
     mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume``
     (mm³) is that of the tetrahedra. A skin, keep zones and a net are no part of it.
 
-    ``write`` is that of ``VolumeMesh``, with fractions in .msh, .vtu and .xdmf. In .inp and .bdf each domain has a material:
-    ``moduli(nu)`` times the ``E`` (MPa) of the solid. ``fields`` may have them in .vtu: ``carrier.moduli()``.
+    In .msh, .vtu and .xdmf each tetrahedron has its ``fraction`` and its ``orientation``, the nine numbers of ``axes``; ``fields`` may
+    have materials: ``carrier.moduli()``, {"C": carrier.stiffness().reshape(-1, 36)}.
     """
 
     def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
         super().__init__(core)
         self._solid = solid
         self._found: dict[tuple[float, int], list[list[float]]] = {}
+        self._constants: dict[tuple[float, int], list[list[float]]] = {}
 
     def __repr__(self) -> str:
         return super().__repr__().replace("VolumeMesh", "Carrier")
@@ -317,6 +329,58 @@ class Carrier(VolumeMesh):
     def fraction(self) -> NDArray[np.float64]:
         """The solid fraction of each tetrahedron."""
         return fixed(self._core.fraction)
+
+    @cached_property
+    def axes(self) -> NDArray[np.float64]:
+        """The axes of each tetrahedron (m, 3, 3), unit vectors, one row each: those of the body-centred cubic lattice whose tetrahedra
+        it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside the background
+        mesh, they are the same everywhere but for their order and signs.
+        """
+        return fixed(self._core.axes.reshape(-1, 3, 3))
+
+    def stiffness(
+        self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
+    ) -> NDArray[np.float64]:
+        """The stiffness of each tetrahedron (m, 6, 6) over Young's modulus of the solid, in world axes, Voigt's order
+        11 22 33 23 13 12: cubic along ``axes``, that of the cell in equal tetrahedra at the mean fraction of the domain. See ``moduli``
+        for what it does not show, and for ``nu`` and ``n``.
+        """
+        import numpy as np
+
+        c11, c12, c44 = np.array(self._cubic(poisson("nu", nu), whole("n", n, 8, 512), threads, progress))[self.domain].T
+        alike = np.zeros((2, 6, 6))
+        alike[0, :3, :3] = 1
+        alike[1] = np.diag([2.0, 2, 2, 1, 1, 1])
+        x, y, z = np.moveaxis(self.axes, -1, 0)
+        # The squares of an axis as a tensor, a ⊗ a.
+        squares = np.stack([x * x, y * y, z * z, y * z, x * z, x * y], axis=-1)
+        along = np.einsum("eai,eaj->eij", squares, squares)
+        cut = [c12, c44, c11 - c12 - 2 * c44]
+        return sum(c[:, None, None] * of for c, of in zip(cut, [*alike, along], strict=True))
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+        oriented: bool = False,
+    ) -> None:
+        """As ``VolumeMesh.write``. In .inp and .bdf each domain has a material: ``moduli(nu)`` times the ``E`` (MPa) of the solid.
+        With ``oriented`` it is cubic, along the ``axes`` of each element (*ORIENTATION by a *DISTRIBUTION), as ``stiffness(nu)``;
+        in .inp alone.
+        """
+        kind = extension(path, VOLUME_WRITES)
+        if not oriented:
+            return super().write(path, E, nu, hold, load, fields)
+        if kind != "inp":
+            raise ValueError(f"oriented materials are for .inp, not .{kind}; leave oriented out")
+        check_order(kind, self._figures.order)
+        of_solid = positive("E", E)
+        cubic = [[of_solid * c for c in of] for of in self._cubic(poisson("nu", nu), 32, None, None)]
+        self._write(path, kind, (E, nu), (hold, load), fields, cubic)
 
     def moduli(
         self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
@@ -335,14 +399,34 @@ class Carrier(VolumeMesh):
         found = np.array(self._moduli(poisson("nu", nu), whole("n", n, 8, 512), threads, progress))[self.domain]
         return {"young": found[:, 0], "poisson": found[:, 1]}
 
+    def materials(
+        self, nu: float, kind: str, threads: int | None = None, progress: Progress | None = None
+    ) -> dict[str, NDArray[np.float64]]:
+        """``moduli`` and ``stiffness`` as fields of a file: the latter as ``stiffness``, its 36 numbers row by row, or, in .msh, as
+        C11, C12 and C44 along the axes.
+        """
+        import numpy as np
+
+        found = self.moduli(nu, threads=threads, progress=progress)
+        if kind != "msh":
+            return found | {"stiffness": self.stiffness(nu).reshape(-1, 36)}
+        constants = np.array(self._cubic(nu, 32, threads, None))[self.domain]
+        return found | dict(zip(("C11", "C12", "C44"), constants.T, strict=True))
+
     def _moduli(self, nu: float, n: int, threads: int | None, progress: Progress | None) -> list[list[float]]:
         """Of each domain."""
         if (nu, n) not in self._found:
             self._found[nu, n] = _core.VolumeMesh.carrier_moduli(self._solid, nu, n, thread_count(threads), progress)
         return self._found[nu, n]
 
+    def _cubic(self, nu: float, n: int, threads: int | None, progress: Progress | None) -> list[list[float]]:
+        """C11, C12 and C44 of each domain, over Young's modulus of the solid."""
+        if (nu, n) not in self._constants:
+            self._constants[nu, n] = _core.VolumeMesh.carrier_stiffness(self._solid, nu, n, thread_count(threads), progress)
+        return self._constants[nu, n]
+
     def _of_elements(self) -> dict[str, NDArray]:
-        return super()._of_elements() | {"fraction": self.fraction}
+        return super()._of_elements() | {"fraction": self.fraction, "orientation": self.axes.reshape(-1, 9)}
 
     def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
         if kind not in ("inp", "bdf"):

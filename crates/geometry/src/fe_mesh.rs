@@ -33,6 +33,8 @@ pub struct FeMesh {
     pub domains: Vec<String>,
     /// The solid fraction of each tetrahedron where it is of a lattice; empty where tetrahedra are solid or pore.
     pub fraction: Vec<f64>,
+    /// The axes of each tetrahedron's material, one row each, where it has some; empty where it has none.
+    pub axes: Vec<Mat3>,
     /// Named sets.
     pub sets: Vec<FeSet>,
     /// Nodes on upper bounding planes of a periodic cell, each with its image on the lower ones.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use geometry::formats::{npy_head, stl, vti_frame};
-use geometry::progress::{Progress, Stopped};
+use geometry::progress::{Progress, Silent, Stopped};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -62,10 +62,11 @@ impl TileRanges {
     fn of(solid: Py<Solid>, py: Python<'_>, edge: f64, figures: bool) -> PyResult<TileRanges> {
         let work = move || {
             let built: &Built = solid.get().built();
-            built.on_grid()?;
-            trabecula::extract::TileRanges::new(&built.solid, edge)
+            built.on_grid().map_err(Stopped::Refused)?;
+            let solid = built.grid_solid(edge, &Silent)?;
+            trabecula::extract::TileRanges::new(&solid, edge).map_err(Stopped::Refused)
         };
-        Ok(TileRanges { tiles: Arc::new(run_apart(py, None, work)?.map_err(error::fault)?), figures })
+        Ok(TileRanges { tiles: Arc::new(run_apart(py, None, work)?.map_err(error::stopped)?), figures })
     }
 
     /// Number of tiles.

@@ -81,6 +81,27 @@ impl VolumeMesh {
         run(py, threads, progress, |p| solid.built().carrier_moduli(nu, n, p))?.map_err(error::stopped)
     }
 
+    /// C11, C12 and C44 of each domain of the carrier, over Young's modulus of the solid: its ratio, and voxels along cells.
+    #[staticmethod]
+    #[pyo3(signature = (solid, nu, n, threads=None, progress=None))]
+    fn carrier_stiffness(
+        py: Python<'_>,
+        solid: &Solid,
+        nu: f64,
+        n: usize,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<[f64; 3]>> {
+        run(py, threads, progress, |p| solid.built().carrier_stiffness(nu, n, p))?.map_err(error::stopped)
+    }
+
+    /// The axes of each tetrahedron of a carrier (m, 9), one after the other.
+    #[getter]
+    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = |m: &[[f64; 3]; 3]| core::array::from_fn::<f64, 9, _>(|i| m[i / 3][i % 3]);
+        table(py, self.mesh().axes.iter().map(each).collect())
+    }
+
     /// The solid fraction of each tetrahedron of a carrier; empty for others.
     #[getter]
     fn fraction<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -157,7 +178,8 @@ impl VolumeMesh {
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio, of all domains or of each, for formats
-    /// with materials; sets that are held, sets with the resultants (N) of their loads, and fields.
+    /// with materials; sets that are held, sets with the resultants (N) of their loads, and fields; C11, C12 and C44 (MPa) of each domain along
+    /// the axes of its elements, in place of isotropic materials.
     #[allow(clippy::too_many_arguments)] // The pieces of a file.
     fn write(
         &self,
@@ -167,13 +189,14 @@ impl VolumeMesh {
         held: Vec<String>,
         loads: Vec<(String, [f64; 3])>,
         fields: Vec<Field>,
+        cubic: Vec<[f64; 3]>,
     ) -> PyResult<()> {
         let (path, suffix, title) = file;
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
         let fields = fields.into_iter().map(field).collect();
-        let text = FeText { title, elastic, held, loads, fields, ..FeText::default() };
+        let text = FeText { title, elastic, cubic, held, loads, fields, ..FeText::default() };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

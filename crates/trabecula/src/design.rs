@@ -20,6 +20,7 @@ mod build_tiling;
 mod built_report;
 mod cell_zones;
 mod coarse_steps;
+mod compensated_grid;
 mod data;
 mod default_spacing;
 mod design_schema;
@@ -38,6 +39,7 @@ mod unit_cell;
 mod volume_error;
 mod warn;
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::io;
 use std::sync::{Arc, OnceLock};
@@ -73,6 +75,7 @@ pub use crate::region::{CadMesh, FaceLabel, Tessellation};
 pub use build_blend::Blended;
 pub use build_tets::{TetReport, Tets};
 pub use cell_zones::CellZone;
+use compensated_grid::CompensatedGrid;
 pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
@@ -154,6 +157,10 @@ pub struct Tiled {
     pub alone: bool,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
+    /// Why it is made on a grid, where it is.
+    pub on_grid: Option<String>,
+    /// The solid fraction that the surface of the part is to have on a grid, where that is known.
+    aim: Option<f64>,
     /// How it ends at the part's surface.
     pub ends: Ends,
     /// The least and the greatest radius of the net's rods, or of rounded ends, mm.
@@ -202,6 +209,8 @@ pub struct Built {
     pub repairs: Vec<(String, Repaired)>,
     /// Computed at first use.
     figures: OnceLock<DesignReport>,
+    /// By how much levels are moved on grids.
+    moves: compensated_grid::Moves,
 }
 
 impl Design {
@@ -367,8 +376,17 @@ impl Built {
     pub fn surface(&self) -> Box<dyn SurfaceMaker + '_> {
         match &self.tilings[..] {
             [only] if only.explicit && self.blend.is_none() => Box::new(TilingSurface(&only.tiling)),
+            _ if compensated_grid::aimed(self).is_some() => Box::new(CompensatedGrid(self)),
             _ => Box::new(GridSurface(&self.solid)),
         }
+    }
+
+    /// The solid whose surface on a grid in steps of `edge` (mm) is that of `surface`.
+    ///
+    /// # Errors
+    /// A spacing at which there is no grid; an interruption.
+    pub fn grid_solid(&self, edge: f64, progress: &dyn Progress) -> Result<Cow<'_, Solid>, Stopped> {
+        compensated_grid::compensated(self, edge, progress)
     }
 
     /// Whether `surface` meshes it on a grid, so that it can be made range by range of the grid's tiles.
@@ -458,6 +476,14 @@ impl Built {
     /// As `carrier`; a cell that carries no load at the fraction of a domain; a solid that is none; an interruption.
     pub fn carrier_moduli(&self, nu: f64, n: usize, progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
         build_carrier::moduli(self, (nu, n), progress)
+    }
+
+    /// C11, C12 and C44 of each domain of the carrier, over Young's modulus of the solid, along the axes of its elements.
+    ///
+    /// # Errors
+    /// As `carrier_moduli`.
+    pub fn carrier_stiffness(&self, nu: f64, n: usize, progress: &dyn Progress) -> Result<Vec<[f64; 3]>, Stopped> {
+        build_carrier::cubic(self, (nu, n), progress)
     }
 
     /// The shells of its mid-surface, with the design's own sets.

@@ -31,6 +31,8 @@ pub struct FeText {
     pub title: String,
     /// Young's modulus (MPa) and Poisson's ratio: of all domains; of a mesh with solid fractions, of each.
     pub elastic: Vec<[f64; 2]>,
+    /// In place of these C11, C12 and C44 (MPa) of each domain, along the axes of its elements; empty where materials are isotropic.
+    pub cubic: Vec<[f64; 3]>,
     /// Names of sets whose nodes are held in all directions.
     pub held: Vec<String>,
     /// Names of sets and the resultant (N) of a uniform traction on their faces.

@@ -1,7 +1,7 @@
 //! Data to solid: values are checked, lattices and regions are combined, and likely mistakes are warned of.
 
 use std::cell::RefCell;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::build_cell::cell;
 use super::data::*;
@@ -112,7 +112,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let keeps = d.keep.0.keys().map(|name| format!("KEEP_{name}"));
     let bodies = skins.chain(keeps).chain(nets.iter().map(|_| "NET".to_string())).chain(core_names).collect();
     let solid = filled.into_iter().chain(nets).chain(cores).fold(solid, Solid::with);
-    let figures = OnceLock::new();
+    let (figures, moves) = Default::default();
     let Notes { warnings: of_regions, repairs } = notes.into_inner();
     // A region may be made more than once.
     let mut all: Vec<Warning> = Vec::new();
@@ -122,7 +122,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         }
     }
     let warnings = all;
-    Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures })
+    Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures, moves })
 }
 
 /// Refuses a region that is empty, unbounded or too far away.
@@ -173,7 +173,7 @@ fn tiled(
     warnings: &mut Vec<Warning>,
 ) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
     let opening = domain.opening();
-    let build_tiling::Made { done, alone, explicit, zones, joins } =
+    let build_tiling::Made { done, alone, on_grid, aim, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
     let Finished { tiling, placed, field, net, radii, fraction: finished } = done;
     let coverage = net.as_ref().map(|rods| Coverage::new(&tiling, rods));
@@ -182,10 +182,25 @@ fn tiled(
     }
     let (name, ends) = (domain.name.to_string(), domain.ends());
     let mesh = domain.report;
-    Ok((
-        Tiled { name, tiling, placed, zones, mesh, alone, explicit, joins, ends, radii, coverage, finished, field },
-        net.map(|rods| rods.solid),
-    ))
+    let explicit = on_grid.is_none();
+    let tiled = Tiled {
+        name,
+        tiling,
+        placed,
+        zones,
+        mesh,
+        alone,
+        explicit,
+        on_grid,
+        aim,
+        joins,
+        ends,
+        radii,
+        coverage,
+        finished,
+        field,
+    };
+    Ok((tiled, net.map(|rods| rods.solid)))
 }
 
 /// A lattice, with warnings of likely mistakes.

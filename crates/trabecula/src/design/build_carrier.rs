@@ -1,7 +1,8 @@
-//! The carrier of a lattice over tetrahedra as finite elements, and what these are as a material: isotropic, by the solid fraction of the cell.
+//! The carrier of a lattice over tetrahedra as finite elements, and what these are as a material, by the solid fraction of the cell.
 //!
-//! The stiffness of a cell in equal tetrahedra is cubic. Those of a mesh lie in many directions, so its mean over all directions is taken:
-//! Hill's, between the bounds of Voigt and Reuss (Hill, Proc. Phys. Soc. A 65 (1952) 349).
+//! The stiffness of a cell in equal tetrahedra is cubic, along the axes of the body-centred cubic lattice that these are of. Where tetrahedra
+//! lie in many directions its mean over all of them may be taken: Hill's, between the bounds of Voigt and Reuss (Hill, Proc. Phys. Soc. A 65
+//! (1952) 349).
 
 use super::tiled_cell::TiledCell;
 use super::{Built, Tiled, unit_cell};
@@ -46,7 +47,12 @@ fn only(built: &Built) -> Result<&Tiled, Fault> {
 }
 
 /// Young's modulus, over that of the solid, and Poisson's ratio of each domain, at the mean fraction of its tetrahedra.
-pub(super) fn moduli(built: &Built, (nu, n): (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
+pub(super) fn moduli(built: &Built, of: (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
+    Ok(cubic(built, of, progress)?.into_iter().map(isotropic).collect())
+}
+
+/// C11, C12 and C44 of each domain, over Young's modulus of the solid, at the mean fraction of its tetrahedra.
+pub(super) fn cubic(built: &Built, (nu, n): (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 3]>, Stopped> {
     let tiled = only(built).map_err(Stopped::Refused)?;
     let (made, zone_of) = carrier(built, 1).map_err(Stopped::Refused)?;
     let solid = Material::isotropic(1.0, nu).map_err(Stopped::Refused)?;
@@ -60,7 +66,7 @@ pub(super) fn moduli(built: &Built, (nu, n): (f64, usize), progress: &dyn Progre
         let message = format!("nothing is solid in the tetrahedra of {}, which carry no load", made.mesh.domains[d]);
         return Err(Stopped::Refused(Fault::new(format!("lattice.{}.level", tiled.name), message)));
     }
-    let mut out = vec![[1.0, nu]; means.len()];
+    let mut out = vec![constants(&solid.stiffness); means.len()];
     let zones = zone_of.last().map_or(0, |z| z + 1);
     for zone in 0..zones {
         let own: Vec<usize> = (0..means.len()).filter(|d| zone_of[*d] == zone && means[*d] < SOLID).collect();
@@ -69,21 +75,20 @@ pub(super) fn moduli(built: &Built, (nu, n): (f64, usize), progress: &dyn Progre
         }
         let cell = cell_of(tiled, zone)?;
         let nodes = nodes(&own.iter().map(|d| means[*d]).collect::<Vec<f64>>());
-        let (mut young, mut poisson) = (Vec::new(), Vec::new());
+        let mut found: [Vec<[f64; 2]>; 3] = Default::default();
         for (i, fraction) in nodes.iter().enumerate() {
             let done = |k: usize| (zone as f64 + k as f64 / nodes.len() as f64) / zones as f64;
             let stage = Stage { whole: progress, from: done(i), to: done(i + 1) };
             let tetrahedra = TiledCell::new(&cell, tiled.tiling.part, *fraction, 1.0, tiled.tiling.map.overlap());
             let path = format!("lattice.{}", tiled.name);
             let unit = unit_cell::of_tiling(path, tetrahedra.map_err(Stopped::Refused)?);
-            let found = unit.stiffness(&solid, Resolution { n, plain: false }, &stage)?;
-            let [e, own] = isotropic(&found.C);
-            young.push([fraction.ln(), e.ln()]);
-            poisson.push([fraction.ln(), own]);
+            let stiffness = unit.stiffness(&solid, Resolution { n, plain: false }, &stage)?;
+            let eigenvalues = eigenvalues(constants(&stiffness.C));
+            found.iter_mut().zip(eigenvalues).for_each(|(f, v)| f.push([fraction.ln(), v.ln()]));
         }
         for d in own {
-            let at = means[d].ln();
-            out[d] = [monotone(&young, at).exp(), monotone(&poisson, at)];
+            let [bulk, slant, shear] = [0, 1, 2].map(|k| monotone(&found[k], means[d].ln()).exp());
+            out[d] = [(bulk + 2.0 * slant) / 3.0, (bulk - slant) / 3.0, shear];
         }
     }
     Ok(out)
@@ -105,12 +110,22 @@ fn nodes(fractions: &[f64]) -> Vec<f64> {
     (0..NODES).map(|i| (first + (last - first) * i as f64 / (NODES - 1) as f64).exp()).collect()
 }
 
-/// Young's modulus and Poisson's ratio of Hill's mean over all directions of a cubic stiffness.
-fn isotropic(c: &Voigt) -> [f64; 2] {
+/// C11, C12 and C44 of a cubic stiffness.
+fn constants(c: &Voigt) -> [f64; 3] {
     let mean = |pairs: [[usize; 2]; 3]| pairs.iter().map(|[i, j]| c[*i][*j]).sum::<f64>() / 3.0;
-    let (c11, c12) = (mean([[0, 0], [1, 1], [2, 2]]), mean([[0, 1], [1, 2], [0, 2]]));
-    let (c44, slant) = (mean([[3, 3], [4, 4], [5, 5]]), c11 - c12);
-    let bulk = (c11 + 2.0 * c12) / 3.0;
+    [mean([[0, 0], [1, 1], [2, 2]]), mean([[0, 1], [1, 2], [0, 2]]), mean([[3, 3], [4, 4], [5, 5]])]
+}
+
+/// What the three kinds of strain of a cubic stiffness are multiplied by: dilatation, C11 + 2 C12; stretches along the axes, C11 − C12; shears
+/// between these, C44. All are positive, as C12 may not be.
+fn eigenvalues([c11, c12, c44]: [f64; 3]) -> [f64; 3] {
+    [c11 + 2.0 * c12, c11 - c12, c44]
+}
+
+/// Young's modulus and Poisson's ratio of Hill's mean over all directions of a cubic stiffness.
+fn isotropic(of: [f64; 3]) -> [f64; 2] {
+    let [bulk, slant, c44] = eigenvalues(of);
+    let bulk = bulk / 3.0;
     let shear = 0.5 * ((slant + 3.0 * c44) / 5.0 + 5.0 * slant * c44 / (4.0 * c44 + 3.0 * slant));
     [9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))]
 }

@@ -23,6 +23,7 @@ use crate::map::{Ends, Tets};
 use crate::region::{Intersection, MeshRegion, Notes, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
 use geometry::fault::{Fault, position};
+use geometry::math::Vec3;
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
@@ -245,8 +246,10 @@ pub(super) struct Made {
     pub done: Finished,
     /// Whether nothing else is in the part: no skin, no kept zone.
     pub alone: bool,
-    /// Whether its surface is made without a grid.
-    pub explicit: bool,
+    /// Why its surface is made on a grid, if it is.
+    pub on_grid: Option<String>,
+    /// The solid fraction of the finished part, where it is to have one or is known to.
+    pub aim: Option<f64>,
     /// The zones, if they have cells of their own.
     pub zones: Vec<CellZone>,
     /// Which zones join, if there are any and it can be predicted.
@@ -354,17 +357,48 @@ fn made(
         sums.0 / sums.1
     });
     let alone = environment.filled.is_empty() && domain.fit != MeshFit::Cut && !finish.changes();
-    let explicit = alone && domain.joined.method == Method::Explicit && domain.fit == MeshFit::Whole;
+    let on_grid = on_grid(domain, environment, finish.changes());
     let done = match asked {
         // Blended functions are evaluated by position on both roads.
-        _ if explicit && bent && map.overlap() <= 0.0 => {
+        _ if on_grid.is_none() && bent && map.overlap() <= 0.0 => {
             let volume = domain.report.region_volume.unwrap_or_else(|| map.boundary().volume());
             finish.bent(tiling, asked, volume)?
         }
         None if bent || finish.changes() => finish.at_own_level(tiling)?,
         _ => finish.made(tiling, asked, whole)?,
     };
-    Ok(Made { done, alone, explicit, zones: Vec::new(), joins: None })
+    // Skins and keep zones are counted in a fraction of the whole part alone.
+    let aim = asked.or(done.fraction).filter(|_| environment.filled.is_empty() || asked.is_some() && whole);
+    Ok(Made { done, alone, on_grid, aim, zones: Vec::new(), joins: None })
+}
+
+/// Why the surface of a lattice is made on a grid, with the place if there is one; `None` where each tetrahedron has its own.
+fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<String> {
+    let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
+    if domain.joined.method == Method::Implicit {
+        return Some("method = \"implicit\"".into());
+    }
+    if ends {
+        return Some(format!("surface = \"{}\"", domain.joined.surface.word()));
+    }
+    if !environment.filled.is_empty() {
+        return Some("a skin or keep zones".into());
+    }
+    match domain.fit {
+        MeshFit::Whole => None,
+        MeshFit::Cut => Some("the region cuts the tetrahedra of the file".into()),
+        MeshFit::Nearly => Some(match (domain.report.lost().first(), domain.map.farthest_off()) {
+            (Some(lost), _) => {
+                let size = rounded(lost.size, 3);
+                format!("the tetrahedra do not follow a {} of {size} mm at {}", lost.kind.word(), at(lost.at))
+            }
+            (None, Some((off, place))) => {
+                let off = rounded(off * domain.map.mean_edge(), 3);
+                format!("the surface is finer than the tetrahedra: bent onto it they are {off} mm off at {}", at(place))
+            }
+            (None, None) => "the tetrahedra are not bent onto the region".into(),
+        }),
+    }
 }
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its

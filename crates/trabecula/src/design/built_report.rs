@@ -236,6 +236,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
     let (_, volume, solid) = sums(None);
     let mesh = TilingReport {
         method: if it.explicit && built.blend.is_none() { "explicit" } else { "implicit" },
+        method_reason: it.on_grid.clone().or(built.blend.as_ref().map(|_| "a blend".into())),
         count: tiling.map.len(),
         mesh: TetMeshReport { fit: None, ..(&it.mesh).into() },
         edge: tiling.map.mean_edge(),

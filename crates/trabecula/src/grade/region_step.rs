@@ -1,6 +1,6 @@
 //! A smooth step across the surface of a region.
 
-use super::{BuildGrade, Depth, Grade, Quantity, Sigmoid};
+use super::{BuildGrade, Depth, Grade, Quantity, Remapped, Sigmoid, Stops};
 use crate::kind::{DesignError, Kind};
 use crate::region::{Region, RegionKind};
 use geometry::fault::{Fault, number};
@@ -14,12 +14,17 @@ pub struct WithinKind {
     /// Width of the step, half of it on either side of the surface.
     #[kind(unit = "mm", above = 0.0)]
     width: f64,
+    /// The values that the numbers map to: pairs [number, value], number rising, linear between: [[0, outside], [1, inside]].
+    remap: Option<Stops>,
 }
 
 impl BuildGrade for WithinKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let region = of.environment.region(&self.of, &format!("{}.of", of.path))?;
-        of.function(region_step(region, self.width))
+        let step = region_step(region, self.width);
+        let Some(stops) = &self.remap else { return of.function(step) };
+        let step = step.map_err(|f| DesignError::fault(&of.path, f))?;
+        of.checked(Remapped::new(step, of.stops(stops.clone())))
     }
 }
 

@@ -54,6 +54,8 @@ pub(crate) struct Curves {
     bent: Vec<Bent>,
     /// Greatest distance of the bent boundary from the region's surface at middles of faces and quarters of edges, in edges.
     pub off: f64,
+    /// Where it is so far off.
+    pub off_at: Vec3,
     /// The share of these places that are farther off than `FIT`.
     misfit: f64,
 }
@@ -206,11 +208,16 @@ impl Curves {
             index: vec![NONE; map.len()],
             bent: Vec::new(),
             off: 0.0,
+            off_at: [0.0; 3],
             misfit: 0.0,
         };
         out.bend(map, &mut moved);
-        let off = out.distances(map, &moved);
-        out.off = off.iter().copied().fold(0.0, f64::max);
+        let (points, off) = out.distances(map, &moved);
+        for (p, off) in points.into_iter().zip(&off).filter(|(_, off)| off.is_finite()) {
+            if *off > out.off {
+                (out.off, out.off_at) = (*off, p);
+            }
+        }
         out.misfit = off.iter().filter(|v| **v > FIT).count() as f64 / off.len().max(1) as f64;
         out
     }
@@ -251,8 +258,8 @@ impl Curves {
         }
     }
 
-    /// The distances of the bent boundary from the surface, in edges: at the middles of faces and the quarters of edges.
-    fn distances(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> Vec<f64> {
+    /// Places on the bent boundary, at the middles of faces and the quarters of edges, and their distances from the surface, in edges.
+    fn distances(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> (Vec<Vec3>, Vec<f64>) {
         let at = |n: u32| map.nodes()[n as usize];
         let bend = |a: u32, b: u32| moved.get(&[a.min(b), a.max(b)]).copied().unwrap_or_default();
         let boundary = map.boundary_nodes();
@@ -273,7 +280,8 @@ impl Curves {
         }
         let mut off = vec![0.0; points.len()];
         self.region.values(&points, &mut off);
-        off.iter().zip(lengths).map(|(v, l)| v.abs() / l).collect()
+        let off = off.iter().zip(lengths).map(|(v, l)| v.abs() / l).collect();
+        (points, off)
     }
 
     /// Whether the bent boundary is the region's surface within a small share of its edges, in all but few places.

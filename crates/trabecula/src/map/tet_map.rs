@@ -159,6 +159,11 @@ impl Tets {
         self.curves.as_ref().map(|c| c.off)
     }
 
+    /// The place where that distance is greatest, with it.
+    pub fn farthest_off(&self) -> Option<(f64, Vec3)> {
+        self.curves.as_ref().map(|c| (c.off, c.off_at))
+    }
+
     /// Whether its bent boundary is the surface of a region within a tenth of its edges, in all but few places.
     pub fn fits(&self) -> bool {
         self.curves.as_ref().is_some_and(Curves::fits)

@@ -226,6 +226,8 @@ impl From<&Fit> for FitReport {
 pub struct TilingReport {
     /// How its surface is made: explicit, in each tetrahedron apart, or implicit, on a grid over the part.
     pub method: &'static str,
+    /// Why it is made on a grid, with the place if it is for one; None where it is not.
+    pub method_reason: Option<String>,
     /// Number of tetrahedra.
     pub count: usize,
     /// The mesh.

@@ -9,9 +9,12 @@ use crate::region::Region;
 use crate::tiling::Tiling;
 use geometry::fault::Fault;
 use geometry::fe_mesh::{FeMesh, fraction_classes};
-use geometry::math::{Aabb, norm};
+use geometry::math::{Aabb, Mat3, Vec3, add, determinant, dot, inverse, norm, scale, sub, transpose};
 use geometry::tetmesh::EDGES;
 use std::collections::HashMap;
+
+/// Iterations of a polar decomposition: quadratic once near, each before that at least halves what is off.
+const ROUNDS: usize = 24;
 
 /// What is known of the zones and the region of a carrier.
 pub struct Carried<'a> {
@@ -50,6 +53,7 @@ pub fn carrier(tiling: &Tiling, of: &Carried) -> Result<(FeMesh, Vec<usize>), Fa
         }
     }
     mesh.fraction = from.iter().map(|t| shares[*t]).collect();
+    mesh.axes = from.iter().map(|t| axes(map.corners(*t))).collect();
     // Nodes of the map are ascending; here they are positive.
     let order = |t: usize| if map.flipped(t) { [0, 1, 3, 2] } else { [0, 1, 2, 3] };
     mesh.tets = from.iter().map(|t| order(*t).map(|c| map.tet(*t)[c])).collect();
@@ -84,6 +88,29 @@ pub fn carrier(tiling: &Tiling, of: &Carried) -> Result<(FeMesh, Vec<usize>), Fa
         }
     }
     add_regions(&mut mesh, &faces, of.sets).map_or(Ok((mesh, zone_of)), Err)
+}
+
+/// The axes, one row each, of the body-centred cubic lattice whose tetrahedra a tetrahedron is most like: those along its two longest
+/// opposite edges and along the line between their middles, made orthogonal by the nearest rotation (polar decomposition).
+fn axes(corners: [Vec3; 4]) -> Mat3 {
+    let edge = |[i, j]: [usize; 2]| sub(corners[j], corners[i]);
+    let length = |pair: &[[usize; 2]; 2]| pair.iter().map(|e| dot(edge(*e), edge(*e))).sum::<f64>();
+    let pairs = [[[0, 1], [2, 3]], [[0, 2], [1, 3]], [[0, 3], [1, 2]]];
+    let [first, second] = pairs.into_iter().fold(pairs[0], |m, p| if length(&p) > length(&m) { p } else { m });
+    let twice = |[i, j]: [usize; 2]| add(corners[i], corners[j]);
+    // In a tetrahedron of that lattice these are as long as the cube's edge, and orthogonal.
+    let mut rows = [edge(first), sub(twice(second), twice(first)), edge(second)];
+    if determinant(&rows) < 0.0 {
+        rows[2] = scale(rows[2], -1.0);
+    }
+    let size = determinant(&rows).cbrt();
+    rows = rows.map(|r| scale(r, 1.0 / size));
+    // Newton's iteration: the mean of a matrix and its inverse transposed tends to the rotation.
+    for _ in 0..ROUNDS {
+        let other = transpose(&inverse(&rows));
+        rows = core::array::from_fn(|k| scale(add(rows[k], other[k]), 0.5));
+    }
+    rows
 }
 
 /// The tetrahedra of each zone, with what their domains' names begin with.

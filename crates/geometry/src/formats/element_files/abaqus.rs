@@ -99,6 +99,9 @@ pub(super) fn decimal(text: &mut String, x: f64) {
 
 /// The materials of the domains: one of all, or where they are classes of the solid fraction one of each.
 fn materials(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    if let (false, [_, ..]) = (mesh.axes.is_empty(), &text.cubic[..]) {
+        return oriented(mesh, text, out);
+    }
     let own = !mesh.fraction.is_empty();
     for (d, name) in mesh.domains.iter().enumerate() {
         let material = if own { name } else { "SOLID" };
@@ -107,6 +110,29 @@ fn materials(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()
             writeln!(out, "*MATERIAL, NAME={material}\n*ELASTIC\n{e:?}, {nu:?}")?;
         }
         writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL={material}")?;
+    }
+    Ok(())
+}
+
+/// Cubic materials of the domains along the axes of each element. CalculiX takes the distribution without the table that Abaqus wants
+/// before it, of which it says that it cannot be interpreted.
+fn oriented(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "*DISTRIBUTION TABLE, NAME=TWO_AXES\nCOORD3D, COORD3D")?;
+    writeln!(out, "*DISTRIBUTION, NAME=AXES, LOCATION=ELEMENT, TABLE=TWO_AXES\n, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0")?;
+    lines(out, mesh.axes.len(), |i, text| {
+        push(text, i + 1);
+        for x in mesh.axes[i][..2].iter().flatten() {
+            text.push_str(", ");
+            decimal(text, *x);
+        }
+        text.push('\n');
+    })?;
+    writeln!(out, "*ORIENTATION, NAME=CELL, SYSTEM=RECTANGULAR\nAXES")?;
+    for (name, [c11, c12, c44]) in mesh.domains.iter().zip(&text.cubic) {
+        // D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, and D2323 on a line of its own.
+        writeln!(out, "*MATERIAL, NAME={name}\n*ELASTIC, TYPE=ORTHO")?;
+        writeln!(out, "{c11:?}, {c12:?}, {c11:?}, {c12:?}, {c12:?}, {c11:?}, {c44:?}, {c44:?},\n{c44:?}")?;
+        writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL={name}, ORIENTATION=CELL")?;
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::gmsh_entities::{Surface, surfaces, write_periodic};
-use super::{FeText, lines, push};
+use super::{FeField, FeText, lines, push};
 use crate::fe_mesh::FeMesh;
 use crate::math::Aabb;
 use crate::tetmesh::EDGES;
@@ -16,7 +16,7 @@ use crate::tetmesh::EDGES;
 /// The order of the edges' nodes, by indices of `EDGES`: the last two are swapped.
 pub(super) const MIDDLES: [usize; 6] = [0, 3, 1, 2, 5, 4];
 
-pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     debug_assert_eq!(EDGES[5], [2, 3]);
     let domains = mesh.domains.len();
     let mut of_faces: BTreeMap<(u32, u8), Vec<usize>> = BTreeMap::new();
@@ -62,7 +62,17 @@ pub(super) fn write(mesh: &FeMesh, _: &FeText, out: &mut dyn Write) -> io::Resul
     })?;
     elements(mesh, &surfaces, &volumes, out)?;
     write_periodic(mesh, &surfaces, "16", out)?;
-    if mesh.fraction.is_empty() { Ok(()) } else { fractions(mesh, &surfaces, &volumes, out) }
+    let order = order(mesh, &surfaces, &volumes);
+    if !mesh.fraction.is_empty() {
+        of_elements("fraction", (1, &mesh.fraction), &order, out)?;
+    }
+    if !mesh.axes.is_empty() {
+        let axes: Vec<f64> = mesh.axes.iter().flatten().flatten().copied().collect();
+        of_elements("orientation", (9, &axes), &order, out)?;
+    }
+    let mut own = text.fields.iter().filter(|f| !f.at_nodes);
+    own.try_for_each(|f| of_elements(&f.name, (f.components, &f.values), &order, out))?;
+    text.fields.iter().filter(|f| f.at_nodes).try_for_each(|f| at_nodes(f, out))
 }
 
 /// Groups, and the tetrahedra that have them all: the domain's number, and after those of domains those of sets.
@@ -110,17 +120,45 @@ fn elements(mesh: &FeMesh, surfaces: &[Surface], volumes: &[Volume], out: &mut d
     writeln!(out, "$EndElements")
 }
 
-/// The solid fraction of each element, in the order of the elements, by which some readers go. Some take no data of a part of the elements:
-/// faces have the fraction of their tetrahedron.
-fn fractions(mesh: &FeMesh, surfaces: &[Surface], volumes: &[Volume], out: &mut dyn Write) -> io::Result<()> {
+/// Numbers and tetrahedra of the elements, in their order, by which some readers go. Some take no data of a part of the elements: faces have
+/// those of their tetrahedron.
+fn order(mesh: &FeMesh, surfaces: &[Surface], volumes: &[Volume]) -> Vec<(usize, u32)> {
     let faces = surfaces.iter().flat_map(|s| &s.faces).map(|f| f.0);
     let faces = (mesh.tets.len()..).zip(faces);
     let tets = volumes.iter().flat_map(|v| &v.1).map(|t| (*t as usize, *t));
-    let all: Vec<(usize, u32)> = faces.chain(tets).collect();
-    writeln!(out, "$ElementData\n1\n\"fraction\"\n1\n0.0\n3\n0\n1\n{}", all.len())?;
-    lines(out, all.len(), |i, text| {
-        let (number, tet) = all[i];
-        let _ = writeln!(text, "{} {:?}", number + 1, mesh.fraction[tet as usize]);
+    faces.chain(tets).collect()
+}
+
+/// The head of data: a name, the time, the step, components and their number.
+fn head(kind: &str, name: &str, components: usize, count: usize, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "${kind}\n1\n\"{name}\"\n1\n0.0\n3\n0\n{components}\n{count}")
+}
+
+fn row(text: &mut String, number: usize, values: &[f64]) {
+    push(text, number);
+    values.iter().for_each(|v| _ = write!(text, " {v:?}"));
+    text.push('\n');
+}
+
+/// Numbers of each tetrahedron.
+fn of_elements(
+    name: &str,
+    (components, values): (usize, &[f64]),
+    order: &[(usize, u32)],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    head("ElementData", name, components, order.len(), out)?;
+    lines(out, order.len(), |i, text| {
+        let (number, tet) = order[i];
+        row(text, number + 1, &values[tet as usize * components..][..components]);
     })?;
     writeln!(out, "$EndElementData")
+}
+
+/// Numbers at nodes.
+fn at_nodes(field: &FeField, out: &mut dyn Write) -> io::Result<()> {
+    let rows: Vec<&[f64]> = field.values.chunks(field.components).collect();
+    head("NodeData", &field.name, field.components, rows.len(), out)?;
+    lines(out, rows.len(), |i, text| row(text, i + 1, rows[i]))?;
+    writeln!(out, "$EndNodeData")
 }

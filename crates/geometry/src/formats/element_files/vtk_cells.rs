@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::FeText;
+use super::{FeField, FeText};
 use crate::fe_mesh::{FeMesh, MIDDLES};
 use crate::formats::vtu::{Array, Cells};
 
@@ -12,6 +12,11 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
     if !mesh.fraction.is_empty() {
         data.push(("fraction", Array::Numbers(&mesh.fraction)));
     }
+    let mut fields = text.fields.clone();
+    if !mesh.axes.is_empty() {
+        let values = mesh.axes.iter().flatten().flatten().copied().collect();
+        fields.insert(0, FeField { name: "orientation".into(), components: 9, at_nodes: false, values });
+    }
     let cells = Cells {
         note: &format!("domains, from 0: {}", mesh.domains.join(", ")),
         nodes: &mesh.nodes,
@@ -20,7 +25,7 @@ pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Re
         width,
         count: mesh.tets.len(),
         data: &data,
-        fields: &text.fields,
+        fields: &fields,
     };
     let corners = |i: usize| mesh.tets[i].into_iter();
     let middles = |i: usize| mesh.middles.get(i).into_iter().flat_map(|m| MIDDLES.map(|k| m[k]));

@@ -1,0 +1,146 @@
+//! Surfaces on a grid of lattices over tetrahedra, at a level by which they enclose what the finished part has.
+//!
+//! Creases at the faces of tetrahedra, and the lattice's ends at the part's surface, fall within cells of the grid, where chords cost volume of
+//! second order in the step: about one per cent at twelve steps along the wavelength. What the part is to enclose is known, so the
+//! surface is measured first, and its level is moved by what is missing: by about the distance of the chords, of second order too.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use super::{Built, Tiled};
+use crate::extract::{GridSurface, region_volume};
+use crate::map::Ends;
+use crate::solid::Solid;
+use crate::surface_maker::{Estimate, Islands, Measured, Options, Pieces, Resolved, Store, Summary, SurfaceMaker};
+use crate::tiling::Rounded;
+use geometry::fault::Fault;
+use geometry::progress::{Progress, Stage, Stopped};
+
+/// Steps along the wavelength of the finest grid that is measured: at finer ones the move falls with the square of the step.
+const STEPS: f64 = 24.0;
+/// The share of the solid's volume that is near enough, and that up to which the first move needs no second: how fast the volume grows with
+/// the level is known within a tenth.
+const NEAR: f64 = 2e-4;
+const SURE: f64 = 4e-3;
+/// The most moves, and the farthest that the level is moved: a share of the range of the cell's function.
+const ROUNDS: usize = 3;
+const FARTHEST: f64 = 0.1;
+/// The change of level, as a share of that range, from which its rate is taken.
+const NUDGE: f64 = 0.005;
+/// The share of the work that measuring takes.
+const MEASURED: f64 = 0.5;
+
+/// Moves of the level that were found, by the bits of the step.
+pub(super) type Moves = Mutex<HashMap<u64, f64>>;
+
+/// The surface of a lattice over tetrahedra on a grid.
+pub(super) struct CompensatedGrid<'a>(pub &'a Built);
+
+/// The lattice of a design whose surface is one, and the solid fraction that the part is to have.
+pub(super) fn aimed(built: &Built) -> Option<(&Tiled, f64)> {
+    match &built.tilings[..] {
+        [only] if !only.explicit && built.blend.is_none() => only.aim.map(|aim| (only, aim)),
+        _ => None,
+    }
+}
+
+/// The solid to be meshed in steps of `edge` (mm).
+pub(super) fn compensated<'a>(built: &'a Built, edge: f64, progress: &dyn Progress) -> Result<Cow<'a, Solid>, Stopped> {
+    let Some((tiled, aim)) = aimed(built) else { return Ok(Cow::Borrowed(&built.solid)) };
+    let step = edge.max(tiled.tiling.wavelength() / STEPS);
+    let known = built.moves.lock().ok().and_then(|moves| moves.get(&step.to_bits()).copied());
+    let by = match known {
+        Some(by) => by,
+        None => {
+            let by = found(built, (tiled, aim), step, progress)?;
+            if let Ok(mut moves) = built.moves.lock() {
+                moves.insert(step.to_bits(), by);
+            }
+            by
+        }
+    };
+    Ok(if by == 0.0 { Cow::Borrowed(&built.solid) } else { Cow::Owned(at(built, tiled, by * (edge / step).powi(2))) })
+}
+
+/// The design's solid with the level of its lattice moved.
+fn at(built: &Built, tiled: &Tiled, by: f64) -> Solid {
+    let moved = tiled.placed.as_ref().clone().moved(by);
+    let field: Arc<dyn crate::implicit::Implicit> = match tiled.ends {
+        Ends::Rounded => Arc::new(Rounded::new(&Arc::new(moved), &built.solid.region)),
+        _ => Arc::new(moved.eased()),
+    };
+    Solid { field: Some(field), ..built.solid.clone() }
+}
+
+/// By how much the level is to be moved in steps of this length (mm); not at all where nothing can be measured.
+fn found(built: &Built, (tiled, aim): (&Tiled, f64), step: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
+    let share = |k: usize| k as f64 / (ROUNDS + 1) as f64;
+    let stage = |k: usize| Stage { whole: progress, from: share(k), to: share(k + 1) };
+    let all = region_volume(&built.solid.region, 0.0, &stage(0))?;
+    let range = tiled.tiling.cells[0].cell.range();
+    let width = (range.hi - range.lo) / tiled.tiling.cells[0].scale;
+    let share_at = |by: f64| {
+        let (flat, solid) = tiled.placed.as_ref().clone().moved(by).volumes();
+        solid / flat
+    };
+    let nudge = NUDGE * width;
+    let mut rate = all * (share_at(nudge) - share_at(-nudge)) / (2.0 * nudge);
+    let (mut by, mut last): (f64, Option<[f64; 2]>) = (0.0, None);
+    let mut best = (f64::INFINITY, 0.0);
+    for round in 0..ROUNDS {
+        let solid = at(built, tiled, by);
+        let options = Options { resolution: step, islands: Islands::Keep };
+        let made = match GridSurface(&solid).measure(&options, &stage(round + 1)) {
+            Ok(made) => made.figures.size.volume,
+            Err(Stopped::Refused(_)) => break,
+            Err(stopped) => return Err(stopped),
+        };
+        let missing = aim * all - made;
+        if missing.abs() < best.0 {
+            best = (missing.abs(), by);
+        }
+        if missing.abs() < NEAR * aim * all || rate <= 0.0 {
+            break;
+        }
+        if let Some([b, v]) = last {
+            let secant = (made - v) / (by - b);
+            rate = if secant > 0.2 * rate && secant < 5.0 * rate { secant } else { rate };
+        }
+        last = Some([by, made]);
+        by = (by + missing / rate).clamp(-FARTHEST * width, FARTHEST * width);
+        if missing.abs() < SURE * aim * all {
+            return Ok(by);
+        }
+    }
+    Ok(best.1)
+}
+
+impl CompensatedGrid<'_> {
+    /// The solid to be meshed, and the progress of meshing it.
+    fn solid<'p>(&self, edge: f64, whole: &'p dyn Progress) -> Result<(Cow<'_, Solid>, Stage<'p>), Stopped> {
+        let first = Stage { whole, from: 0.0, to: MEASURED };
+        Ok((compensated(self.0, edge, &first)?, Stage { whole, from: MEASURED, to: 1.0 }))
+    }
+}
+
+impl SurfaceMaker for CompensatedGrid<'_> {
+    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
+        let (solid, rest) = self.solid(options.resolution, progress)?;
+        GridSurface(&solid).make(options, out, &rest)
+    }
+
+    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
+        let (solid, rest) = self.solid(options.resolution, progress)?;
+        GridSurface(&solid).stream_stl(options, out, &rest)
+    }
+
+    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
+        let (solid, rest) = self.solid(options.resolution, progress)?;
+        GridSurface(&solid).measure(options, &rest)
+    }
+
+    fn estimate(&self, resolution: f64) -> Result<Estimate, Fault> {
+        GridSurface(&self.0.solid).estimate(resolution)
+    }
+}
