@@ -1,6 +1,6 @@
 """A large part by threads, by workers and in a run that can be taken up again: seconds, peak memory of processes, equal bytes.
 
-  python bench/large.py --trabecula .venv/bin/trabecula --voxels 1e9 [--of mesh measure voxels] [--workers 2]
+  python bench/large.py --trabecula .venv/bin/trabecula --voxels 1e9 [--of mesh measure voxels slice] [--workers 2]
     [--folder /big/disk] [--rounds 1]
 
 A gyroid network in a box of 40 mm on a grid of about this number of cells. A file is written, hashed and removed before the
@@ -32,7 +32,9 @@ map.affine.wavelength = 4
 map.affine.rotate = [3, 5, 7]
 level.fraction = 0.3
 """
-ENDING = {"mesh": "stl", "voxels": "npy"}
+ENDING = {"mesh": "stl", "voxels": "npy", "slice": "cli"}
+#: The option that takes the edge: layers of slice are as high as voxels.
+STEP = {"voxels": "--step", "slice": "--layer"}
 LARGE = 1e11
 
 
@@ -88,7 +90,7 @@ def digest(path):
 def command_of(trabecula, of, scratch, edge, way):
     """The command that makes the part in a folder at an edge (mm)."""
     written = [] if of == "measure" else ["-o", str(pathlib.Path(scratch) / f"part.{ENDING[of]}")]
-    step = ["--step" if of == "voxels" else "--edge", f"{edge:.9g}"]
+    step = [STEP.get(of, "--edge"), f"{edge:.9g}"]
     return [trabecula, of, str(pathlib.Path(scratch) / "part.toml"), *written, *step, *way, "--json"]
 
 
@@ -96,7 +98,7 @@ def main():
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--trabecula", required=True)
     ask.add_argument("--voxels", type=float, default=1e9)
-    ask.add_argument("--of", nargs="+", choices=("mesh", "measure", "voxels"), default=["mesh"])
+    ask.add_argument("--of", nargs="+", choices=("mesh", "measure", "voxels", "slice"), default=["mesh"])
     ask.add_argument("--workers", type=int, default=2)
     ask.add_argument("--folder", help="where files are written")
     ask.add_argument("--rounds", type=int, default=1)

@@ -10,13 +10,17 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 import warnings
 from pathlib import Path
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import trabecula as lt
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from trabecula import cli, clusters, ranges, shared_file, unfinished
 from trabecula.errors import Refused
 from trabecula.shared_file import Written
@@ -37,8 +41,8 @@ map.affine.rotate = [5, 15, 25]
 level.fraction = 0.1
 """
 EDGE = 0.07
-#: Kills in a campaign.
-KILLS = 50 if os.environ.get("TRABECULA_CAMPAIGN") else 4
+#: Kills, and runs whose workers are killed, in a campaign and else.
+KILLS, RUNS = (50, 50) if os.environ.get("TRABECULA_CAMPAIGN") else (4, 3)
 
 
 def built(text: str = NETWORK) -> lt.Design:
@@ -187,7 +191,7 @@ import sys, warnings
 warnings.simplefilter("ignore")
 import trabecula as lt
 from trabecula import ranges, unfinished
-unfinished.CHUNK = 1_000_000  # many moves
+unfinished.CHUNK = 1_000_000  # many lines
 design = lt.load(sys.argv[1]).build()
 print("built", flush=True)
 ranges.save(design, sys.argv[2], float(sys.argv[3]), "drop", size=1)
@@ -215,36 +219,35 @@ def test_killed_at_random_moments_it_goes_on_to_the_same_file(tmp_path: Path, wh
     assert again(path) == whole[1] and path.read_bytes() == whole[0]
 
 
-@pytest.mark.parametrize("room", [True, False])
-@pytest.mark.parametrize("at", [0, 1, 2, 5, 9])
-def test_killed_while_bytes_are_copied_it_goes_on_to_the_same_file(tmp_path: Path, whole, monkeypatch, at: int, room: bool):
-    monkeypatch.setattr(unfinished, "CHUNK", 300_000)
-    monkeypatch.setattr(unfinished.shutil, "disk_usage", lambda folder: SimpleNamespace(free=10**12 if room else 10**5))
-    path, copied, write, full = tmp_path / "part.stl", 0, unfinished.write, 0
-    parts = tmp_path / "part.stl.parts"
+@pytest.mark.parametrize("lost", [True, False])
+@pytest.mark.parametrize("at", [0, 1, 5, 30])
+def test_killed_while_bytes_move_it_goes_on_to_the_same_file(tmp_path: Path, whole, monkeypatch, at: int, lost: bool):
+    monkeypatch.setattr(unfinished, "CHUNK", 3_000_000)
+    path, move, staged, moves, since, sizes = tmp_path / "part.stl", unfinished.move, Unfinished._staged, 0, None, set()
 
-    def torn(file, place, chunk):
-        nonlocal copied, full
-        if str(file.name).isdigit():  # the file of what is kept
-            copied += 1
-            full = full or os.path.getsize(parts / "data")
-            if copied > at:  # half of it is written
-                write(file, place, chunk[: len(chunk) // 2])
-                raise KeyboardInterrupt
-        write(file, place, chunk)
+    def torn(file, source, place, length):
+        nonlocal moves, since
+        moves, since = moves + 1, place if since is None else since
+        sizes.add(os.path.getsize(tmp_path / "part.stl.parts" / "data"))
+        if moves <= at:
+            return move(file, source, place, length)
+        move(file, source, place, length // 2)
+        if lost:  # as if the power had failed: of what moved since the last line nothing is on the disk
+            unfinished.write(file, since, bytes(place + length // 2 - since))
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(unfinished, "write", torn)
+    def noted(self, line):
+        nonlocal since
+        staged(self, line)
+        since = None
+
+    monkeypatch.setattr(unfinished, "move", torn)
+    monkeypatch.setattr(Unfinished, "_staged", noted)
     with pytest.raises(KeyboardInterrupt):
-        again(path, 5)
-    assert not path.exists()
-    if room:
-        assert os.path.getsize(parts / "data") == full
-    elif hasattr(os.stat(parts), "st_blocks"):
-        # The disk holds a part twice at most; what is not written of a file takes no room but for its blocks.
-        held = sum(512 * os.stat(parts / name).st_blocks for name in ("data", "whole"))
-        assert held <= full + unfinished.CHUNK + 4 * 4096, held
-    monkeypatch.setattr(unfinished, "write", write)
-    assert again(path, 5) == whole[1] and path.read_bytes() == whole[0]
+        again(path, 1)
+    assert not path.exists() and len(sizes) == 1  # the disk holds the part once
+    monkeypatch.setattr(unfinished, "move", move)
+    assert again(path, 1) == whole[1] and path.read_bytes() == whole[0]
     left_alone(path)
 
 
@@ -398,6 +401,183 @@ def test_killed_while_shards_are_written_it_goes_on(tmp_path: Path, whole, monke
     assert joined(tmp_path / "part") == whole[0][84:]
 
 
+@pytest.mark.parametrize("kind", ["vti", "npy"])
+@pytest.mark.parametrize("stop", [None, 0, 2])
+def test_bricks_are_the_voxels_in_pieces(tmp_path: Path, monkeypatch, kind: str, stop: int | None):
+    solid = built()
+    voxels = solid.voxels(step=0.11)
+    layer = voxels.shape[0] * voxels.shape[1]
+    more = {"size": 3, "shards": 7 * layer}
+    if stop is not None:  # killed after so many files
+        staged, left = Unfinished._staged, [stop]
+
+        def torn(self, line):
+            if not left[0]:
+                raise KeyboardInterrupt
+            left[0] -= 1
+            staged(self, line)
+
+        with monkeypatch.context() as killed, pytest.raises(KeyboardInterrupt):
+            killed.setattr(Unfinished, "_staged", torn)
+            ranges.save_voxels(solid, str(tmp_path / "part"), kind, 0.11, **more)
+    made = ranges.save_voxels(solid, str(tmp_path / "part"), kind, 0.11, **more)
+    assert (made["shape"], made["volume"]) == (list(voxels.shape), voxels.volume)
+    manifest = json.loads((tmp_path / "part" / "manifest.json").read_text())
+    assert manifest["voxels"] == made and len(manifest["shards"]) > 4
+    index, ends = ["all.pvti"] * (kind == "vti"), [0]
+    for brick in manifest["shards"]:
+        content = (tmp_path / "part" / brick["file"]).read_bytes()
+        assert (hashlib.sha256(content).hexdigest(), len(content)) == (brick["sha256"], brick["bytes"])
+        first, end = brick["layers"]
+        assert first == ends[-1]
+        ends.append(end)
+        wanted = voxels.solid[:, :, first:end].tobytes("F")
+        if kind == "npy":
+            array = np.load(tmp_path / "part" / brick["file"])
+            assert array.shape == (*voxels.shape[:2], end - first) and array.tobytes("F") == wanted
+        else:
+            assert (
+                wanted in content and f'WholeExtent="0 {voxels.shape[0]} 0 {voxels.shape[1]} {first} {end}"'.encode() in content
+            )
+    assert ends[-1] == voxels.shape[2]
+    files = [brick["file"] for brick in manifest["shards"]]
+    assert sorted(p.name for p in (tmp_path / "part").iterdir()) == sorted([*files, *index, "manifest.json"])
+    left_alone(tmp_path / "part")
+
+
+def test_another_program_reads_bricks_as_one(tmp_path: Path):
+    pyvista = pytest.importorskip("pyvista")
+    solid = built()
+    voxels = solid.voxels(step=0.2)
+    solid.save_voxels(tmp_path / "part.vti", step=0.2, shards=3e-5)
+    found = pyvista.read(tmp_path / "part" / "all.pvti")
+    assert found.dimensions == tuple(n + 1 for n in voxels.shape) and len(list((tmp_path / "part").glob("*.vti"))) > 2
+    assert np.allclose(found.bounds[::2], voxels.origin) and (found["solid"] == voxels.solid.ravel("F")).all()
+
+
+def test_the_command_writes_bricks_to_a_new_folder(tmp_path: Path):
+    design = tmp_path / "network.toml"
+    design.write_text(NETWORK)
+    words = ["voxels", str(design), "-o", str(tmp_path / "part.vti"), "--step", "0.08", "--shards", "0.001", "--json"]
+    out, said = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(said):
+        assert cli.main(words) == 0
+        assert cli.main(words) == 1
+    made = json.loads((tmp_path / "part" / "manifest.json").read_text())
+    assert json.loads(out.getvalue())["volume"] == made["voxels"]["volume"]
+    assert len(made["shards"]) == 2 and f"{tmp_path / 'part'} exists; shards go to a new folder" in said.getvalue()
+
+
+def test_a_new_run_has_no_file_of_the_one_before(tmp_path: Path, monkeypatch):
+    staged = Unfinished._staged
+
+    def torn(self, line):
+        staged(self, line)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as killed, pytest.raises(KeyboardInterrupt):
+        killed.setattr(Unfinished, "_staged", torn)
+        again(tmp_path / "part", shards=1_000_000)
+    again(tmp_path / "part", shards=4_000_000, new=True)
+    joined(tmp_path / "part")  # all files are in the manifest
+
+
+# --- layers for machines ---------------------------------------------------------------------------------------------
+
+#: Files of layers: the end of the name and what else is asked for.
+SLICED = [("cli", {}), ("cli", {"binary": True}), ("svg", {}), ("3mf", {})]
+SLICED += [(kind, {"pixel": 0.13}) for kind in ("zip", "sl1", "tif", "npy")]
+
+
+def layers_of(tmp_path: Path, kind: str, more: dict, apart: dict, **plan) -> tuple[dict, bytes]:
+    """The figures and the file of the network's layers."""
+    folder = tmp_path / ("apart" if apart else "whole")
+    folder.mkdir(exist_ok=True)
+    report = built().layers(**{"layer": 0.3, "tolerance": 0.01} | plan).save(folder / f"part.{kind}", **more, **apart)
+    left_alone(folder / f"part.{kind}")
+    return report.to_dict(), (folder / f"part.{kind}").read_bytes()
+
+
+@pytest.mark.parametrize("size", [1, 5, 1000])
+@pytest.mark.parametrize(("kind", "more"), SLICED)
+def test_layers_in_ranges_are_the_file_of_one_run(tmp_path: Path, monkeypatch, kind: str, more: dict, size: int):
+    monkeypatch.setattr(ranges, "LAYERS", size)
+    assert layers_of(tmp_path, kind, more, {"resume": True}) == layers_of(tmp_path, kind, more, {})
+
+
+@settings(max_examples=100 if os.environ.get("TRABECULA_CAMPAIGN") else 5, deadline=None)
+@given(
+    layer=st.floats(0.2, 2),
+    ends=st.tuples(st.floats(-6, -1), st.floats(1, 6)),
+    adaptive=st.none() | st.floats(0.05, 0.5),
+    size=st.integers(1, 9),
+)
+def test_any_layers_are_those_of_one_run(layer: float, ends: tuple, adaptive: float | None, size: int):
+    with tempfile.TemporaryDirectory() as scratch, pytest.MonkeyPatch.context() as patched:
+        patched.setattr(ranges, "LAYERS", size)
+        plan = {"layer": layer, "start": ends[0], "stop": ends[1], "adaptive": adaptive}
+        made = [layers_of(Path(scratch), "3mf", {}, apart, **plan) for apart in ({}, {"resume": True})]
+        assert made[0] == made[1]
+
+
+def test_layers_go_on_where_they_were_and_not_with_others(tmp_path: Path):
+    design, out = tmp_path / "network.toml", tmp_path / "part.cli"
+    design.write_text(NETWORK)
+    layers, begun = lt.load(design).build().layers(0.1, 0.01), []
+    layers.save(out)
+    whole = out.read_bytes()
+
+    def stop(done: int, total: int) -> None:
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        layers.save(out, resume=True, progress=stop)
+    with pytest.raises(Refused, match=r"changed since are .*plan\.layer; take that back"):
+        lt.load(design).build().layers(0.2, 0.01).save(out, resume=True)
+    layers.save(out, resume=True, progress=lambda n, total: begun.append(n))
+    assert begun[0] == 5 and out.read_bytes() == whole
+    assert sorted(p.name for p in tmp_path.iterdir()) == [design.name, out.name]
+
+
+def test_a_damaged_range_of_layers_is_made_again(tmp_path: Path):
+    layers, out = built().layers(0.1, 0.01), tmp_path / "part.3mf"
+    layers.save(out)
+    whole = out.read_bytes()
+    for of in ("data", "partials", "lines"):
+
+        def stop(done: int, total: int) -> None:
+            if done == 12:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            layers.save(out, resume=True, progress=stop)
+        path = tmp_path / "part.3mf.parts" / of
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 4
+        path.write_bytes(content)
+        layers.save(out, resume=True)
+        assert out.read_bytes() == whole
+
+
+def test_the_command_slices_in_ranges(tmp_path: Path):
+    design = tmp_path / "network.toml"
+    design.write_text(NETWORK)
+    said = []
+    for folder, more in (("a", ()), ("b", ("--resume",))):
+        (tmp_path / folder).mkdir()
+        out = io.StringIO()
+        words = ("slice", design, "-o", tmp_path / folder / "part.cli", "--layer", "0.2", "--binary", "--json", *more)
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+            assert cli.main([str(word) for word in words]) == 0
+        said.append(json.loads(out.getvalue()) | {"seconds": None})
+    assert said[0] == said[1] and (tmp_path / "a/part.cli").read_bytes() == (tmp_path / "b/part.cli").read_bytes()
+    err = io.StringIO()
+    with contextlib.redirect_stderr(err):
+        assert cli.main(["slice", str(design), "--z", "0", "--cluster", "local:2"]) == 2
+    assert "--cluster belongs to --layer; leave it out" in err.getvalue()
+
+
 # --- clusters --------------------------------------------------------------------------------------------------------
 
 
@@ -430,6 +610,12 @@ def test_a_cluster_measures_and_samples_the_same(tmp_path: Path, cluster):
     assert a.read_bytes() == b.read_bytes()
 
 
+@pytest.mark.parametrize(("kind", "more"), SLICED)
+def test_a_cluster_slices_the_same(tmp_path: Path, cluster, kind: str, more: dict):
+    address = {"cluster": cluster.scheduler_address}
+    assert layers_of(tmp_path, kind, more, address) == layers_of(tmp_path, kind, more, {})
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_any_number_of_workers_gives_the_same_file(tmp_path: Path, count: int):
     pytest.importorskip("distributed")
@@ -456,6 +642,57 @@ def test_workers_that_are_killed_and_join_change_nothing(tmp_path: Path, whole, 
 
         assert again(path, cluster=cluster.scheduler_address, progress=kill) == whole[1]
     assert path.read_bytes() == whole[0]
+
+
+class Killer(threading.Thread):
+    """Kills one worker of a cluster after the other at random moments, some seconds apart, until it is ended."""
+
+    def __init__(self, cluster, moments: random.Random):
+        super().__init__(daemon=True)
+        self.cluster, self.moments = cluster, moments
+        self.kills, self.ended = 0, threading.Event()
+
+    def run(self):
+        while not self.ended.wait(self.moments.choice((0.3, 3)) * self.moments.random()):
+            running = [nanny.pid for nanny in list(self.cluster.workers.values()) if nanny.pid]
+            with contextlib.suppress(ProcessLookupError):
+                if running:
+                    os.kill(self.moments.choice(running), signal.SIGKILL)
+                    self.kills += 1
+
+    def __enter__(self):
+        self.start()
+
+    def __exit__(self, *_):
+        self.ended.set()
+        self.join()
+
+
+def test_runs_whose_workers_are_killed_at_random_moments_give_equal_files(tmp_path: Path, whole, cluster):
+    solid, address = built(), cluster.scheduler_address
+    layers = solid.layers(0.2, 0.01)
+    solid.voxels(step=0.05).write(tmp_path / "whole.npy")
+    layers.save(tmp_path / "part.cli")
+    wanted = {"stl": whole[0], "npy": (tmp_path / "whole.npy").read_bytes(), "cli": (tmp_path / "part.cli").read_bytes()}
+    ways = {
+        "stl": lambda path: again(path, 1, cluster=address),
+        "npy": lambda path: solid.save_voxels(path, step=0.05, cluster=address),
+        "cli": lambda path: layers.save(path, cluster=address),
+    }
+    kills, equal = [], 0
+    for run in range(RUNS):
+        kind = list(ways)[run % len(ways)]
+        folder = tmp_path / f"{run}"
+        folder.mkdir()
+        killer = Killer(cluster, random.Random(run))
+        with killer:
+            ways[kind](folder / f"part.{kind}")
+        kills.append(killer.kills)
+        equal += (folder / f"part.{kind}").read_bytes() == wanted[kind]
+        left_alone(folder / f"part.{kind}")
+        (folder / f"part.{kind}").unlink()
+    print(f"{equal} of {RUNS} files equal, {sum(kills)} workers killed, in {sum(map(bool, kills))} of the runs")
+    assert equal == RUNS and sum(kills) > RUNS / 2
 
 
 @contextlib.contextmanager

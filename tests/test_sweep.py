@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 import warnings
 from pathlib import Path
 
@@ -443,6 +444,97 @@ def test_a_dask_cluster_gives_the_same_table(tmp_path: Path):
     assert table(tmp_path / "here.csv") == table(tmp_path / "there.csv")
 
 
+def test_files_of_a_design_go_with_it_to_the_workers_of_a_cluster(tmp_path: Path):
+    pytest.importorskip("distributed")
+    here, there = tmp_path / "here", tmp_path / "there"
+    for folder in (here, there):
+        (folder / "parts").mkdir(parents=True)
+    for name, size in (("a", 4), ("b", 5)):
+        lattice = lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.9))
+        part = lt.Design(lt.region.box(size=[size] * 3), {"a": lattice}).build()
+        part.mesh(edge=0.4).write(here / "parts" / f"{name}.stl")
+    (here / "parts" / "bad.stl").write_text("solid\n")
+    text = BASE.replace("region.box.size = [4, 4, 4]", 'region.mesh.path = "parts/a.stl"')
+    names = ", ".join(f'"parts/{name}.stl"' for name in ("a", "b", "bad", "missing"))
+    study = here / "study.toml"
+    study.write_text(f'{text}[sweep]\n"region.mesh.path" = [{names}]')
+    design, out = lt.load(study), tmp_path / "out.csv"
+    job, points = Job(design, per_cell=8.0), list(enumerate(Study(design).points()))
+    plain = [row_of(job, *point) for point in points]
+    assert [bool(row["error"]) for row in plain] == [False, False, True, True]
+    with clusters.connected("local:2") as client:
+
+        def sent(self, *words, **more):
+            os.rename(here, there / "gone")  # what was read is gone before a worker begins
+            monkey.undo()
+            return client.submit(*words, **more)
+
+        with pytest.MonkeyPatch.context() as monkey:
+            monkey.setattr(type(client), "submit", sent)
+            monkey.setattr(clusters, "connected", lambda name: contextlib.nullcontext(client))
+            rows = sorted(clusters.rows_by_cluster(job, points, "local:2"), key=lambda row: row["design"])
+    assert not out.exists()
+    assert [row | {"seconds": 0} for row in rows] == [row | {"seconds": 0} for row in plain]
+
+
+@pytest.mark.parametrize("kind", ["slurm", "pbs"])
+def test_jobs_of_a_queue_are_workers(monkeypatch: pytest.MonkeyPatch, kind: str):
+    distributed = pytest.importorskip("distributed")
+    asked = []
+
+    class Queue(distributed.LocalCluster):
+        """Stands for the clusters of dask-jobqueue."""
+
+        def __init__(self):
+            super().__init__(n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+
+        def adapt(self, *, minimum_jobs: int, maximum_jobs: int):
+            asked.append((minimum_jobs, maximum_jobs))
+            self.scale(minimum_jobs)
+
+    def unknown():
+        raise ValueError("You must specify how many cores to use per job like ``cores=8``")
+
+    queues = types.SimpleNamespace(SLURMCluster=Queue, PBSCluster=Queue, SGECluster=unknown)
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", queues)
+    with clusters.connected(f"{kind}:2") as client:
+        assert client.submit(sum, [1, 2]).result() == 3
+    assert asked == [(2, 2)]
+    with pytest.raises(ValueError, match=r"cluster sge:1: You must .*cores=8.*\(jobqueue\.sge of Dask's configuration"):
+        clusters.connected("sge:1").__enter__()
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", None)
+    with pytest.raises(ValueError, match="cluster slurm:2: jobs of queues need dask-jobqueue: pip install dask-jobqueue"):
+        clusters.connected("slurm:2").__enter__()
+    with pytest.raises(ValueError, match="expected slurm:N with N from 1 to 4096, found slurm:0"):
+        clusters.connected("slurm:0").__enter__()
+
+
+#: The command in a process whose files may have so many bytes, as on a disk that is full.
+FULL = """
+import resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
+from trabecula import cli
+sys.exit(cli.main(sys.argv[2:]))
+"""
+
+
+def test_a_disk_that_is_full_keeps_the_rows_so_far(tmp_path: Path):
+    pytest.importorskip("resource")
+    study, out = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'), tmp_path / "out.csv"
+    words = ("sweep", study, "-o", out, "--per-cell", 8, "--jobs", 1)
+    done = subprocess.run([sys.executable, "-c", FULL, "4000", *map(str, words)], capture_output=True, text=True, check=False)
+    rows = Path(f"{out}.rows")
+    begun = rows.read_bytes().count(b"\n") - 1
+    said = f"{rows}: File too large; {begun} rows are safe; free some space, and the same command goes on"
+    assert done.returncode == 1 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert 0 < begun < 12
+    again = command(*words, "--json")
+    assert again.returncode == 0 and json.loads(again.stdout)["resumed"] == begun
+    assert command(*words[:3], tmp_path / "whole.csv", *words[4:]).returncode == 0
+    assert table(out) == table(tmp_path / "whole.csv")
+
+
 def test_rows_of_a_worker_of_another_version_are_not_taken(tmp_path: Path):
     distributed = pytest.importorskip("distributed")
     study, rows = written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'), []
@@ -642,7 +734,7 @@ def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple
         (("--meshes", "one.stl"), "write {design} where the number goes"),
         (("--meshes", "{design}.stp"), "the name must end in"),
         (("--properties", "stifness"), 'unknown property "stifness"; did you mean stiffness?'),
-        (("--cluster", "nonsense"), "expected local:N or an address such as tcp://head:8786, found nonsense"),
+        (("--cluster", "nonsense"), "expected local:N, slurm:N or an address such as tcp://head:8786, found nonsense"),
         (("--cluster", "local:0"), "expected local:N with N from 1 to 4096, found local:0"),
         (("--front", "min,max"), "--front is of --plot"),
         (("--plot", "fraction"), "--plot takes two columns, or three"),

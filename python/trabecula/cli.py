@@ -304,10 +304,18 @@ APART = (
         "--cluster",
         type=cluster,
         metavar="ADDRESS",
-        help="by a Dask cluster at this address, or local:N; needs the extra scale",
+        help="by a Dask cluster at this address, local:N processes, or slurm:N jobs; needs the extra scale",
     ),
     option("--new", action="store_true", help="begin anew: the folder of an earlier run is not taken up"),
 )
+
+
+def shards(folder: str, more: str):
+    """Several files instead of one."""
+    text = f"a folder with the name of OUT {folder}, of files of about this size and a manifest: as --resume{more}"
+    return option("--shards", type=GIGABYTES, metavar="GB", help=text)
+
+
 TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the transitions of a blend to OUT.svg", "OUT.svg")
 
 #: For each command: one line, examples and more, options; of a list of options one at most may be given.
@@ -365,13 +373,7 @@ COMMANDS = {
         ),
         *(THREADS, PROGRESS),
         *APART,
-        option(
-            "--shards",
-            type=GIGABYTES,
-            metavar="GB",
-            help="a folder with the name of OUT without .stl, of files of about this size and a manifest: as --resume, and of "
-            "any number of triangles",
-        ),
+        shards("without .stl", ", and of any number of triangles"),
         option(
             "--islands",
             choices=ISLANDS,
@@ -496,7 +498,10 @@ COMMANDS = {
         "Write the solid as cubic voxels.",
         "The name of OUT decides the format: .npy (indexed [x, y, z], 1 is solid) or .vti (for ParaView).\n\n"
         "example:\n  trabecula voxels part.toml -o part.vti --step 0.2",
-        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step"), *APART, *(THREADS, PROGRESS, JSON, *NOTICES)),
+        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step")),
+        *APART,
+        shards("without its ending", "; of .vti also all.pvti, by which ParaView opens them as one"),
+        *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
     "tets": (
         "Make or check the tetrahedral mesh that carries a lattice; print its quality; write it.",
@@ -547,7 +552,7 @@ COMMANDS = {
             "--cluster",
             type=cluster,
             metavar="ADDRESS",
-            help="a Dask cluster at this address, or local:N; needs the extra scale",
+            help="a Dask cluster at this address, local:N processes, or slurm:N jobs; needs the extra scale",
         ),
         option(
             "--properties",
@@ -593,6 +598,7 @@ COMMANDS = {
         option("--pixel", type=LENGTH, metavar="MM", help="edge of a pixel of pictures, mm"),
         option("--size", type=pixels, metavar="WxH", help="pixels of pictures, the part in the middle (default: the part)"),
         option("--exposure", type=exposure, metavar="S,S", help="of layers and first ones of .sl1, s (default: 8,35)"),
+        *APART,
         option("--beams", metavar="NAME", help="the beams to cut in arcs, of several"),
         option("--chord", type=LENGTH, metavar="MM", help="chord error of drawn arcs, mm (default: 0.01)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),

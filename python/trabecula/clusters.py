@@ -1,4 +1,4 @@
-"""Work by a Dask cluster: one machine, many, or those of a queue. In the extra "scale".
+"""Work by a Dask cluster: processes of one machine, workers of many, or jobs of a queue. In the extra "scale".
 
 Workers run functions of this package, which they have installed in the same version, on plain data: no design is code.
 """
@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import tempfile
+import threading
 import time
 import warnings
 from collections import deque
@@ -16,13 +19,16 @@ from itertools import islice
 from typing import Any
 
 from . import _core
-from .given import cluster_name
+from .given import QUEUES, cluster_name
 from .rows import Job, row_of
+from .sent import contents, put_files
 
 __all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
 
 #: Seconds that a cluster has to answer, and to have a worker again when it has lost the last one.
 PATIENCE = 30
+#: The same of jobs in a queue, which may be long.
+QUEUED = 24 * 3600
 #: Tasks that wait at each thread of a worker: enough to keep it busy, few enough for the memory of both.
 WAITING = 2
 #: Environment of workers here: freed memory is used again rather than given back at once, which costs as much as the work.
@@ -43,7 +49,8 @@ TRIES, STARTS = 20, 3
 
 @contextmanager
 def connected(cluster: str) -> Iterator[Any]:
-    """A client of the Dask cluster at an address such as "tcp://head:8786", or of as many processes here as "local:N" says.
+    """A client of the Dask cluster at an address such as "tcp://head:8786", of as many processes here as "local:N" says, or of
+    as many jobs as "slurm:N" does, each as Dask's configuration has them.
 
     Raises ValueError for a cluster that does not answer, and one with workers of another version.
     """
@@ -68,6 +75,11 @@ def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
         here = _started(dask, int(cluster.removeprefix("local:")), opened)
         # Results do not go by way of the scheduler, which is in this process.
         return opened.enter_context(dask.Client(here, direct_to_workers=True))
+    if cluster.partition(":")[0] in QUEUES:
+        client = opened.enter_context(dask.Client(_queued(cluster, opened)))
+        client.patience = QUEUED
+        client.wait_for_workers(1, timeout=QUEUED)
+        return client
     try:
         client = opened.enter_context(dask.Client(cluster, timeout=PATIENCE))
         client.wait_for_workers(1, timeout=PATIENCE)
@@ -89,6 +101,24 @@ def _started(dask: Any, count: int, opened: ExitStack) -> Any:
             last = error
     words = f"its processes ended {STARTS} times before they had started; were they killed, or is memory short?"
     raise ValueError(f"cluster local:{count}: {words} ({last})")
+
+
+def _queued(cluster: str, opened: ExitStack) -> Any:
+    """The scheduler here of as many jobs of a queue. Those that end are replaced."""
+    from .bridges import package
+
+    kind, _, count = cluster.partition(":")
+    try:
+        queues = package("dask_jobqueue")
+    except ImportError:
+        raise ValueError(f"cluster {cluster}: jobs of queues need dask-jobqueue: pip install dask-jobqueue") from None
+    try:
+        made = opened.enter_context(getattr(queues, QUEUES[kind])())
+    except (OSError, RuntimeError, ValueError) as error:
+        words = " ".join(str(error).split())
+        raise ValueError(f"cluster {cluster}: {words} (jobqueue.{kind} of Dask's configuration says what a job is)") from None
+    made.adapt(minimum_jobs=int(count), maximum_jobs=int(count))
+    return made
 
 
 def _same_version(client: Any, cluster: str) -> None:
@@ -128,14 +158,15 @@ def version() -> str:
 
 
 def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Iterator[dict[str, Any]]:
-    """The rows of numbered points of a sweep as they are done. Files that the design reads are read by workers under the same
-    names.
+    """The rows of numbered points of a sweep as they are done. Files that the design reads go by their content once to each
+    worker.
 
     A row whose worker dies is made by another. Raises ValueError as ``connected``, for a worker of another version that has
     joined since, and for a cluster that has lost its workers for longer than ``PATIENCE``.
     """
     with connected(cluster) as client:
-        data = job.to_dict() | {"threads": 1}
+        files = contents(job.design.to_dict(), job.design.folder or os.getcwd())
+        data = job.to_dict() | {"threads": 1, "files": files, "key": os.urandom(16)}
         given = client.submit(_same, data, pure=False)
         waiting = iter(tasks)
         #: The task of each row that is asked for, and how often it has been.
@@ -178,8 +209,26 @@ def _done(asked: Iterable[Any]) -> list[Any]:
     return [future for future in futures if future.done()]
 
 
-def _row(job: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
-    return row_of(Job.of(job), number, values)
+#: The last job of this process, by its key.
+_last: tuple[bytes, Job] | None = None
+_lock = threading.Lock()
+
+
+def _row(data: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
+    """A row, where a worker makes it."""
+    global _last
+    with _lock:
+        if _last is None or _last[0] != data["key"]:
+            from distributed import get_worker
+
+            given = {key: value for key, value in data.items() if key not in ("key", "files")}
+            if data["files"]:
+                # In a folder that goes with the worker.
+                folder = tempfile.mkdtemp(prefix="trabecula-", dir=get_worker().local_directory)
+                given["sent"] = folder, put_files(data["files"], folder)
+            _last = data["key"], Job.of(given)
+        job = _last[1]
+    return row_of(job, number, values)
 
 
 def in_order(
@@ -257,7 +306,7 @@ def _result(client: Any, future: Any) -> Any:
 
 def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
     """What an attempt gives that may raise TimeoutError, made as long as there are workers, or may be again soon."""
-    last = time.monotonic()
+    last, patience = time.monotonic(), getattr(client, "patience", PATIENCE)
     while True:
         try:
             return attempt()
@@ -265,8 +314,8 @@ def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
             with suppress(OSError, TimeoutError):
                 if client.nthreads():
                     last = time.monotonic()
-            if time.monotonic() - last > PATIENCE:
-                raise ValueError(f"the cluster has had no workers for {PATIENCE} s") from None
+            if time.monotonic() - last > patience:
+                raise ValueError(f"the cluster has had no workers for {patience} s") from None
 
 
 def _same(inputs: dict[str, Any]) -> dict[str, Any]:

@@ -120,8 +120,8 @@ def voxels(args) -> None:
     solid = build(args.design)
     options = {"step" if k == "edge" else k: v for k, v in resolution(args).items()}
     with Progress("sampling", args.progress) as progress:
-        if args.resume or args.cluster or args.new:
-            apart = {"cluster": args.cluster, "new": args.new}
+        if args.resume or args.cluster or args.new or args.shards:
+            apart = {"cluster": args.cluster, "new": args.new, "shards": args.shards and int(args.shards * 1e9)}
             size = options.get("step"), options.get("per_cell")
             made = solid._save_voxels(args.output, *size, args.threads, progress, apart, settle)
         else:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Builder = TypeVar("Builder", bound=Callable[..., Any])
 
 __all__ = [
+    "QUEUES",
     "Points",
     "Stops",
     "cluster_name",
@@ -212,14 +213,28 @@ def control(points: Points) -> dict:
     return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
 
 
+#: Queues whose jobs can be workers, and what dask-jobqueue calls them.
+QUEUES = {
+    "htcondor": "HTCondorCluster",
+    "lsf": "LSFCluster",
+    "moab": "MoabCluster",
+    "oar": "OARCluster",
+    "pbs": "PBSCluster",
+    "sge": "SGECluster",
+    "slurm": "SLURMCluster",
+}
+
+
 def cluster_name(text: str) -> str:
-    """The name of a Dask cluster: local:N, N from 1 to 4096, or an address such as tcp://head:8786. ValueError for others."""
-    if text.startswith("local:"):
-        count = text.removeprefix("local:")
+    """The name of a Dask cluster: local:N, or slurm:N and other queues, N from 1 to 4096; or an address such as
+    tcp://head:8786. ValueError for others.
+    """
+    kind, _, count = text.partition(":")
+    if kind == "local" or kind in QUEUES:
         if not (count.isascii() and count.isdigit()) or not 1 <= int(count[:5]) <= 4096 or len(count) > 4:
-            raise ValueError(f"cluster: expected local:N with N from 1 to 4096, found {text:.80}")
+            raise ValueError(f"cluster: expected {kind}:N with N from 1 to 4096, found {text:.80}")
     elif ":" not in text:
-        raise ValueError(f"cluster: expected local:N or an address such as tcp://head:8786, found {text:.80}")
+        raise ValueError(f"cluster: expected local:N, slurm:N or an address such as tcp://head:8786, found {text:.80}")
     return text
 
 

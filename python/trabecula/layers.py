@@ -71,9 +71,11 @@ class Layer:
 class Layers(Sequence):
     """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
 
-    def __init__(self, solid: Solid, core: _core.Layers, threads: int | None):
+    def __init__(self, solid: Solid, plan: dict[str, Any], threads: int | None):
         self._solid = solid
-        self._core = core
+        #: How they are made: what ``_core.Layers.of`` takes besides the solid.
+        self._plan = plan
+        self._core = core = _core.Layers.of(solid._core, **plan)
         self._threads = threads
         #: Where layers begin, and the end of the last one, mm.
         self.heights: list[float] = core.heights
@@ -116,6 +118,9 @@ class Layers(Sequence):
         size: tuple[int, int] | None = None,
         exposure: tuple[float, float] | None = None,
         progress: Progress | None = None,
+        resume: bool = False,
+        cluster: str | None = None,
+        new: bool = False,
     ) -> LayersReport:
         """Writes all layers to a file and gives its figures; a few layers are held in memory at a time.
 
@@ -124,6 +129,10 @@ class Layers(Sequence):
         is the exact area fraction of the pixel. ``size`` is their width and height in pixels, the part in the middle; without
         it they are as large as the region. ``exposure`` (s, of layers and of the first ones; 8 and 35 unless given) is for
         .sl1.
+
+        With ``resume`` layers stand in the folder ``path``.parts as soon as they are made, and after any end the same call goes
+        on there, unless a ``new`` run is wanted. With ``cluster`` they are made by the workers of a Dask cluster, an address or
+        "local:N" (extra ``scale``). The file is put together at the end, the same to the last byte.
         """
         kind = extension(path, LAYER_WRITES)
         row = LAYERS[kind]
@@ -147,8 +156,13 @@ class Layers(Sequence):
         title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         if raster:
             self._check_room(kind, path, raster[1], raster[0])
+        file = {"suffix": kind, "title": title, "binary": binary, "pixel": raster, "exposure": times}
+        if resume or cluster or new:
+            from . import ranges
+
+            return ranges.save_layers(self, os.fsdecode(path), file, self._threads, progress, cluster, new)
         with whole_file(path) as temporary:
-            return self._core.save((temporary, kind, title), binary, raster, times, self._threads, progress)
+            return _core.LayerRanges.of(self._core, **file).save(temporary, self._threads, progress)
 
     def _raster(self, kind: str, pixel: float | None, size: tuple[int, int] | None) -> tuple:
         """Edge of a pixel, numbers of pixels and the lower left corner of pictures."""

@@ -1,4 +1,5 @@
-"""Parts that outgrow one process or one run, range by range: surfaces and their figures by tiles of the grid, voxels by layers.
+"""Parts that outgrow one process or one run, range by range: surfaces and their figures by tiles of the grid, voxels and layers
+for machines by layers.
 
 Ranges are made by threads here or by the workers of a cluster, and stand in a folder as soon as they are made: a run goes on
 where the last one ended. The result is that of one process to the last byte.
@@ -18,20 +19,22 @@ from typing import Any
 from . import _core, terminal
 from .clusters import connected, in_order
 from .design import _moved, parsed
+from .files import whole_file
 from .given import thread_count
 from .sent import digest_of, files_of, put_files
 from .shared_file import Written, write_at
-from .unfinished import Unfinished
+from .unfinished import Shards, Unfinished
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from .islands import Islands
-    from .reports import IslandsReport, MeshReport, QualityReport, SurfaceReport
+    from .layers import Layers
+    from .reports import IslandsReport, LayersReport, MeshReport, QualityReport, SurfaceReport
     from .solid import Solid
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["measure", "save", "save_voxels"]
+__all__ = ["measure", "save", "save_layers", "save_voxels"]
 
 #: Bytes of a range, about: few enough that its memory is used again by the next one rather than given back to the system.
 WANTED = 1 << 23
@@ -40,14 +43,17 @@ WANTED = 1 << 23
 AT_ONCE, SENT_AT_ONCE = 16, 4
 #: The fewest tasks of a part, so that all workers have some.
 TASKS = 16
+#: Layers for machines in a range, and the most ranges of them.
+LAYERS, LAYER_RANGES = 4, 1 << 12
 #: Bytes of the header and of a triangle of a binary STL, and the most triangles that it counts.
 HEADER, RECORD, MOST = _core.STL_HEADER, _core.STL_RECORD, 2**32 - 1
 
-#: For each kind of work what gives its ranges, of a solid and a step in mm.
-KINDS: dict[str, Callable[[_core.Solid, float], Any]] = {
-    "surface": lambda solid, step: _core.TileRanges.of(solid, step),
-    "figures": lambda solid, step: _core.TileRanges.of(solid, step, True),
-    "voxels": lambda solid, step: _core.VoxelRanges.of(solid, step),
+#: For each kind of work what gives its ranges, of a solid and settings.
+KINDS: dict[str, Callable[..., Any]] = {
+    "surface": lambda solid, edge: _core.TileRanges.of(solid, edge),
+    "figures": lambda solid, edge: _core.TileRanges.of(solid, edge, True),
+    "voxels": lambda solid, edge: _core.VoxelRanges.of(solid, edge),
+    "layers": lambda solid, plan, **file: _core.LayerRanges.of(_core.Layers.of(solid, **plan), **file),
 }
 
 
@@ -72,7 +78,7 @@ def save(
     another run, OSError for a disk that is full.
     """
     more = {"islands": islands} | ({"shards": shards} if shards else {})
-    work = _Work("surface", solid, spacing, path, HEADER, more, size or _tiles_at_once(solid, spacing))
+    work = _Work("surface", solid, {"edge": spacing}, path, HEADER, more, size or _tiles_at_once(solid, spacing, shards))
     with work.opened(new):
         joined = _core.Joined()
         work.make(joined.add, cluster, threads, progress)
@@ -80,7 +86,8 @@ def save(
         accept(report, words)
         if shards:
             about = work.folder.head | {"design": solid._core.design, "surface": report.to_dict()}
-            work.folder.split(kept, RECORD, _core.stl_header, shards, about)
+            files = Shards("stl", shards, lambda a, b: (_core.stl_header(b - a), b""), lambda a, b: {"triangles": b - a})
+            work.folder.split(kept, RECORD, files, about)
         else:
             work.folder.keep(kept, RECORD, _core.stl_header(report.triangles))
     work.folder.finish()
@@ -106,7 +113,7 @@ def measure(
     """
     with tempfile.TemporaryDirectory(prefix="trabecula-") as scratch:
         output = f"{design_file}.figures" if design_file else os.path.join(scratch, "figures")
-        work = _Work("figures", solid, spacing, output, 0, {}, size or _tiles_at_once(solid, spacing))
+        work = _Work("figures", solid, {"edge": spacing}, output, 0, {}, size or _tiles_at_once(solid, spacing))
         with work.opened(new):
             joined = _core.Joined()
             work.make(joined.add, cluster, threads, progress)
@@ -125,43 +132,98 @@ def save_voxels(
     cluster: str | None = None,
     new: bool = False,
     size: int | None = None,
+    shards: int | None = None,
     accept: Callable[[float], Any] = lambda volume: None,
 ) -> dict[str, Any]:
     """Writes a solid as voxels of edge ``step`` (mm) to a file of a ``kind`` ("npy", "vti"), in ranges of ``size`` layers.
-    ``accept`` is called with the volume (mm³) before the file gets its name. Gives ``shape``, ``step``, ``origin`` (mm) and
-    ``volume``.
+    ``accept`` is called with the volume (mm³) before the file gets its name. With ``shards`` ``path`` is a folder of files of
+    about this number of bytes, whole layers each. Gives ``shape``, ``step``, ``origin`` (mm) and ``volume``.
 
     Raises as ``save``.
     """
     grid = _core.VoxelRanges.of(solid._core, step)
-    head, tail = grid.frame(kind)
     nx, ny, nz = grid.shape
-    work = _Work("voxels", solid, step, path, len(head), {"kind": kind}, size or max(WANTED // (nx * ny), 1))
+    head, tail = grid.frame(kind, 0, nz)
+    more = {"kind": kind} | ({"shards": shards} if shards else {})
+    size = size or max(min(WANTED, shards or WANTED) // (nx * ny), 1)
+    work = _Work("voxels", solid, {"edge": step}, path, len(head), more, size, size * nx * ny)
     with work.opened(new):
         counts: list[int] = []
         work.make(lambda partial: counts.append(int.from_bytes(partial, "little")), cluster, threads, progress)
         volume = float(sum(counts)) * step**3
         accept(volume)
-        work.folder.keep([(0, nx * ny * nz)], 1, head, tail)
+        made = {"shape": [nx, ny, nz], "step": step, "origin": list(grid.origin), "volume": volume}
+        if shards:
+            files = Shards(kind, shards, lambda a, b: grid.frame(kind, a, b), lambda a, b: {"layers": [a, b]})
+            about = work.folder.head | {"design": solid._core.design, "voxels": made}
+            bricks = work.folder.split([(0, nz)], nx * ny, files, about)
+            if kind == "vti":
+                with open(os.path.join(work.folder.name("shards"), "all.pvti"), "w", encoding="utf-8", newline="\n") as index:
+                    index.write(grid.index([(brick["file"], *brick["layers"]) for brick in bricks]))
+        else:
+            work.folder.keep([(0, nz)], nx * ny, head, tail)
     work.folder.finish()
-    return {"shape": [nx, ny, nz], "step": step, "origin": list(grid.origin), "volume": volume}
+    return made
 
 
-def _tiles_at_once(solid: Solid, spacing: float) -> int:
-    """The number of tiles whose triangles take about as many bytes as are wanted."""
+def save_layers(
+    layers: Layers,
+    path: str,
+    file: dict[str, Any],
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cluster: str | None = None,
+    new: bool = False,
+    size: int | None = None,
+) -> LayersReport:
+    """Writes layers for machines, in ranges of ``size`` layers; ``file`` says what ``_core.LayerRanges.of`` takes besides them.
+    Gives their figures.
+
+    Raises as ``save``.
+    """
+    pixels = file["pixel"][1] if file["pixel"] else (1, 1)
+    most = max(-(-len(layers) // LAYER_RANGES), LAYERS)
+    size = size or max(min(most, WANTED // (pixels[0] * pixels[1])), 1)
+    settings = {"plan": layers._plan, **file}
+    work = _Work("layers", layers._solid, settings, path, 0, {}, size, size * pixels[0] * pixels[1])
+    with work.opened(new):
+        partials: list[bytes] = []
+        work.make(partials.append, cluster, threads, progress)
+        with whole_file(path) as temporary:
+            made = work.ranges.join(temporary, work.folder.name("data"), partials)
+    work.folder.finish()
+    return made
+
+
+def _tiles_at_once(solid: Solid, spacing: float, most: int | None = None) -> int:
+    """The number of tiles whose triangles take about as many bytes as are wanted, and no more than ``most``."""
     made = solid._core.estimate(spacing, spacing)
     tiles = 1.0
     for n in made.cells:
         tiles *= -(-n // _core.TILE)
-    return int(min(max(WANTED * tiles / made.stl, 1), 4096))
+    return int(min(max(min(WANTED, most or WANTED) * tiles / made.stl, 1), 4096))
 
 
 class _Work:
-    """Ranges of ``size`` tiles or layers that are to be made of a solid, and the folder in which they stand."""
+    """Ranges of ``size`` tiles or layers, about ``heavy`` bytes each, that are to be made of a solid, and the folder in which
+    they stand.
+    """
 
-    def __init__(self, kind: str, solid: Solid, step: float, output: str, first: int, more: dict[str, Any], size: int):
-        self.ranges = KINDS[kind](solid._core, step)
+    def __init__(
+        self,
+        kind: str,
+        solid: Solid,
+        settings: dict[str, Any],
+        output: str,
+        first: int,
+        more: dict[str, Any],
+        size: int,
+        heavy: int = WANTED,
+    ):
+        self.ranges = KINDS[kind](solid._core, **settings)
         self.size = size
+        #: By how much fewer ranges a worker makes at a time, since these are large.
+        self.share = min(1.0, WANTED / heavy)
         self.count = -(-self.ranges.count // size)
         files = files_of(solid)
         text = solid._core.design
@@ -170,7 +232,7 @@ class _Work:
             "version": _core.__version__,
             "design": hashlib.sha256(text.encode()).hexdigest(),
             "files": {name: digest_of(content.items()) for name, content in files.items()},
-            "edge": step,
+            **settings,
             **more,
             "count": self.ranges.count,
             "range": size,
@@ -178,7 +240,8 @@ class _Work:
         self.folder = Unfinished(output, head, first)
         self.limit = HEADER + RECORD * MOST if kind == "surface" and "shards" not in more else None
         key = hashlib.sha256(repr(sorted(head.items())).encode()).hexdigest()
-        self.job = {"key": key, "of": kind, "version": _core.__version__, "design": text, "files": files, "edge": step}
+        about = {"key": key, "of": kind, "version": _core.__version__, "settings": settings}
+        self.job = about | {"design": text, "files": files}
 
     @contextmanager
     def opened(self, new: bool) -> Iterator[None]:
@@ -201,7 +264,7 @@ class _Work:
         """Makes what is missing or damaged, and calls ``join`` with the partial results of all ranges in order."""
         folder = self.folder
         begun = len(folder.ranges)
-        damaged = [] if folder.stage else folder.damaged()
+        damaged = folder.damaged()
         if begun:
             again = f", {len(damaged)} of them damaged and made again" if damaged else ""
             terminal.say(f"{begun} of {self.count} ranges are there already ({folder.folder}){again}")
@@ -244,7 +307,7 @@ class _Work:
         """As ``_make``, by a cluster. Workers on this machine write what follows the ranges so far to its place."""
         last = self.ranges.count
         most = AT_ONCE if cluster.startswith("local:") else SENT_AT_ONCE
-        most = min(most, max(len(missing) // TASKS, 1))
+        most = max(min(int(most * self.share), len(missing) // TASKS), 1)
         rows = [(n, min(n + most, end)) for first, end in _rows(missing) for n in range(first, end, most)]
         tasks = [(first * self.size, min(end * self.size, last), self.size) for first, end in rows]
         follow = missing[0] == len(self.folder.ranges)
@@ -312,5 +375,5 @@ def _ranges_of(job: dict[str, Any]) -> Any:
                 places = put_files(job["files"], folder)
                 data = parsed(job["design"], False, "<design>", folder).to_dict()
                 built = _core.Design.from_data(_moved(data, lambda name: places.get(name, name))).build(folder)
-            _last = job["key"], KINDS[job["of"]](built, job["edge"])
+            _last = job["key"], KINDS[job["of"]](built, **job["settings"])
         return _last[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import time
 import warnings
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import _core
-from .design import Design
+from .design import Design, _moved
 from .errors import DesignWarning
 from .keys import listless, missing, unit_of
 from .solid import Solid
@@ -59,6 +60,8 @@ class Job:
     pictures: str | None = None
     properties: dict[str, dict[str, Any]] = field(default_factory=dict)
     threads: int | None = None
+    #: The folder to which the files of the design were sent, and their names there by those that the design has for them.
+    sent: tuple[str, dict[str, str]] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data, the folder of the design included."""
@@ -80,6 +83,8 @@ def row_of(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
         row |= _figures(job, number, values)
     except FAULTS as error:
         row["error"] = _words(error)
+    if job.sent:
+        row |= {name: _at_home(job, row[name]) for name in ("warnings", "error") if row.get(name)}
     row["seconds"] = round(time.perf_counter() - start, 3)
     row["version"] = _core.__version__
     return row
@@ -89,10 +94,22 @@ def _words(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
+def _at_home(job: Job, text: str) -> str:
+    """A text in which files have the names that the design has for them, wherever they were read."""
+    folder, places = job.sent or ("", {})
+    for name, place in sorted(places.items(), key=lambda pair: -len(pair[1])):
+        home = os.path.join(job.design.folder or "", name)
+        text = text.replace(os.path.join(folder, place), home).replace(place, name)
+    return text
+
+
 def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
     core = _varied(job.design, values)
     folder = job.design.folder or os.getcwd()
     figures: dict[str, Any] = {"sha256": hashlib.sha256(core.to_toml().encode()).hexdigest()}
+    if job.sent:
+        folder, places = job.sent
+        core = _core.Design.from_data(_moved(json.loads(core.to_json()), lambda name: places.get(name, name)))
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", DesignWarning)
         solid = Solid(core.build(folder), folder)

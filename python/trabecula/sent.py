@@ -15,13 +15,17 @@ if TYPE_CHECKING:
 
     from .solid import Solid
 
-__all__ = ["digest_of", "digests", "files_of", "put_files"]
+__all__ = ["contents", "digest_of", "digests", "files_of", "put_files"]
 
 
 def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
-    """The files of a design by its names for them; a name stands for one file, or for all of a pattern or a folder."""
-    names = files_in(parsed(solid._core.design, False, "<design>", solid._folder).to_dict())
-    return {name: {inner: _content(path) for inner, path in _paths(name, solid._folder)} for name in names}
+    """The files of a solid's design, as ``contents`` gives them."""
+    return contents(parsed(solid._core.design, False, "<design>", solid._folder).to_dict(), solid._folder)
+
+
+def contents(data: Any, folder: str) -> dict[str, dict[str, bytes]]:
+    """The files of a design by the names that its ``data`` have for them: a name is that of one, a pattern or a folder."""
+    return {name: {inner: _content(path) for inner, path in _paths(name, folder)} for name in files_in(data)}
 
 
 def digests(data: Any, folder: str) -> dict[str, str]:

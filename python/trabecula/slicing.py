@@ -15,7 +15,7 @@ from .texts import counted
 __all__ = ["slice"]
 
 #: What belongs to layers alone, and the words of those that are others on the command line.
-LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exposure")
+LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exposure", "resume", "cluster", "new")
 WORDS = {"start": "from", "stop": "to"}
 
 
@@ -49,9 +49,8 @@ def layers(solid: Solid, args) -> None:
     wanted = (args.layer, args.tolerance, args.start, args.stop, args.step, args.threads, args.adaptive, args.least)
     made = solid.layers(*wanted)
     with Progress("slicing", args.progress) as progress:
-        report = made.save(
-            args.output, binary=args.binary, pixel=args.pixel, size=args.size, exposure=args.exposure, progress=progress
-        )
+        options = ("binary", "pixel", "size", "exposure", "resume", "cluster", "new")
+        report = made.save(args.output, progress=progress, **{name: getattr(args, name) for name in options})
     seconds = round(time.perf_counter() - start, 3)
     if args.json:
         return put_json(report.to_dict() | {"seconds": seconds})

@@ -451,7 +451,7 @@ class Solid(Seen, Simulated, Resolution):
         ``shards`` (GB) the output is a folder with the name of ``path`` without .stl: files of about this size, the triangles
         in the same order, and ``manifest.json``, with their number, bytes and SHA-256; it may have more than 2³² triangles.
         """
-        size = int(1e9 * positive("shards", shards)) if shards is not None else None
+        size = _shard_bytes(shards)
         apart = {"cluster": cluster, "new": new, "shards": size} if resume or cluster or new or size else None
         return self._save(path, edge, per_cell, threads, progress, islands, chord, apart=apart)
 
@@ -593,10 +593,7 @@ class Solid(Seen, Simulated, Resolution):
             raise ValueError(f"{name}: a surface is made in ranges as .stl only, to a file; leave resume and cluster out")
         if self._chord_of(chord, edge, per_cell, islands) is not None:
             raise ValueError(OF_BEAMS)
-        if apart.get("shards"):
-            name = os.path.splitext(name)[0]
-            if os.path.exists(name):
-                raise ValueError(f"{name} exists; shards go to a new folder of this name")
+        name = _shards_in(name) if apart.get("shards") else name
         spacing = self.spacing(edge, per_cell)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
@@ -638,12 +635,16 @@ class Solid(Seen, Simulated, Resolution):
         progress: Progress | None = None,
         cluster: str | None = None,
         new: bool = False,
+        shards: float | None = None,
     ) -> dict[str, Any]:
         """Writes the voxels that ``voxels`` gives to a file (.npy, .vti) without holding them in memory: layers stand in the
         folder ``path``.parts as soon as they are made, and after any end the same call goes on there, as for ``save`` with
-        ``resume``. Gives ``shape``, ``step`` and ``origin`` (mm), ``volume`` (mm³).
+        ``resume``. With ``shards`` (GB) the output is a folder with the name of ``path`` without its ending: files of about
+        this size, whole layers each, ``manifest.json``, and of .vti ``all.pvti``, by which ParaView opens them as one. Gives
+        ``shape``, ``step`` and ``origin`` (mm), ``volume`` (mm³).
         """
-        return self._save_voxels(path, step, per_cell, threads, progress, {"cluster": cluster, "new": new})
+        apart = {"cluster": cluster, "new": new, "shards": _shard_bytes(shards)}
+        return self._save_voxels(path, step, per_cell, threads, progress, apart)
 
     def _save_voxels(
         self,
@@ -661,6 +662,7 @@ class Solid(Seen, Simulated, Resolution):
         check_place(path)
         if special(name):
             raise ValueError(f"{name} is a device or a pipe; voxels are made in ranges to a file")
+        name = _shards_in(name) if apart.get("shards") else name
         spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
         self._warn_thin(spacing, "step")
 
@@ -711,7 +713,8 @@ class Solid(Seen, Simulated, Resolution):
             cusp = [positive("adaptive", adaptive), thick / 4 if least is None else positive("least", least)]
         elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
-        return Layers(self, _core.Layers.of(self._core, thick, within, spacing, begin, end, cusp), thread_count(threads))
+        plan = {"layer": thick, "tolerance": within, "step": spacing, "begin": begin, "end": end, "adaptive": cusp}
+        return Layers(self, plan, thread_count(threads))
 
     def thickness(
         self,
@@ -731,6 +734,19 @@ class Solid(Seen, Simulated, Resolution):
     def _picture(self) -> Mesh:
         low, high = self.bounds
         return self.mesh(edge=max(self.wavelength / 20, max(b - a for a, b in zip(low, high, strict=True)) / 160))
+
+
+def _shard_bytes(shards: float | None) -> int | None:
+    """Gigabytes of a file of several as bytes, one at least."""
+    return None if shards is None else max(int(1e9 * positive("shards", shards)), 1)
+
+
+def _shards_in(name: str) -> str:
+    """The folder for the files of an output in several."""
+    folder = os.path.splitext(name)[0]
+    if os.path.exists(folder):
+        raise ValueError(f"{folder} exists; shards go to a new folder of this name")
+    return folder
 
 
 def _rebuilt(design: str, folder: str) -> Solid:

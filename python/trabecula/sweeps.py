@@ -203,12 +203,16 @@ class Journal:
 
             def write(line: dict[str, Any]) -> None:
                 left = memoryview(json.dumps(line).encode() + b"\n")
-                while left:  # a disk that fills takes a part, and then none with an error
-                    left = left[file.write(left) or 0 :]
+                try:
+                    while left:  # a disk that fills takes a part, and then none with an error
+                        left = left[file.write(left) or 0 :]
+                except OSError as error:
+                    safe = f"{len(self.rows)} rows are safe; free some space, and the same command goes on"
+                    raise OSError(f"{self.path}: {os.strerror(error.errno or 0)}; {safe}") from error
 
             def add(row: dict[str, Any]) -> None:
-                self.rows[row["design"]] = row
                 write(row)
+                self.rows[row["design"]] = row
 
             if not begun:
                 write(self.head)

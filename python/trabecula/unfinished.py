@@ -11,18 +11,17 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
-from typing import Any
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 from .errors import Refused
 from .files import replace_file
-from .shared_file import Written, shared, withdraw, write
+from .shared_file import PIECE, Written, shared, withdraw, write
 
-__all__ = ["Range", "Unfinished", "alone"]
+__all__ = ["Range", "Shards", "Unfinished", "alone"]
 
-#: Bytes of which the disk holds two copies while the output is put together and has no room for more.
-CHUNK = 1 << 26
-#: Bytes that are read at once.
-PIECE = 1 << 20
+#: Bytes that move while the output is put together before a line says so: no more are made again after a kill.
+CHUNK = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,17 @@ class Range:
     sha256: str
     partial: int
     partial_sha256: str
+
+
+class Shards(NamedTuple):
+    """Files in which an output is divided. Of each the first of its records and the one after its last are given."""
+
+    #: End of their names, and about how many bytes each has.
+    kind: str
+    most: int
+    #: What precedes and what follows the records, and what the manifest says of them.
+    frame: Callable[[int, int], tuple[bytes, bytes]]
+    of: Callable[[int, int], dict[str, Any]]
 
 
 class Unfinished:
@@ -78,9 +88,10 @@ class Unfinished:
             if new or not read:
                 self._lines.truncate(0)
                 read = []
-                for name in ("data", "partials", "whole"):
+                for name in ("data", "partials"):
                     with suppress(FileNotFoundError):
                         os.remove(self.name(name))
+                shutil.rmtree(self.name("shards"), ignore_errors=True)
             else:
                 self._same(read[0])
             self.ranges = [Range(**line) for line in read[1:] if "number" in line]
@@ -127,11 +138,16 @@ class Unfinished:
         """Where a range begins in ``partials``."""
         return sum(r.partial for r in self.ranges[:number])
 
+    @property
+    def moved(self) -> int:
+        """The number of ranges that have left their place in ``data`` for that in the output."""
+        return self.stage[-1].get("moved", len(self.ranges)) if self.stage else 0
+
     def damaged(self) -> list[int]:
-        """The numbers of the ranges that are not what their checksums say."""
+        """The numbers of the ranges, of those that have not moved, that are not what their checksums say."""
         wrong = []
-        place, partial_place = self.first, 0
-        for r in self.ranges:
+        place, partial_place = self.place(self.moved), self.partial_place(self.moved)
+        for r in self.ranges[self.moved :]:
             whole = _digest(self._data, place, r.bytes) == r.sha256
             if not whole or _digest(self._partials, partial_place, r.partial) != r.partial_sha256:
                 wrong.append(r.number)
@@ -176,86 +192,85 @@ class Unfinished:
         self.stage.append(line)
 
     def keep(self, kept: list[tuple[int, int]], size: int, header: bytes, tail: bytes = b"") -> None:
-        """Makes the output of the ``kept`` ranges of records of ``size`` bytes, by their numbers, and of what comes before and
-        after them: of ``data`` itself if these are all, else in the file ``whole``.
+        """Makes the output of ``data``: the ``kept`` ranges of records of ``size`` bytes, by their numbers, in a row, and
+        what comes before and after them.
 
-        From the last one to the first: when the disk has no room for both files, what is written is cut off ``data``. Killed at
-        any point, it goes on from there.
+        What stays moves to its place in ``data`` itself, first record first, so that the disk holds it once. Killed at any
+        point, it goes on from the last line that says how far it was: what stood where others have moved to since is damaged,
+        and made again.
         """
         if self.stage and "done" in self.stage[-1]:
             return
-        count = (self.length - self.first) // size
-        end = self.first + size * sum(b - a for a, b in kept)
-        name = "data" if end == self.length else "whole"
-        if name == "whole":
-            # The parts of an earlier run are gone on with as they were divided.
-            most = self.stage[0]["most"] if self.stage else max(CHUNK // size, 1)
-            bounds = [*range(0, count, most), count]
-            self._copy(_cut(kept, bounds), bounds, size, end)
-        with open(self.name(name), "r+b", 0) as file:
-            file.truncate(end)
-            write(file, 0, header)
-            write(file, end, tail)
-            os.fsync(file.fileno())  # what it was made of goes next
-        self._staged({"done": name})
+        end = self._move(kept, size)
+        self._data.truncate(end)
+        write(self._data, 0, header)
+        write(self._data, end, tail)
+        os.fsync(self._data.fileno())  # what it was made of goes next
+        self._staged({"done": "data"})
 
-    def _copy(self, parts: list[list[tuple[int, int]]], bounds: list[int], size: int, end: int) -> None:
-        """Writes records, those of each part between two bounds, to the file ``whole`` so that the last one is at its end."""
-        begin = self.stage[-1]["part"] if self.stage else len(parts)
-        with open(os.open(self.name("whole"), os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0) as whole:
-            for n in range(len(parts) - 1, -1, -1):
-                place = end = end - size * sum(b - a for a, b in parts[n])
-                if n >= begin:  # it is there
-                    continue
-                for a, b in parts[n]:
-                    for chunk in _chunks(self._data, self.first + a * size, (b - a) * size):
-                        write(whole, place, chunk)
-                        place += len(chunk)
-                if shutil.disk_usage(self.folder).free < end + 2 * CHUNK:
-                    os.fsync(whole.fileno())
-                    self._staged({"part": n, "most": bounds[1]})
-                    self._data.truncate(self.first + bounds[n] * size)
+    def _move(self, kept: list[tuple[int, int]], size: int) -> int:
+        """Moves the records that stay to their place, and gives the end of the last one."""
+        bounds = list(accumulate((r.bytes // size for r in self.ranges), initial=0))
+        place, begin, since = self.first, self.moved, 0
+        for n, own in enumerate(_cut(kept, bounds)):
+            for a, b in own:
+                source, length = self.first + a * size, (b - a) * size
+                if n >= begin and source != place:
+                    move(self._data, source, place, length)
+                    since += length
+                place += length
+            last = n + 1 == len(self.ranges)
+            if since >= CHUNK or (last and since):
+                os.fsync(self._data.fileno())  # before the line
+                self._staged({"moved": n + 1})
+                since = 0
+        return place
 
-    def split(
-        self, kept: list[tuple[int, int]], size: int, header: Callable[[int], bytes], most: int, about: dict[str, Any]
-    ) -> None:
-        """Writes the ``kept`` ranges of records of ``size`` bytes to files of about ``most`` bytes, each of whole ranges and
-        with the ``header`` of its number of records, and ``manifest.json`` with ``about`` and the name, records, bytes
-        and SHA-256 of each, all in the folder ``shards``.
+    def split(self, kept: list[tuple[int, int]], size: int, shards: Shards, about: dict[str, Any]) -> list[dict[str, Any]]:
+        """Writes the ``kept`` ranges of records of ``size`` bytes to files, each of whole ranges, and ``manifest.json`` with
+        ``about`` and the name, records, bytes and SHA-256 of each, all in the folder ``shards``; gives what it says of each.
 
         From the last one to the first: what is written is cut off ``data``, so that the disk holds it once. Killed at any
         point, it goes on from there.
         """
-        if self.stage and "done" in self.stage[-1]:
-            return
-        os.makedirs(self.name("shards"), exist_ok=True)
-        bounds, at = [0], 0
-        for r in self.ranges:
-            at += r.bytes
-            if at - bounds[-1] >= most:
-                bounds.append(at)
-        bounds += [at] if at > bounds[-1] else []
-        parts = _cut(kept, [bound // size for bound in bounds])
-        for n in range(len(parts) - 1 - len(self.stage), -1, -1):
-            own = parts[n]
-            count = sum(b - a for a, b in own)
-            name = f"{n:05d}.stl"
-            digest = hashlib.sha256(header(count))
-            with open(os.path.join(self.name("shards"), name), "wb") as file:
-                file.write(header(count))
-                for a, b in own:
-                    for chunk in _chunks(self._data, self.first + a * size, (b - a) * size):
-                        digest.update(chunk)
-                        file.write(chunk)
-                file.flush()
-                os.fsync(file.fileno())
-            length = len(header(count)) + count * size
-            self._staged({"file": name, "triangles": count, "bytes": length, "sha256": digest.hexdigest()})
-            self._data.truncate(self.first + bounds[n])
-        manifest = about | {"shards": self.stage[::-1]}
-        with open(os.path.join(self.name("shards"), "manifest.json"), "w", encoding="utf-8", newline="\n") as file:
-            file.write(json.dumps(manifest, indent=2) + "\n")
-        self._staged({"done": "shards"})
+        if not (self.stage and "done" in self.stage[-1]):
+            os.makedirs(self.name("shards"), exist_ok=True)
+            bounds, at = [0], 0
+            for r in self.ranges:
+                at += r.bytes
+                if at - bounds[-1] >= shards.most:
+                    bounds.append(at)
+            bounds += [at] if at > bounds[-1] else []
+            parts = _cut(kept, [bound // size for bound in bounds])
+            first = list(accumulate((sum(b - a for a, b in own) for own in parts), initial=0))
+            for n in range(len(parts) - 1 - len(self.stage), -1, -1):
+                self._staged(self._shard(f"{n:05d}.{shards.kind}", parts[n], size, shards, first[n : n + 2]))
+                self._data.truncate(self.first + bounds[n])
+            manifest = about | {"shards": self.stage[::-1]}
+            with open(os.path.join(self.name("shards"), "manifest.json"), "w", encoding="utf-8", newline="\n") as file:
+                file.write(json.dumps(manifest, indent=2) + "\n")
+            self._staged({"done": "shards"})
+        return self.stage[-2::-1]
+
+    def _shard(self, name: str, own: list[tuple[int, int]], size: int, shards: Shards, ends: list[int]) -> dict[str, Any]:
+        """Writes one of the files; what the manifest says of it."""
+        head, tail = shards.frame(*ends)
+        digest, length = hashlib.sha256(), 0
+        with open(os.path.join(self.name("shards"), name), "wb") as file:
+
+            def put(content: bytes | memoryview) -> None:
+                nonlocal length
+                digest.update(content)
+                length += file.write(content)
+
+            put(head)
+            for a, b in own:
+                for piece in _pieces(self._data, self.first + a * size, (b - a) * size):
+                    put(piece)
+            put(tail)
+            file.flush()
+            os.fsync(file.fileno())
+        return {"file": name, **shards.of(*ends), "bytes": length, "sha256": digest.hexdigest()}
 
     def finish(self) -> None:
         """Gives what is made the name of the output, and takes the folder away."""
@@ -299,20 +314,29 @@ def _sha256(data: bytes) -> str:
 def _digest(file: Any, place: int, length: int) -> str:
     """The SHA-256 of a part of a file; of less if it ends before."""
     digest = hashlib.sha256()
-    for chunk in _chunks(file, place, length):
-        digest.update(chunk)
+    for piece in _pieces(file, place, length):
+        digest.update(piece)
     return digest.hexdigest()
 
 
-def _chunks(file: Any, place: int, length: int) -> Iterator[bytes]:
-    """A part of a file, piece by piece; less if it ends before."""
-    file.seek(place)
-    while length > 0:
-        chunk = file.read(min(length, PIECE))
-        if not chunk:
+def _pieces(file: Any, place: int, length: int) -> Iterator[memoryview]:
+    """A part of a file, piece by piece, each good until the next one; less if it ends before."""
+    buffer = memoryview(bytearray(min(length, PIECE)))
+    end = place + length
+    while place < end:
+        file.seek(place)  # whoever takes a piece may have moved it
+        count = file.readinto(buffer[: end - place])
+        if not count:
             return
-        yield chunk
-        length -= len(chunk)
+        yield buffer[:count]
+        place += count
+
+
+def move(file: Any, source: int, place: int, length: int) -> None:
+    """Moves a part of a file to a place before it."""
+    for piece in _pieces(file, source, length):
+        write(file, place, piece)
+        place += len(piece)
 
 
 def alone(file: Any, place: str) -> None:

@@ -1,22 +1,15 @@
-//! Layers of a solid: contours as arrays, and files for machines.
+//! Layers of a solid: contours as arrays.
 
-use std::io::BufWriter;
-use std::path::PathBuf;
-
-use geometry::formats::{Encoded, LAYER_FORMATS, LayerFormat, Raster, Stack};
+use geometry::formats::LAYER_FORMATS;
 use geometry::layer::Layer;
 use geometry::math::Aabb;
-use geometry::progress::{Cancellation, Stopped};
+use geometry::progress::Cancellation;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use trabecula::layers::{Adaptive, Plan, Slicer};
-use trabecula::report::LayersReport;
 
 use crate::error;
-use crate::file;
-use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
 
@@ -26,8 +19,8 @@ type Section<'py> = (f64, f64, f64, Vec<Bound<'py, PyArray2<f64>>>, f64);
 /// A solid that is ready to be sliced.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Layers {
-    slicer: Slicer,
-    bounds: Aabb,
+    pub slicer: Slicer,
+    pub bounds: Aabb,
 }
 
 fn section<'py>(py: Python<'py>, layer: &Layer) -> PyResult<Section<'py>> {
@@ -89,52 +82,6 @@ impl Layers {
     /// The section at a height, mm.
     fn at<'py>(&self, py: Python<'py>, z: f64) -> PyResult<Section<'py>> {
         section(py, &run(py, None, None, |_| self.slicer.at(z))?)
-    }
-
-    /// Writes all layers to a file, given as path, suffix and title; `pixel` is the edge of a pixel (mm), its numbers along x and
-    /// y and the lower left corner. Gives its `reports.LayersReport`.
-    #[pyo3(signature = (file, binary=false, pixel=None, exposure=[8.0, 35.0], threads=None, progress=None))]
-    #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
-    fn save<'py>(
-        &self,
-        py: Python<'py>,
-        file: (PathBuf, String, String),
-        binary: bool,
-        pixel: Option<(f64, [usize; 2], [f64; 2])>,
-        exposure: [f64; 2],
-        threads: Option<usize>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let (path, suffix, title) = file;
-        let format = LayerFormat::of(&suffix)
-            .ok_or_else(|| PyValueError::new_err(format!("no format of layers is named {suffix}")))?;
-        let stack = Stack {
-            heights: self.slicer.heights().to_vec(),
-            bounds: self.bounds,
-            title,
-            application: format!("Trabecula {}", env!("CARGO_PKG_VERSION")),
-            binary,
-            raster: pixel.map(|(pixel, size, origin)| Raster { origin, pixel, size }),
-            exposure,
-        };
-        let made = run(py, threads, progress, |p| {
-            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path).map_err(Stopped::Io)?);
-            let mut aside = file::nameless(&path, ".1").map_err(Stopped::Io)?;
-            let mut writer = (format.open)(&stack, &mut out, &mut aside).map_err(Stopped::Io)?;
-            let mut total = LayersReport::default();
-            let encode = |index: usize, layer: &Layer| {
-                let encoded = (format.encode)(&stack, index, layer);
-                (LayersReport::from(layer), layer.area(), encoded)
-            };
-            let take = |(figures, area, encoded): (LayersReport, f64, std::io::Result<Encoded>)| {
-                total.add(&figures);
-                encoded.and_then(|e| writer.put(e, area)).map_err(Stopped::Io)
-            };
-            self.slicer.each(p, encode, take)?;
-            writer.finish().map_err(Stopped::Io)?;
-            Ok(total)
-        })?;
-        report(py, "LayersReport", &made.map_err(error::stopped)?)
     }
 }
 

@@ -12,6 +12,7 @@ mod fe_arrays;
 mod file;
 mod folder;
 mod lattice_terms;
+mod layer_ranges;
 mod layers;
 mod machine;
 mod mesh;
@@ -75,6 +76,8 @@ mod _core {
     use crate::effective::Cell;
     #[pymodule_export]
     use crate::lattice_terms::{LatticeTerms, formula_terms, lattice_terms};
+    #[pymodule_export]
+    use crate::layer_ranges::LayerRanges;
     #[pymodule_export]
     use crate::layers::Layers;
     #[pymodule_export]

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use geometry::formats::{npy_head, stl, vti_frame};
+use geometry::formats::{npy_head, pvti, stl, vti_frame};
 use geometry::progress::{Progress, Silent, Stopped};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,7 +21,7 @@ use crate::solid::{Measured, Solid, islands_word, measured};
 type Range<'py> = (usize, usize, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
 /// Calls `take` with a range; what it raises is put aside and ends the work.
-fn hand_over(
+pub fn hand_over(
     take: &Py<PyAny>,
     raised: &Mutex<Option<PyErr>>,
     range: (usize, usize, &[u8], &[u8]),
@@ -39,7 +39,7 @@ fn hand_over(
 }
 
 /// What the work ended with, if nothing was raised.
-fn ended(raised: Mutex<Option<PyErr>>, made: Result<(), Stopped>) -> PyResult<()> {
+pub fn ended(raised: Mutex<Option<PyErr>>, made: Result<(), Stopped>) -> PyResult<()> {
     match raised.into_inner().ok().flatten() {
         Some(e) => Err(e),
         None => made.map_err(error::stopped),
@@ -132,13 +132,20 @@ impl VoxelRanges {
         self.grid.origin
     }
 
-    /// What precedes and what follows the voxels in a file, `npy` or `vti`.
-    fn frame<'py>(&self, py: Python<'py>, extension: &str) -> [Bound<'py, PyBytes>; 2] {
+    /// What precedes and what follows the voxels of the layers from `start` to before `end` in a file, `npy` or `vti`.
+    fn frame<'py>(&self, py: Python<'py>, extension: &str, start: usize, end: usize) -> [Bound<'py, PyBytes>; 2] {
+        let (VoxelGrid { origin, step, shape, .. }, layers) = (&self.grid, start..end.max(start));
         let [head, tail] = match extension {
-            "npy" => [npy_head(self.grid.shape), Vec::new()],
-            _ => vti_frame(self.grid.origin, self.grid.step, self.grid.shape),
+            "npy" => [npy_head([shape[0], shape[1], layers.len()]), Vec::new()],
+            _ => vti_frame(*origin, *step, *shape, layers),
         };
         [PyBytes::new(py, &head), PyBytes::new(py, &tail)]
+    }
+
+    /// The file (PVTI) by which programs open files of layers as one: their names, first layers and those after their last ones.
+    fn index(&self, files: Vec<(String, usize, usize)>) -> String {
+        let files: Vec<_> = files.into_iter().map(|(name, start, end)| (name, start..end)).collect();
+        pvti(self.grid.origin, self.grid.step, self.grid.shape, &files)
     }
 
     /// As `TileRanges.each`, of layers: their voxels, x fastest, and the number of those that are solid as eight bytes, the lowest first.

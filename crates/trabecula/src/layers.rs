@@ -16,6 +16,8 @@ mod plane_grid;
 mod rings;
 mod roots;
 
+use std::ops::Range;
+
 use geometry::fault::{Fault, number};
 use geometry::layer::Layer;
 use geometry::progress::{Cancellation, Progress, Stopped, checkpoint};
@@ -227,27 +229,29 @@ impl Slicer {
         rings
     }
 
-    /// Makes all layers, maps each with its number by `map` on its thread and passes the results to `take` in order. A few layers
+    /// Makes some layers, maps each with its number by `map` on its thread and passes the results to `take` in order. A few layers
     /// a thread are held at a time.
     ///
     /// # Errors
     /// What `take` reports; `Interrupted` if the progress asks for it.
     pub fn each<T: Send>(
         &self,
+        layers: Range<usize>,
         progress: &dyn Progress,
         map: impl Fn(usize, &Layer) -> T + Sync,
         mut take: impl FnMut(T) -> Result<(), Stopped>,
     ) -> Result<(), Stopped> {
-        let total = self.len();
+        let (start, end) = (layers.start, layers.end.min(self.len()));
+        let total = end.saturating_sub(start) as u64;
         let batch = 2 * rayon::current_num_threads();
         let request = Cancellation::current();
-        for first in (0..total).step_by(batch) {
+        for first in (start..end).step_by(batch) {
             let made =
-                (first..total.min(first + batch)).into_par_iter().map(|i| request.enter(|| map(i, &self.layer(i))));
+                (first..end.min(first + batch)).into_par_iter().map(|i| request.enter(|| map(i, &self.layer(i))));
             let made: Vec<T> = made.collect();
-            let done = (first + made.len()) as u64;
+            let done = (first - start + made.len()) as u64;
             made.into_iter().try_for_each(&mut take)?;
-            if !progress.step(done, total as u64) {
+            if !progress.step(done, total) {
                 return Err(Stopped::Interrupted);
             }
         }

@@ -30,7 +30,7 @@ fn layers(solid: &Solid, plan: &Plan) -> Vec<Layer> {
         out.push(l);
         Ok(())
     };
-    slicer.each(&Silent, |_, l| l.clone(), take).expect("layers");
+    slicer.each(0..slicer.len(), &Silent, |_, l| l.clone(), take).expect("layers");
     out
 }
 

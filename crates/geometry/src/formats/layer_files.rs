@@ -57,6 +57,27 @@ pub enum Encoded {
     Deflated(Piece),
 }
 
+impl Encoded {
+    /// Its bytes, and what they do not say of a deflated piece.
+    pub fn into_parts(self) -> (Vec<u8>, Option<[u64; 2]>) {
+        match self {
+            Encoded::Bytes(bytes) => (bytes, None),
+            Encoded::Deflated(piece) => {
+                let (bytes, about) = piece.into_parts();
+                (bytes, Some(about))
+            }
+        }
+    }
+
+    /// From what `into_parts` gave.
+    pub fn of_parts(bytes: Vec<u8>, about: Option<[u64; 2]>) -> Encoded {
+        match about {
+            None => Encoded::Bytes(bytes),
+            Some(about) => Encoded::Deflated(Piece::of_parts(bytes, about)),
+        }
+    }
+}
+
 /// Where layers are written.
 pub trait Target: Write + Seek {}
 impl<T: Write + Seek> Target for T {}

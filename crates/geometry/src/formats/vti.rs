@@ -3,6 +3,7 @@
 //! Source: Kitware, VTK File Formats, XML formats.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
 use super::invalid;
 use crate::math::Vec3;
@@ -17,19 +18,21 @@ pub fn write_vti<W: Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
     if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(count) {
         return Err(invalid(format!("a grid of {x} × {y} × {z} does not have {count} voxels")));
     }
-    let [head, tail] = vti_frame(voxels.origin, voxels.step, voxels.shape);
+    let [head, tail] = vti_frame(voxels.origin, voxels.step, voxels.shape, 0..z);
     out.write_all(&head)?;
     out.write_all(&voxels.solid)?;
     out.write_all(&tail)
 }
 
-/// What precedes and what follows the voxels in such a file: origin and step in mm, numbers of voxels along x, y, z.
-pub fn vti_frame([ox, oy, oz]: Vec3, step: f64, [x, y, z]: [usize; 3]) -> [Vec<u8>; 2] {
+/// What precedes and what follows the voxels of some layers in such a file: origin (of all layers) and step in mm, numbers of voxels
+/// along x, y, z.
+pub fn vti_frame([ox, oy, oz]: Vec3, step: f64, [x, y, _]: [usize; 3], layers: Range<usize>) -> [Vec<u8>; 2] {
+    let Range { start, end } = layers;
     let mut head = format!(
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
-<ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{ox} {oy} {oz}" Spacing="{step} {step} {step}">
-<Piece Extent="0 {x} 0 {y} 0 {z}">
+<ImageData WholeExtent="0 {x} 0 {y} {start} {end}" Origin="{ox} {oy} {oz}" Spacing="{step} {step} {step}">
+<Piece Extent="0 {x} 0 {y} {start} {end}">
 <CellData Scalars="solid">
 <DataArray type="UInt8" Name="solid" format="appended" offset="0"/>
 </CellData>
@@ -39,8 +42,25 @@ pub fn vti_frame([ox, oy, oz]: Vec3, step: f64, [x, y, z]: [usize; 3]) -> [Vec<u
 _"#
     )
     .into_bytes();
-    head.extend(([x, y, z].iter().map(|n| *n as u64).product::<u64>()).to_le_bytes());
+    head.extend(([x, y, end - start].iter().map(|n| *n as u64).product::<u64>()).to_le_bytes());
     [head, b"\n</AppendedData>\n</VTKFile>\n".to_vec()]
+}
+
+/// The file (PVTI) by which programs open several such files of layers as one: their names and layers.
+pub fn pvti([ox, oy, oz]: Vec3, step: f64, [x, y, z]: [usize; 3], files: &[(String, Range<usize>)]) -> String {
+    let mut text = format!(
+        r#"<?xml version="1.0"?>
+<VTKFile type="PImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<PImageData WholeExtent="0 {x} 0 {y} 0 {z}" GhostLevel="0" Origin="{ox} {oy} {oz}" Spacing="{step} {step} {step}">
+<PCellData Scalars="solid">
+<PDataArray type="UInt8" Name="solid"/>
+</PCellData>
+"#
+    );
+    for (name, Range { start, end }) in files {
+        text.push_str(&format!("<Piece Extent=\"0 {x} 0 {y} {start} {end}\" Source=\"{name}\"/>\n"));
+    }
+    text + "</PImageData>\n</VTKFile>\n"
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use flate2::Crc;
+use crc32fast::Hasher;
 
 use super::Aside;
 
@@ -22,16 +22,26 @@ const DATE: u16 = 0x21;
 /// A piece of an entry, deflated so that pieces can be put one after the other.
 pub struct Piece {
     bytes: Vec<u8>,
-    crc: Crc,
+    crc: Hasher,
     size: u64,
 }
 
 impl Piece {
     /// Deflates text, best of rows of one pattern.
     pub fn of(text: &[u8]) -> Piece {
-        let mut crc = Crc::new();
+        let mut crc = Hasher::new();
         crc.update(text);
         Piece { bytes: super::deflate::rows(text), crc, size: text.len() as u64 }
+    }
+
+    /// Its bytes, and the CRC-32 and number of those of the text.
+    pub fn into_parts(self) -> (Vec<u8>, [u64; 2]) {
+        (self.bytes, [u64::from(self.crc.finalize()), self.size])
+    }
+
+    /// From what `into_parts` gave.
+    pub fn of_parts(bytes: Vec<u8>, [crc, size]: [u64; 2]) -> Piece {
+        Piece { bytes, crc: Hasher::new_with_initial_len(crc as u32, size), size }
     }
 }
 
@@ -39,7 +49,7 @@ impl Piece {
 pub struct Entry<'a> {
     name: &'static str,
     pieces: &'a mut dyn Aside,
-    crc: Crc,
+    crc: Hasher,
     size: u64,
     /// Bytes in the archive: the pieces and the two that end the stream.
     packed: u64,
@@ -48,13 +58,12 @@ pub struct Entry<'a> {
 impl<'a> Entry<'a> {
     /// An empty file, whose pieces are put aside in `pieces`.
     pub fn new(name: &'static str, pieces: &'a mut dyn Aside) -> Self {
-        Entry { name, pieces, crc: Crc::new(), size: 0, packed: FINAL.len() as u64 }
+        Entry { name, pieces, crc: Hasher::new(), size: 0, packed: FINAL.len() as u64 }
     }
 
     /// The same file, for a shorter time: one that others with pieces elsewhere can stand in a row with.
     pub fn lent(&mut self) -> Entry<'_> {
-        let mut crc = Crc::new();
-        crc.combine(&self.crc);
+        let crc = self.crc.clone();
         Entry { name: self.name, pieces: &mut *self.pieces, crc, size: self.size, packed: self.packed }
     }
 
@@ -101,7 +110,7 @@ pub fn write(entries: &mut [Entry], limit: u64, out: &mut dyn Write) -> io::Resu
         let wide = e.size >= limit || packed >= limit || at >= limit;
         let version = if wide { 45 } else { 20 };
         let fields = |r: &mut Record| {
-            r.two(version).two(0).two(8).two(0).two(DATE).raw(e.crc.sum());
+            r.two(version).two(0).two(8).two(0).two(DATE).raw(e.crc.clone().finalize());
             let cap = if wide { 0 } else { u64::MAX };
             r.four(packed, cap).four(e.size, cap).two(name.len());
         };
