@@ -1,10 +1,9 @@
 use super::super::judged::compared;
 use super::super::phase_grid::Grid;
-use super::super::poisson::Poisson;
 use super::*;
 use crate::grade::{Formula, Linear};
 use crate::map::Affine;
-use geometry::math::{rotation, sub};
+use geometry::math::sub;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
