@@ -160,7 +160,7 @@ def test_the_mean_of_oriented_stiffness_is_between_the_bounds_of_the_isotropic_o
     assert (voigt >= moduli["young"] / (2 * (1 + moduli["poisson"])) * (1 - 1e-9)).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_axes_and_stiffness_turn_with_the_mesh(seed, tmp_path):
     meshio = pytest.importorskip("meshio")
     rng = np.random.default_rng(seed)
@@ -171,7 +171,7 @@ def test_axes_and_stiffness_turn_with_the_mesh(seed, tmp_path):
     for name, places in (("as_it_is", nodes), ("turned", nodes @ q.T)):
         meshio.write_points_cells(tmp_path / f"{name}.vtu", places, [("tetra", mesh.tets)])
         core = lt.Lattice(lt.cell.tet("diamond"), "lower", lt.map.tets(path=str(tmp_path / f"{name}.vtu")), {"fraction": 0.3})
-        found.append(lt.Design(lt.region.sphere(radius=40), core).build().carrier().stiffness(n=16))
+        found.append(lt.Design(lt.region.sphere(radius=16), core).build().carrier().stiffness(n=8))
     assert max(np.abs(turned(a, q) - b).max() for a, b in zip(*found, strict=True)) < 1e-9
 
 

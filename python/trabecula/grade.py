@@ -143,13 +143,15 @@ def sigmoid(of: float | dict, width: float, at: float | None = None) -> dict:
 
 
 @named
-def region(of: dict, width: float) -> dict:
+def region(of: dict, width: float, remap: Stops | None = None) -> dict:
     """1 inside a region and 0 outside, with a smooth step at its surface.
 
     of: The region.
     width: Width of the step, half of it on either side of the surface. [mm, above 0]
+    remap: The values that the numbers map to: pairs [number, value], number rising, linear between: [[0, outside], [1,
+        inside]]. [optional]
     """
-    return {"region": settings(of=of, width=width)}
+    return {"region": settings(of=of, width=width, remap=pairs(remap))}
 
 
 @named

@@ -1251,6 +1251,8 @@ class TilingReport(Report):
     """The mesh."""
     method: str
     """How its surface is made: explicit, in each tetrahedron apart, or implicit, on a grid over the part."""
+    method_reason: str | None
+    """Why it is made on a grid, with the place if it is for one; None where it is not."""
     net: NetReport | None
     """What the net covers; None without one."""
     overlap: float

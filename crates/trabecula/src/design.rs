@@ -159,8 +159,8 @@ pub struct Tiled {
     pub explicit: bool,
     /// Why it is made on a grid, where it is.
     pub on_grid: Option<String>,
-    /// The solid fraction that the surface of the part is to have on a grid, where that is known.
-    aim: Option<f64>,
+    /// The solid fraction that the surface of the part is to have on a grid, where that is known, and how far it may be off.
+    aim: Option<[f64; 2]>,
     /// How it ends at the part's surface.
     pub ends: Ends,
     /// The least and the greatest radius of the net's rods, or of rounded ends, mm.

@@ -28,6 +28,9 @@ use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
 
+/// By how much a solid fraction that is found by samples may be off.
+const SAMPLED: f64 = 1e-3;
+
 /// A tetrahedral mesh that the part is made of, and the lattice in it.
 pub(super) struct Domain<'a> {
     pub name: &'a str,
@@ -248,8 +251,8 @@ pub(super) struct Made {
     pub alone: bool,
     /// Why its surface is made on a grid, if it is.
     pub on_grid: Option<String>,
-    /// The solid fraction of the finished part, where it is to have one or is known to.
-    pub aim: Option<f64>,
+    /// The solid fraction of the finished part, where it is to have one or has one by samples, and how far that may be off.
+    pub aim: Option<[f64; 2]>,
     /// The zones, if they have cells of their own.
     pub zones: Vec<CellZone>,
     /// Which zones join, if there are any and it can be predicted.
@@ -368,7 +371,8 @@ fn made(
         _ => finish.made(tiling, asked, whole)?,
     };
     // Skins and keep zones are counted in a fraction of the whole part alone.
-    let aim = asked.or(done.fraction).filter(|_| environment.filled.is_empty() || asked.is_some() && whole);
+    let aim = asked.map(|share| [share, 0.0]).or(done.fraction.map(|share| [share, SAMPLED]));
+    let aim = aim.filter(|_| environment.filled.is_empty() || asked.is_some() && whole);
     Ok(Made { done, alone, on_grid, aim, zones: Vec::new(), joins: None })
 }
 

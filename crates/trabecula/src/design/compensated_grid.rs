@@ -37,8 +37,8 @@ pub(super) type Moves = Mutex<HashMap<u64, f64>>;
 /// The surface of a lattice over tetrahedra on a grid.
 pub(super) struct CompensatedGrid<'a>(pub &'a Built);
 
-/// The lattice of a design whose surface is one, and the solid fraction that the part is to have.
-pub(super) fn aimed(built: &Built) -> Option<(&Tiled, f64)> {
+/// The lattice of a design whose surface is one, the solid fraction that the part is to have, and how far that may be off.
+pub(super) fn aimed(built: &Built) -> Option<(&Tiled, [f64; 2])> {
     match &built.tilings[..] {
         [only] if !only.explicit && built.blend.is_none() => only.aim.map(|aim| (only, aim)),
         _ => None,
@@ -74,7 +74,12 @@ fn at(built: &Built, tiled: &Tiled, by: f64) -> Solid {
 }
 
 /// By how much the level is to be moved in steps of this length (mm); not at all where nothing can be measured.
-fn found(built: &Built, (tiled, aim): (&Tiled, f64), step: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
+fn found(
+    built: &Built,
+    (tiled, [aim, off]): (&Tiled, [f64; 2]),
+    step: f64,
+    progress: &dyn Progress,
+) -> Result<f64, Stopped> {
     let share = |k: usize| k as f64 / (ROUNDS + 1) as f64;
     let stage = |k: usize| Stage { whole: progress, from: share(k), to: share(k + 1) };
     let all = region_volume(&built.solid.region, 0.0, &stage(0))?;
@@ -100,7 +105,7 @@ fn found(built: &Built, (tiled, aim): (&Tiled, f64), step: f64, progress: &dyn P
         if missing.abs() < best.0 {
             best = (missing.abs(), by);
         }
-        if missing.abs() < NEAR * aim * all || rate <= 0.0 {
+        if missing.abs() < (NEAR * aim).max(off) * all || rate <= 0.0 {
             break;
         }
         if let Some([b, v]) = last {

@@ -46,7 +46,7 @@ fn off(built: &Built, asked: f64, steps: f64) -> f64 {
 #[test]
 fn a_surface_on_a_grid_has_the_volume_asked_for() {
     let mut some = Random(240);
-    for case in 0..cases(6) as usize {
+    for case in 0..cases(3) as usize {
         let (cell, part, [low, high]) = CELLS[case % CELLS.len()];
         let (asked, size) = (some.between(low, high), some.between(3.5, 5.0));
         let (region, map) = match case % 3 {
@@ -57,8 +57,9 @@ fn a_surface_on_a_grid_has_the_volume_asked_for() {
         let built = built(&region, cell, part, asked, &map);
         let tiled = &built.tilings[0];
         assert!(!tiled.explicit && tiled.on_grid.is_some(), "{region}");
-        let found = [12.0, 24.0].map(|steps| off(&built, asked, steps));
+        let found = [6.0, 12.0].map(|steps| off(&built, asked, steps));
         println!("{region} {cell} {asked:.3} {map}: {found:.6?}, {:?}", tiled.on_grid);
-        assert!(found.iter().all(|off| off.abs() < 1e-3), "{region} {cell}: {found:?}");
+        // Without the move of the level these are several per cent and about one.
+        assert!(found[0].abs() < 5e-3 && found[1].abs() < 1e-3, "{region} {cell}: {found:?}");
     }
 }
