@@ -9,6 +9,7 @@ for both. Processor seconds are those of the command and all its processes; the 
 """
 
 import argparse
+import csv
 import pathlib
 import resource
 import subprocess
@@ -30,7 +31,7 @@ level.fraction = 0.3
 
 
 def run(python, folder, count, asked):
-    """Seconds and processor seconds of a sweep of twice as many designs, and its table without its times."""
+    """Seconds and processor seconds of a sweep of twice as many designs, and how many have an error."""
     study, table = folder / "study.toml", folder / "table.csv"
     study.write_text(TEXT.format(size=4 * asked.cells, count=count))
     words = ["-m", "trabecula", "sweep", study, "-o", table, "--per-cell", asked.per_cell, "--jobs", asked.jobs, "--quiet"]
@@ -38,9 +39,9 @@ def run(python, folder, count, asked):
     subprocess.run([python, *map(str, words)], check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    seconds, lines = time.perf_counter() - start, table.read_text().splitlines()
-    column = lines[0].split(",").index("error")
-    failed = sum(bool(line.split(",")[column]) for line in lines[1:])
+    seconds = time.perf_counter() - start
+    with open(table, newline="") as file:
+        failed = sum(bool(row["error"]) for row in csv.DictReader(file))
     table.unlink()
     return seconds, busy, failed
 

@@ -55,6 +55,7 @@ pub struct Cell {
     connected: [OnceLock<Vec<[f64; 2]>>; 3],
     necks: [OnceLock<Vec<(Vec3, f64)>>; 3],
     openings: [OnceLock<Openings>; 3],
+    alternates: OnceLock<bool>,
 }
 
 impl Cell {
@@ -71,6 +72,7 @@ impl Cell {
             connected: Default::default(),
             necks: Default::default(),
             openings: Default::default(),
+            alternates: OnceLock::new(),
         }
     }
 

@@ -1,7 +1,9 @@
 //! The level at which the largest ball that passes through the void has a given diameter.
 
+use super::series::Series;
 use super::{Cell, Part, pore};
-use geometry::math::{Mat3, Vec3, scale};
+use geometry::math::{Mat3, Vec3, dot, scale};
+use geometry::once::computed;
 use geometry::progress::checkpoint;
 
 /// Solid fractions between which a level is sought: below and above, cells are specks of solid or void.
@@ -32,7 +34,11 @@ impl Cell {
     /// Diameters (mm) of the largest balls that pass through the void of a part at level `iso`, where u = `to_phase` · x: of a
     /// network the one void, of a sheet f < −iso and f > iso. See `pore`.
     pub fn pores(&self, part: Part, iso: f64, to_phase: &Mat3) -> Vec<f64> {
-        voids(part, iso).into_iter().map(|(side, level)| self.pore(side, level, to_phase)).collect()
+        let voids = voids(part, iso);
+        if part == Part::Sheet && *computed(&self.alternates, || alternates(&self.plain)) {
+            return vec![self.pore(voids[0].0, voids[0].1, to_phase); 2];
+        }
+        voids.into_iter().map(|(side, level)| self.pore(side, level, to_phase)).collect()
     }
 
     /// Diameter (mm) of the largest ball that passes through the void f ≤ `level` (`Lower`) or f ≥ `level` (`Upper`), where phases
@@ -123,6 +129,18 @@ impl Cell {
         }
         Err(if fewest.is_finite() { NoPore::AtLeast(fewest) } else { NoPore::AtMost(most) })
     }
+}
+
+/// Whether a translation or an inversion takes f to −f, and so the void on one side of a sheet to that on the other: of a wave
+/// cos 2π(h·u + p) a translation by s makes h·s half a turn, an inversion that takes 0 to s makes 2p + h·s half a turn.
+fn alternates(series: &Series) -> bool {
+    const PARTS: usize = 8;
+    let half = |turns: f64| (turns.rem_euclid(1.0) - 0.5).abs() < 1e-9;
+    (0..PARTS.pow(3)).any(|k| {
+        let s = [k % PARTS, k / PARTS % PARTS, k / PARTS / PARTS].map(|i| i as f64 / PARTS as f64);
+        let all = |phases: f64| series.terms().iter().all(|t| half(phases * t.phase + dot(t.hkl.map(f64::from), s)));
+        all(0.0) || all(2.0)
+    })
 }
 
 /// The voids of a part at level `iso`: sides of f and levels.
