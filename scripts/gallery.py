@@ -12,8 +12,8 @@ EXAMPLES, PICTURES = ROOT / "examples", ROOT / "docs" / "images" / "gallery"
 STAMP = "<!-- Made by scripts/gallery.py; do not edit. -->"
 #: Pixels of a picture; of one of a tall part, and of a long one.
 WIDE, TALL, LONG = (800, 640), (560, 800), (800, 480)
-#: Example, samples on the smallest wavelength (beams alone are meshed by their own patches), azimuth and elevation of the camera
-#: (degrees), pixels.
+#: Example, samples on the smallest wavelength (none: the usual mesh, of beams alone finer), azimuth and elevation of the
+#: camera (degrees), pixels.
 SHOWN = (
     ("hybrid_stem", 20, 70, 12, TALL),
     ("kelvin_stem", None, 240, 12, TALL),
@@ -58,7 +58,7 @@ def entry(name, per_cell, azimuth, elevation, size):
     pieces = "one piece" if mesh.pieces == 1 else f"{mesh.pieces} pieces"
     count = f"{mesh.counts[1]:,}".replace(",", " ")
     figures = f"{count} triangles, {mesh.volume:.4g} mm³, solid fraction {mesh.solid_fraction:.3f}, {pieces}"
-    fine = f"{per_cell} samples on the smallest wavelength" if per_cell else f"chord error {mesh.chord_error:.2g} mm"
+    fine = f"{per_cell} samples on the smallest wavelength" if per_cell else f"a grid of {solid.spacing():.2g} mm"
     return [
         f"## [{name}.toml](../examples/{name}.toml)",
         "",

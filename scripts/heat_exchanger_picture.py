@@ -25,8 +25,10 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "half.json"
         path.write_text(json.dumps(given), encoding="utf-8")
-        mesh = lt.load(path).build().mesh(edge=0.25)
-    mesh.render(ROOT / "docs" / "images" / "heat_exchanger.png", (900, 720), azimuth=90, elevation=-35)
+        solid = lt.load(path).build()
+    to_scale = {"projection": "orthographic", "scale_bar": True}
+    mesh = solid.mesh(edge=0.25)
+    mesh.render(ROOT / "docs" / "images" / "heat_exchanger.png", (900, 720), azimuth=90, elevation=-35, solid=solid, **to_scale)
 
 
 if __name__ == "__main__":

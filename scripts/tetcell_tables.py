@@ -8,7 +8,7 @@ from trabecula import _core
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated" / "tetcells.md"
 IMAGES = ROOT / "docs" / "images" / "tetcells"
-STEPS = 24
+STEPS = 60
 
 
 def spans(ranges):

@@ -11,8 +11,8 @@ const BATCH: usize = 4096;
 /// Cosine of the angle from a triangle up to which the gradient at a vertex is that of the triangle's side: 20°, more than triangles of a
 /// default mesh turn from their surface.
 const SAME_SIDE: f64 = 0.94;
-/// Cosine of the angle beyond which the field says nothing about a triangle: 45°.
-const UNLIKE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Cosine of the angle beyond which the field says nothing about a triangle: 80°. Facets of a beam that is two grid steps thick turn by 60°.
+const UNLIKE: f64 = 0.17;
 /// How far to the middle of its triangle a corner on a crease is moved, off the crease.
 const INWARDS: f64 = 0.25;
 
