@@ -1,10 +1,15 @@
 //! What is meshed: domains over common surfaces, and whose each surface is.
 
+use std::sync::Arc;
+
 use crate::conforming_tets::Patched;
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::solid::{Solid, Space};
 use geometry::fault::Fault;
+
+/// The length of pieces of creases, as a fraction of the edge of the background's cubes.
+const PIECE: f64 = 0.125;
 
 /// What is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +84,9 @@ impl Domains {
         let filled: Vec<CsgSolid> = if solid.field.is_some() { solid.filled.clone() } else { Vec::new() };
         let lattice = region + filled.iter().map(|b| b.surfaces.len()).sum::<usize>();
         let own = surfaces.len();
+        if let (Some(edge), Some(field), [only]) = (edge, &solid.field, &mut surfaces[lattice..]) {
+            only.creases = Arc::new(field.creases(PIECE * edge));
+        }
         let patched = edge.map(|edge| Patched::of(&mut surfaces, edge, Patched::NARROW)).unwrap_or_default();
         Ok(Domains { names, surfaces, own, patched, trees, region, lattice, filled })
     }
