@@ -41,5 +41,6 @@ mod tiling_curved;
 mod tiling_ends;
 mod tiling_fields;
 mod tiling_net;
+mod volume_angles;
 mod walls;
 mod wavelength;
