@@ -1351,8 +1351,16 @@ class VolumeReport(Report):
     """Volume of the components other than the largest that were left out on request, mm³."""
     max_angle: float
     """Greatest dihedral angle, degrees."""
+    max_angle_p50: float
+    """Median of each tetrahedron's greatest dihedral angle, degrees."""
+    max_angle_p99: float
+    """99th percentile of each tetrahedron's greatest dihedral angle, degrees."""
     min_angle: float
     """Smallest dihedral angle, degrees; of quadratic tetrahedra between the planes of their corners."""
+    min_angle_p01: float
+    """1st percentile of each tetrahedron's smallest dihedral angle, degrees."""
+    min_angle_p50: float
+    """Median of each tetrahedron's smallest dihedral angle, degrees."""
     nodes: int
     """Number of nodes."""
     order: int
@@ -1367,6 +1375,8 @@ class VolumeReport(Report):
     """Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted."""
     volume: float
     """Volume, mm³."""
+    worst: list[float]
+    """The middle of the tetrahedron with the angle nearest to 0 or 180, mm."""
 
 
 class VoxelElementsReport(Report):

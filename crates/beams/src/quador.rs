@@ -45,6 +45,7 @@ mod foot;
 mod gauss;
 mod hub;
 mod hub_classes;
+mod hub_creases;
 mod hub_in_box;
 mod hub_mesh;
 mod hub_quadric;

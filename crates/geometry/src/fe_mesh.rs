@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::math::{Mat3, Vec3, determinant, sub};
+use crate::math::{Mat3, Vec3, add, determinant, scale, sub};
 use crate::tetmesh::{EDGES, FACES, TetMesh, tet_quality::dihedral_cosines};
 
 mod beam_mesh;
@@ -69,6 +69,25 @@ pub struct Pair {
     pub along: [bool; 3],
 }
 
+/// Dihedral angles, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Angles {
+    /// The least of all.
+    pub min: f64,
+    /// The greatest of all.
+    pub max: f64,
+    /// 1 % of the tetrahedra have a smaller least angle.
+    pub min_p01: f64,
+    /// Half of them have.
+    pub min_p50: f64,
+    /// Half of the tetrahedra have a greater greatest angle.
+    pub max_p50: f64,
+    /// 1 % of them have.
+    pub max_p99: f64,
+    /// The middle of the tetrahedron with the angle nearest to 0 or 180 (mm).
+    pub worst: Vec3,
+}
+
 /// The order of the edges' nodes in Abaqus, CalculiX, Nastran and VTK, by indices of `EDGES`.
 pub const MIDDLES: [usize; 6] = [0, 3, 1, 2, 4, 5];
 
@@ -95,16 +114,30 @@ impl FeMesh {
         (-0.8 * self.jacobian(i, [0.25; 4]) + 0.45 * four) / 6.0
     }
 
-    /// The least and greatest dihedral angle (degrees) between the planes of corners.
-    pub fn angles(&self) -> (f64, f64) {
-        let cosines = |t: &[u32; 4]| {
-            let all = dihedral_cosines(t.map(|n| self.nodes[n as usize]));
-            all.iter().fold((1.0f64, -1.0f64), |(lo, hi), c| (lo.min(*c), hi.max(*c)))
-        };
-        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-        let (lo, hi) = self.tets.par_iter().map(cosines).reduce(|| (1.0, -1.0), both);
+    /// The dihedral angles between the planes of corners; `None` without tetrahedra.
+    pub fn angles(&self) -> Option<Angles> {
         let degrees = |c: f64| c.clamp(-1.0, 1.0).acos().to_degrees();
-        (degrees(hi), degrees(lo))
+        let both = |t: &[u32; 4]| {
+            let all = dihedral_cosines(t.map(|n| self.nodes[n as usize]));
+            let (lo, hi) = all.iter().fold((1.0f64, -1.0f64), |(lo, hi), c| (lo.min(*c), hi.max(*c)));
+            (degrees(hi), degrees(lo))
+        };
+        let (mut least, mut most): (Vec<f64>, Vec<f64>) = self.tets.par_iter().map(both).unzip();
+        let off = |i: &usize| least[*i].min(180.0 - most[*i]);
+        let worst = (0..least.len()).min_by(|i, j| off(i).total_cmp(&off(j)))?;
+        least.par_sort_unstable_by(f64::total_cmp);
+        most.par_sort_unstable_by(f64::total_cmp);
+        let at = |of: &[f64], share: f64| of[((of.len() - 1) as f64 * share).round() as usize];
+        let corners = self.tets[worst].map(|n| self.nodes[n as usize]);
+        Some(Angles {
+            min: least[0],
+            max: most[most.len() - 1],
+            min_p01: at(&least, 0.01),
+            min_p50: at(&least, 0.5),
+            max_p50: at(&most, 0.5),
+            max_p99: at(&most, 0.99),
+            worst: scale(corners.into_iter().fold([0.0; 3], add), 0.25),
+        })
     }
 
     /// The ten nodes of a quadratic tetrahedron: corners, edges in the order of `EDGES`.

@@ -29,7 +29,7 @@ pub struct Creases {
 }
 
 /// The least turn of the normal across a crease, radians (10°): below it a rounded edge is off by a twentieth of a step.
-const TURN: f64 = 0.175;
+pub const TURN: f64 = 0.175;
 /// Two creases that meet and turn by more than this, radians (20°), meet in a corner.
 const BEND: f64 = 0.35;
 /// Two that turn by less than this, radians (1°), are pieces of one straight line: rounding turns them by far less, and the

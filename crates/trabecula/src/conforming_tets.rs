@@ -11,6 +11,7 @@ mod boundary_repair;
 mod chord_balance;
 mod crease_nodes;
 mod flips;
+mod mending;
 mod node_surfaces;
 mod partition;
 mod patch_cuts;

@@ -21,6 +21,11 @@ pub trait Implicit: Field {
         false
     }
 
+    /// The creases of the zero set, in pieces about as long as `step` (mm), where they are known.
+    fn creases(&self, _step: f64) -> Creases {
+        Creases::default()
+    }
+
     /// The smooth fields whose maximum this is (their intersection); empty if it is smooth itself.
     fn parts(&self) -> Vec<Arc<dyn Implicit>> {
         Vec::new()

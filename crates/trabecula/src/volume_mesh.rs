@@ -133,8 +133,12 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     if !whole {
         return Err(Stopped::Interrupted);
     }
+    shaping.mend();
     if options.of != Of::All {
         dropped += shaping.shell(false);
+        if shaping.mend() {
+            dropped += shaping.shell(false);
+        }
     }
     let loose = if options.largest && one { keep_largest(&mut shaping) } else { 0.0 };
     if options.order == 1 {

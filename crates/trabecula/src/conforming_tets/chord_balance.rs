@@ -65,8 +65,9 @@ impl Shaping<'_> {
         // (surface, edge) of each face on a curved surface.
         let of = |f: &[u32; 3]| {
             let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
-            // Between the creases of a mesh it is flat, and across them a chord tells nothing.
-            let smooth = |s: usize| self.surfaces[s].plane.is_none() && self.surfaces[s].creases.segments.is_empty();
+            // Between the creases of a mesh, a region's, it is flat, and across them a chord tells nothing.
+            let flat = |s: &Surface| s.plane.is_some() || s.cut && !s.creases.segments.is_empty();
+            let smooth = |s: usize| !flat(&self.surfaces[s]);
             members(set).next().filter(|_| members(set).all(smooth))
         };
         let faces: Vec<([u32; 3], usize)> = faces.par_iter().filter_map(|(f, ..)| of(f).map(|s| (*f, s))).collect();

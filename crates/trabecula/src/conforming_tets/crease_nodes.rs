@@ -6,6 +6,7 @@
 use rustc_hash::FxHashMap;
 
 use super::chord_balance::{distances, interfaces};
+use super::mending::Change;
 use super::node_surfaces::{HELD, SurfaceSet, members, only};
 use super::shaping::Shaping;
 use super::tet_shape::shape;
@@ -195,22 +196,21 @@ impl Shaping<'_> {
         }
         crossed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         for (_, [a, b], to, on) in crossed {
-            self.split_edge([a, b], to, on);
+            self.split_edge([a, b], to, on, LEAST);
         }
     }
 
-    /// Bisects an edge by a node at a position, unless a tetrahedron would be badly shaped.
-    fn split_edge(&mut self, [a, b]: [u32; 2], at: Vec3, on: SurfaceSet) {
-        let gone: Vec<u32> =
-            self.around[a as usize].iter().copied().filter(|t| self.tets[*t as usize].contains(&b)).collect();
+    /// Bisects an edge by a node at a position if shapes are at least `least`; whether it was.
+    pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], at: Vec3, on: SurfaceSet, least: f64) -> bool {
+        let gone = self.at_edge([a, b]);
         let new = self.nodes.len() as u32;
         let (mut made, mut domains) = (Vec::new(), Vec::new());
         for t in &gone {
             for end in [a, b] {
                 let half = self.tets[*t as usize].map(|n| if n == end { new } else { n });
                 let p = half.map(|n| if n == new { at } else { self.nodes[n as usize] });
-                if shape(p) < LEAST {
-                    return;
+                if shape(p) < least {
+                    return false;
                 }
                 made.push(half);
                 domains.push(self.domain[*t as usize]);
@@ -220,6 +220,10 @@ impl Shaping<'_> {
         self.on.push(on);
         self.next.push(new);
         self.around.push(Vec::new());
+        if let Some(changes) = &mut self.changes {
+            changes.push(Change::Added);
+        }
         self.replace_each(&gone, &made, &domains);
+        true
     }
 }

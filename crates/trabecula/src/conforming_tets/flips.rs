@@ -3,6 +3,7 @@
 //!
 //! The triangulation of the ring is optimal by dynamic programming (Klincsek 1980; Freitag, Ollivier-Gooch 1997).
 
+use super::mending::Change;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::partition::SAGITTA;
 use super::shaping::{GONE, Shaping};
@@ -26,22 +27,30 @@ impl Shaping<'_> {
             if old == GONE {
                 continue;
             }
-            let there = |s: &Self| s.tets[t as usize] == old;
-            for [a, b] in EDGES {
-                if there(self) {
-                    changed |= self.remove_edge([old[a], old[b]]);
-                }
+            changed |= self.change_at(t);
+        }
+        changed
+    }
+
+    /// Tries all changes at a tetrahedron until it is gone; whether any was made.
+    pub(super) fn change_at(&mut self, t: u32) -> bool {
+        let old = self.tets[t as usize];
+        let there = |s: &Self| s.tets[t as usize] == old;
+        let mut changed = false;
+        for [a, b] in EDGES {
+            if there(self) {
+                changed |= self.remove_edge([old[a], old[b]], None);
             }
-            for f in FACES {
-                if there(self) {
-                    changed |= self.remove_face(t, f.map(|k| old[k]));
-                }
+        }
+        for f in FACES {
+            if there(self) {
+                changed |= self.remove_face(t, f.map(|k| old[k]), None);
             }
-            for [a, b] in EDGES {
-                for [n, m] in [[a, b], [b, a]] {
-                    if there(self) {
-                        changed |= self.collapse(old[n], old[m]);
-                    }
+        }
+        for [a, b] in EDGES {
+            for [n, m] in [[a, b], [b, a]] {
+                if there(self) {
+                    changed |= self.collapse([old[n], old[m]], None);
                 }
             }
         }
@@ -80,8 +89,8 @@ impl Shaping<'_> {
         left.is_empty().then_some((ring, closed))
     }
 
-    /// Removes an edge by an optimal triangulation of the ring about it, if that improves the worst shape.
-    fn remove_edge(&mut self, [a, b]: [u32; 2]) -> bool {
+    /// Removes an edge by an optimal triangulation of the ring about it, if shapes are better than `bar`; without one, than the worst was.
+    pub(super) fn remove_edge(&mut self, [a, b]: [u32; 2], bar: Option<f64>) -> bool {
         let at = self.at_edge([a, b]);
         if at.is_empty()
             || at.len() >= RING
@@ -97,7 +106,7 @@ impl Shaping<'_> {
             return false;
         }
         let before = at.iter().map(|t| self.shapes[*t as usize]).fold(f64::INFINITY, f64::min);
-        let Some(made) = self.triangulated([a, b], &ring, before * GAIN) else { return false };
+        let Some(made) = self.triangulated([a, b], &ring, bar.unwrap_or(before * GAIN)) else { return false };
         self.replace(&at, &made);
         true
     }
@@ -164,8 +173,9 @@ impl Shaping<'_> {
         Some(made)
     }
 
-    /// Replaces the face of a tetrahedron by an edge between the nodes opposite to it, if that improves the worst shape.
-    fn remove_face(&mut self, t: u32, [a, b, c]: [u32; 3]) -> bool {
+    /// Replaces the face of a tetrahedron by an edge between the nodes opposite to it, if shapes are better than `bar`; without one, than
+    /// the worst was.
+    pub(super) fn remove_face(&mut self, t: u32, [a, b, c]: [u32; 3], bar: Option<f64>) -> bool {
         let has = |o: &&u32| **o != t && [b, c].iter().all(|n| self.tets[**o as usize].contains(n));
         let Some(other) = self.around[a as usize].iter().find(has).copied() else { return false };
         if self.domain[t as usize] != self.domain[other as usize] {
@@ -183,7 +193,7 @@ impl Shaping<'_> {
             |of: &[[u32; 4]]| of.iter().map(|t| shape(t.map(|n| self.nodes[n as usize]))).fold(f64::INFINITY, f64::min);
         let turned = made.map(|[d, e, x, y]| [d, e, y, x]);
         for made in [made, turned] {
-            if worst(&made) > before * GAIN {
+            if worst(&made) > bar.unwrap_or(before * GAIN) {
                 self.replace(&[t, other], &made);
                 return true;
             }
@@ -191,8 +201,8 @@ impl Shaping<'_> {
         false
     }
 
-    /// Collapses the edge from `n` to `m`, onto `m`, if that improves the worst shape at `n`.
-    fn collapse(&mut self, n: u32, m: u32) -> bool {
+    /// Collapses the edge from `n` to `m`, onto `m`, if shapes at `n` are better than `bar`; without one, than the worst was.
+    pub(super) fn collapse(&mut self, [n, m]: [u32; 2], bar: Option<f64>) -> bool {
         let [on_n, on_m] = [n, m].map(|n| self.on[n as usize]);
         if on_n & (!on_m | HELD) != 0 || self.next[n as usize] != n {
             return false;
@@ -209,6 +219,7 @@ impl Shaping<'_> {
         }
         let of = &self.around[n as usize];
         let before = of.iter().map(|t| self.shapes[*t as usize]).fold(f64::INFINITY, f64::min);
+        let bar = bar.unwrap_or(before * GAIN);
         let mut made = Vec::with_capacity(of.len());
         for t in of {
             let t = self.tets[*t as usize];
@@ -216,7 +227,7 @@ impl Shaping<'_> {
                 continue;
             }
             let new = t.map(|k| if k == n { m } else { k });
-            if shape(new.map(|n| self.nodes[n as usize])) <= before * GAIN {
+            if shape(new.map(|n| self.nodes[n as usize])) <= bar {
                 return false;
             }
             made.push(new);
@@ -296,13 +307,10 @@ impl Shaping<'_> {
 
     /// Replaces tetrahedra by others, of these domains; the numbers of those that are gone are used again.
     pub fn replace_each(&mut self, gone: &[u32], made: &[[u32; 4]], domains: &[u8]) {
-        for t in gone {
-            for n in core::mem::replace(&mut self.tets[*t as usize], GONE) {
-                self.around[n as usize].retain(|o| o != t);
-            }
-            self.shapes[*t as usize] = f64::INFINITY;
-        }
-        let mut free = gone.iter().copied();
+        let before = self.changes.is_some().then(|| self.state_of(gone));
+        gone.iter().for_each(|t| self.detach(*t));
+        let (mut free, count) = (gone.iter().copied(), self.tets.len());
+        let mut new = Vec::with_capacity(made.len());
         for (t, domain) in made.iter().zip(domains) {
             let i = free.next().unwrap_or_else(|| {
                 self.tets.push(GONE);
@@ -310,11 +318,27 @@ impl Shaping<'_> {
                 self.shapes.push(0.0);
                 self.tets.len() as u32 - 1
             });
-            self.tets[i as usize] = *t;
-            self.domain[i as usize] = *domain;
-            self.shapes[i as usize] = shape(t.map(|n| self.nodes[n as usize]));
-            t.iter().for_each(|n| self.around[*n as usize].push(i));
+            self.attach(i, *t, *domain);
+            new.push(i);
         }
+        if let (Some(changes), Some(gone)) = (&mut self.changes, before) {
+            changes.push(Change::Replaced { gone, made: new, count });
+        }
+    }
+
+    /// Takes a tetrahedron from its nodes.
+    pub(super) fn detach(&mut self, t: u32) {
+        for n in core::mem::replace(&mut self.tets[t as usize], GONE) {
+            self.around[n as usize].retain(|o| *o != t);
+        }
+        self.shapes[t as usize] = f64::INFINITY;
+    }
+
+    /// Makes a tetrahedron with a number that is free.
+    pub(super) fn attach(&mut self, t: u32, nodes: [u32; 4], domain: u8) {
+        (self.tets[t as usize], self.domain[t as usize]) = (nodes, domain);
+        self.shapes[t as usize] = shape(self.corners(t));
+        nodes.iter().for_each(|n| self.around[*n as usize].push(t));
     }
 }
 

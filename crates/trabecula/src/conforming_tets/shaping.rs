@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::mending::Change;
 use super::node_surfaces::{SurfaceSet, onto, tangent};
 use super::partition::images;
 use super::tet_shape::shape;
@@ -39,6 +40,8 @@ pub(crate) struct Shaping<'a> {
     pub around: Vec<Vec<u32>>,
     /// The shape of each tetrahedron.
     pub shapes: Vec<f64>,
+    /// What was changed while a neighbourhood is being mended.
+    pub(super) changes: Option<Vec<Change>>,
 }
 
 impl<'a> Shaping<'a> {
@@ -54,7 +57,7 @@ impl<'a> Shaping<'a> {
             t.iter().for_each(|n| around[*n as usize].push(i));
         }
         let shapes = tets.par_iter().map(|t| shape(t.map(|n| nodes[n as usize]))).collect();
-        Shaping { surfaces, nodes, on, next, tets, domain, around, shapes }
+        Shaping { surfaces, nodes, on, next, tets, domain, around, shapes, changes: None }
     }
 
     /// Moves nodes, collapses edges and flips until shapes are good or nothing helps; false if `goes_on` was.
@@ -119,19 +122,27 @@ impl<'a> Shaping<'a> {
             for (n, by) in now.into_iter().zip(moves) {
                 if let Some(by) = by {
                     changed = true;
-                    for n in images(&self.next, n) {
-                        self.nodes[n as usize] = add(self.nodes[n as usize], by);
-                    }
-                    for n in images(&self.next, n) {
-                        for t in &self.around[n as usize] {
-                            self.shapes[*t as usize] = shape(self.tets[*t as usize].map(|n| self.nodes[n as usize]));
-                        }
-                    }
+                    self.displace(n, by);
                 }
             }
             left = later;
         }
         changed
+    }
+
+    /// Displaces a node and its images.
+    pub(super) fn displace(&mut self, n: u32, by: Vec3) {
+        for n in images(&self.next, n) {
+            if let Some(changes) = &mut self.changes {
+                changes.push(Change::Moved(n, self.nodes[n as usize]));
+            }
+            self.nodes[n as usize] = add(self.nodes[n as usize], by);
+        }
+        for n in images(&self.next, n) {
+            for t in &self.around[n as usize] {
+                self.shapes[*t as usize] = shape(self.tets[*t as usize].map(|n| self.nodes[n as usize]));
+            }
+        }
     }
 
     /// The worst shape at a node and its images if it is displaced; `None` if it is no better than `bar`.
@@ -151,7 +162,7 @@ impl<'a> Shaping<'a> {
     }
 
     /// The displacement of a node that improves the worst shape at it most, if there is one: of nodes on surfaces along them.
-    fn better(&self, n: u32) -> Option<Vec3> {
+    pub(super) fn better(&self, n: u32) -> Option<Vec3> {
         let (start, on) = (self.nodes[n as usize], self.on[n as usize]);
         let images: Vec<u32> = images(&self.next, n).collect();
         let of = || images.iter().flat_map(|n| self.around[*n as usize].iter().map(|t| (*n, *t)));

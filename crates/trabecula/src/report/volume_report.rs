@@ -29,6 +29,16 @@ pub struct VolumeReport {
     pub min_angle: f64,
     /// Greatest dihedral angle, degrees.
     pub max_angle: f64,
+    /// 1st percentile of each tetrahedron's smallest dihedral angle, degrees.
+    pub min_angle_p01: f64,
+    /// Median of each tetrahedron's smallest dihedral angle, degrees.
+    pub min_angle_p50: f64,
+    /// Median of each tetrahedron's greatest dihedral angle, degrees.
+    pub max_angle_p50: f64,
+    /// 99th percentile of each tetrahedron's greatest dihedral angle, degrees.
+    pub max_angle_p99: f64,
+    /// The middle of the tetrahedron with the angle nearest to 0 or 180, mm.
+    pub worst: [f64; 3],
     /// Number of components connected by faces.
     pub pieces: usize,
     /// Greatest distance of boundary faces from the surface, mm, at their corners, edges and centroids; faces on flat cuts have none.
@@ -215,7 +225,7 @@ impl From<&FeSet> for SetReport {
 impl From<&Made> for VolumeReport {
     fn from(made: &Made) -> VolumeReport {
         let mesh = &made.mesh;
-        let (min_angle, max_angle) = mesh.angles();
+        let angles = mesh.angles().unwrap_or_default();
         let domains = mesh.domains.iter().enumerate().map(|(d, name)| {
             let of: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| mesh.domain[*t as usize] as usize == d).collect();
             let corners = |t: u32| mesh.tets[t as usize].map(|n| mesh.nodes[n as usize]);
@@ -235,8 +245,100 @@ impl From<&Made> for VolumeReport {
             order: if mesh.middles.is_empty() { 1 } else { 2 },
             edge: made.step,
             volume: mesh.volume(),
-            min_angle,
-            max_angle,
+            min_angle: angles.min,
+            max_angle: angles.max,
+            min_angle_p01: angles.min_p01,
+            min_angle_p50: angles.min_p50,
+            max_angle_p50: angles.max_p50,
+            max_angle_p99: angles.max_p99,
+            worst: angles.worst,
+            pieces: made.pieces,
+            length,
+            loose: made.loose,
+            volume,
+            thinnest: range(f64::min),
+            thickest: range(f64::max),
+            sections: mesh.sections().len(),
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
+}
+
+impl ShellReport {
+    /// Of a mesh made at a grid spacing `edge` (mm).
+    pub fn new(made: &shell_mesh::Made, edge: f64) -> ShellReport {
+        let mesh = &made.mesh;
+        let (area, volume) = mesh.size();
+        let range = |least: fn(f64, f64) -> f64| mesh.thickness.iter().copied().reduce(least).unwrap_or(0.0);
+        let corners = Mesh { vertices: mesh.nodes.clone(), triangles: mesh.triangles.clone() };
+        ShellReport {
+            elements: mesh.triangles.len(),
+            nodes: mesh.nodes.len(),
+            order: if mesh.middles.is_empty() { 1 } else { 2 },
+            edge,
+            area,
+            volume,
+            thinnest: range(f64::min),
+            thickest: range(f64::max),
+            min_angle: quality(&corners).map_or(0.0, |q| q.smallest_angle),
+            straight: made.straight,
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
+}
+
+impl From<&HexMesh> for VoxelElementsReport {
+    fn from(mesh: &HexMesh) -> VoxelElementsReport {
+        VoxelElementsReport {
+            elements: mesh.hexes.len(),
+            nodes: mesh.nodes.len(),
+            step: mesh.step,
+            volume: mesh.volume(),
+            least: mesh.fraction.iter().fold(1.0, |m, f| f64::min(m, *f)),
+            dropped: mesh.dropped,
+            sets: mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s))).collect(),
+        }
+    }
+}
+
+impl From<&FeSet> for SetReport {
+    fn from(set: &FeSet) -> SetReport {
+        SetReport { nodes: set.nodes.len(), elements: set.elements.len(), faces: set.faces.len() }
+    }
+}
+
+impl From<&Made> for VolumeReport {
+    fn from(made: &Made) -> VolumeReport {
+        let mesh = &made.mesh;
+        let angles = mesh.angles().unwrap_or_default();
+        let domains = mesh.domains.iter().enumerate().map(|(d, name)| {
+            let of: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| mesh.domain[*t as usize] as usize == d).collect();
+            let corners = |t: u32| mesh.tets[t as usize].map(|n| mesh.nodes[n as usize]);
+            let volume = |t: u32| mesh.element_volume(t as usize);
+            let largest = of.iter().copied().max_by(|a, b| volume(*a).total_cmp(&volume(*b)));
+            let inside = largest.map_or([f64::NAN; 3], |t| {
+                let p = corners(t);
+                core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0)
+            });
+            let report = DomainReport { elements: of.len(), volume: of.iter().map(|t| volume(*t)).sum(), inside };
+            (name.clone(), report)
+        });
+        let sets = mesh.sets.iter().map(|s| (s.name.clone(), SetReport::from(s)));
+        VolumeReport {
+            elements: mesh.tets.len(),
+            nodes: mesh.nodes.len(),
+            order: if mesh.middles.is_empty() { 1 } else { 2 },
+            edge: made.step,
+            volume: mesh.volume(),
+            min_angle: angles.min,
+            max_angle: angles.max,
+            angles: AnglesReport {
+                min_p01: angles.min_p01,
+                min_p50: angles.min_p50,
+                max_p50: angles.max_p50,
+                max_p99: angles.max_p99,
+                worst: angles.worst,
+            },
             pieces: made.pieces,
             deviation: made.deviation,
             straight: made.straight,

@@ -2,13 +2,14 @@
 
 use beams::pattern::PatternField;
 use beams::quador::{Quadors, Wanted};
+use geometry::feature_edges::Creases;
 use geometry::math::{Aabb, Interval, Vec3};
 
 use crate::field::{Block, Field};
 use crate::implicit::Implicit;
 
 macro_rules! field_of {
-    ($($beams:ty { $($fill:item)* })*) => {$(
+    ($($beams:ty { $($fill:item)* } { $($known:item)* })*) => {$(
         impl Field for $beams {
             fn values(&self, points: &[Vec3], out: &mut [f64]) {
                 <$beams>::values(self, points, out);
@@ -33,6 +34,8 @@ macro_rules! field_of {
             fn has_creases(&self) -> bool {
                 <$beams>::has_creases(self)
             }
+
+            $($known)*
         }
     )*};
 }
@@ -54,6 +57,10 @@ field_of!(
         fn is_large(&self) -> bool {
             Quadors::is_large(self)
         }
+    } {
+        fn creases(&self, step: f64) -> Creases {
+            Quadors::creases(self, step)
+        }
     }
-    PatternField {}
+    PatternField {} {}
 );

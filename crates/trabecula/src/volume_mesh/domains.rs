@@ -1,10 +1,15 @@
 //! What is meshed: domains over common surfaces, and whose each surface is.
 
+use std::sync::Arc;
+
 use crate::conforming_tets::{MOST, Patched};
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
 use crate::solid::{Solid, Space};
 use geometry::fault::Fault;
+
+/// The length of pieces of creases, as a fraction of the edge of the background's cubes.
+const PIECE: f64 = 0.125;
 
 /// What is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +89,9 @@ impl Domains {
                 "the design has {own} surfaces; a volume mesh takes at most {MOST}: unite keep zones, or mesh a part of it"
             );
             return Err(Fault::new("design", m));
+        }
+        if let (Some(edge), Some(field), [only]) = (edge, &solid.field, &mut surfaces[lattice..]) {
+            only.creases = Arc::new(field.creases(PIECE * edge));
         }
         let patched = edge.map(|edge| Patched::of(&mut surfaces, edge, Patched::NARROW)).unwrap_or_default();
         Ok(Domains { names, surfaces, own, patched, trees, region, lattice, filled })

@@ -42,5 +42,6 @@ mod tiling_ends;
 mod tiling_fields;
 mod tiling_net;
 mod tiling_on_grid;
+mod volume_angles;
 mod walls;
 mod wavelength;

@@ -1,0 +1,200 @@
+//! The worst tetrahedra, whose neighbourhoods become worse before they become better.
+//!
+//! Where no move, flip or collapse helps by itself, an edge is bisected, removed or collapsed whatever comes of it, and what that touched
+//! is improved step by step. All is taken back unless everything touched is better than the tetrahedron was, so that the worst shapes never
+//! get worse. Nodes are inserted in this way by B. M. Klingner and J. R. Shewchuk (Aggressive tetrahedral mesh improvement, 2007).
+
+use super::node_surfaces::{HELD, SurfaceSet, onto};
+use super::shaping::{GONE, Shaping};
+use super::tet_shape::shape;
+use geometry::math::{Vec3, add, norm, scale, sub};
+use geometry::progress::checkpoint;
+use geometry::tetmesh::{EDGES, FACES};
+
+/// Shapes worse than this are mended: dihedral angles below 15.1 or above 158.8 degrees.
+const MENDED: f64 = 2.0;
+/// Rounds over all of them.
+const ROUNDS: usize = 3;
+/// The least shape that the first change may leave: a tetrahedron with some volume.
+const LEAST: f64 = 0.01;
+/// The most steps after it.
+const STEPS: usize = 40;
+/// The least relative gain.
+const GAIN: f64 = 1.05;
+/// Greatest distance of a new node on a surface from the middle of its edge, as a fraction of the edge.
+const REACH: f64 = 0.3;
+
+/// A change that can be taken back.
+pub(super) enum Change {
+    /// A node that was elsewhere.
+    Moved(u32, Vec3),
+    /// A new node.
+    Added,
+    /// Tetrahedra, with their nodes and domains, in place of which there are others; how many numbers there were.
+    Replaced { gone: Vec<(u32, [u32; 4], u8)>, made: Vec<u32>, count: usize },
+}
+
+/// The first change of a neighbourhood.
+#[derive(Clone, Copy)]
+enum First {
+    Bisect([u32; 2]),
+    RemoveEdge([u32; 2]),
+    RemoveFace([u32; 3]),
+    Collapse([u32; 2]),
+}
+
+impl Shaping<'_> {
+    /// Mends the neighbourhoods of the worst tetrahedra; whether any was.
+    pub fn mend(&mut self) -> bool {
+        let mut mended = false;
+        for _ in 0..ROUNDS {
+            let mut changed = false;
+            for t in self.bad() {
+                checkpoint();
+                if self.tets[t as usize] != GONE && self.shapes[t as usize] < MENDED {
+                    changed |= self.mend_at(t) || self.mend_free(t);
+                }
+            }
+            mended |= changed;
+            if !changed {
+                break;
+            }
+        }
+        mended
+    }
+
+    /// Mends the neighbourhood of a tetrahedron with its nodes on creases set free; whether it is better. If not, they stay.
+    fn mend_free(&mut self, t: u32) -> bool {
+        let held = |on: SurfaceSet| on & HELD != 0 && on != HELD;
+        let nodes = self.tets[t as usize].map(|n| n as usize);
+        let before = nodes.map(|n| self.on[n]);
+        nodes.into_iter().zip(before).filter(|(_, on)| held(*on)).for_each(|(n, _)| self.on[n] &= !HELD);
+        if nodes.map(|n| self.on[n]) == before {
+            return false;
+        }
+        let mended = self.mend_at(t);
+        if !mended {
+            nodes.into_iter().zip(before).for_each(|(n, on)| self.on[n] = on);
+        }
+        mended
+    }
+
+    /// Mends the neighbourhood of a tetrahedron; whether it is better.
+    fn mend_at(&mut self, t: u32) -> bool {
+        let (nodes, before) = (self.tets[t as usize], self.shapes[t as usize]);
+        let bar = (before * GAIN).max(LEAST);
+        let edges = EDGES.map(|e| e.map(|k| nodes[k]));
+        let bisections = edges.into_iter().map(First::Bisect);
+        let edge_removals = edges.into_iter().map(First::RemoveEdge);
+        let face_removals = FACES.into_iter().map(|f| First::RemoveFace(f.map(|k| nodes[k])));
+        let collapses = edges.into_iter().flat_map(|[a, b]| [First::Collapse([a, b]), First::Collapse([b, a])]);
+        for change in bisections.chain(edge_removals).chain(face_removals).chain(collapses) {
+            self.changes = Some(Vec::new());
+            let done = match change {
+                First::Bisect(edge) => self.bisect(edge),
+                First::RemoveEdge(edge) => self.remove_edge(edge, Some(LEAST)),
+                First::RemoveFace(face) => self.remove_face(t, face, Some(LEAST)),
+                First::Collapse(edge) => self.collapse(edge, Some(LEAST)),
+            };
+            let better = done && self.improved_beyond(bar);
+            let changes = self.changes.take().unwrap_or_default();
+            if better {
+                return true;
+            }
+            self.take_back(changes);
+        }
+        false
+    }
+
+    /// Improves what was touched, the worst first, until all of it is better than `bar`; whether it is.
+    fn improved_beyond(&mut self, bar: f64) -> bool {
+        for _ in 0..STEPS {
+            let Some(t) = self.worst_touched(bar) else { return true };
+            let mut improved = false;
+            for n in self.tets[t as usize] {
+                if let Some(by) = self.better(n) {
+                    self.displace(n, by);
+                    improved = true;
+                }
+            }
+            if !improved && !self.change_at(t) {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// The worst of the tetrahedra that were touched, if it is not better than `bar`.
+    fn worst_touched(&self, bar: f64) -> Option<u32> {
+        let each = self.changes.iter().flatten().flat_map(|c| match c {
+            Change::Moved(n, _) => &self.around[*n as usize][..],
+            Change::Replaced { made, .. } => made,
+            Change::Added => &[],
+        });
+        let worse = each.copied().filter(|t| self.shapes[*t as usize] <= bar);
+        worse.min_by(|a, b| self.shapes[*a as usize].total_cmp(&self.shapes[*b as usize]).then(a.cmp(b)))
+    }
+
+    /// Bisects an edge, of the boundary on its surfaces; whether it was.
+    fn bisect(&mut self, [a, b]: [u32; 2]) -> bool {
+        if [a, b].iter().all(|n| self.next[*n as usize] != *n) {
+            return false;
+        }
+        let on = self.surfaces_of([a, b]);
+        let [p, q] = [a, b].map(|n| self.nodes[n as usize]);
+        let middle = scale(add(p, q), 0.5);
+        let at = if on & !HELD == 0 || on & HELD != 0 {
+            Some(middle)
+        } else {
+            onto(self.surfaces, on, middle, REACH * norm(sub(p, q)))
+        };
+        at.is_some_and(|at| self.split_edge([a, b], at, on, LEAST))
+    }
+
+    /// The surfaces on which an edge lies by the faces of the boundary, and between domains, at it.
+    fn surfaces_of(&self, [a, b]: [u32; 2]) -> SurfaceSet {
+        let at = self.at_edge([a, b]);
+        let mut on = 0;
+        for c in at.iter().flat_map(|t| self.tets[*t as usize]).filter(|c| *c != a && *c != b) {
+            let mut of = at.iter().filter(|t| self.tets[**t as usize].contains(&c)).map(|t| self.domain[*t as usize]);
+            if of.next() != of.next() {
+                let set = [a, b, c].iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
+                on |= if set == 0 { HELD } else { set };
+            }
+        }
+        on
+    }
+
+    /// What restores some tetrahedra.
+    pub(super) fn state_of(&self, tets: &[u32]) -> Vec<(u32, [u32; 4], u8)> {
+        tets.iter().map(|t| (*t, self.tets[*t as usize], self.domain[*t as usize])).collect()
+    }
+
+    /// Takes changes back.
+    fn take_back(&mut self, changes: Vec<Change>) {
+        for change in changes.into_iter().rev() {
+            match change {
+                Change::Moved(n, p) => {
+                    self.nodes[n as usize] = p;
+                    for i in 0..self.around[n as usize].len() {
+                        let t = self.around[n as usize][i];
+                        self.shapes[t as usize] = shape(self.corners(t));
+                    }
+                }
+                Change::Added => {
+                    self.nodes.pop();
+                    self.on.pop();
+                    self.next.pop();
+                    self.around.pop();
+                }
+                Change::Replaced { gone, made, count } => {
+                    made.into_iter().for_each(|t| self.detach(t));
+                    self.tets.truncate(count);
+                    self.domain.truncate(count);
+                    self.shapes.truncate(count);
+                    gone.into_iter().for_each(|(t, nodes, domain)| self.attach(t, nodes, domain));
+                }
+            }
+        }
+    }
+}
