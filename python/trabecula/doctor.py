@@ -29,7 +29,7 @@ def state() -> dict[str, Any]:
         "threads": os.environ.get("RAYON_NUM_THREADS"),
         "free_memory": _core.free_memory(),
         "free_disk": free_disk(os.getcwd()),
-        "command": shutil.which("trabecula"),
+        "command": shutil.which("trabecula") or shutil.which("trabecula", path=os.path.dirname(sys.executable)),
         "numpy": installed("numpy"),
         "extras": {name: {package: installed(package) for package in sorted(packages)} for name, packages in extras().items()},
     }

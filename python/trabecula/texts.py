@@ -122,7 +122,7 @@ def _beams(it: Report) -> Iterator[str]:
     if it.fillet_shortfalls:
         yield from _shortfalls(it.fillet_shortfalls)
     if it.valence:
-        yield f"  valence    {', '.join(f'{n} of {v}' for v, n in it.valence.items())}"
+        yield f"  valence    {', '.join(f'{n} of {v}' for v, n in sorted(it.valence.items(), key=lambda of: int(of[0])))}"
     if it.smallest_angle is not None:
         yield f"  angle      {it.smallest_angle:.1f}° at least, at {point(it.smallest_angle_at)} mm"
     how = "exact" if it.fraction_exact else "sampled"
@@ -230,10 +230,10 @@ def _transition(it: Report) -> Iterator[str]:
     error = "" if worst is None else f", off by {worst:+.4f} at most"
     found = [row.found for row in it.fractions]
     yield f"  fraction   {span([min(found), max(found)])}{error}"
-    yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm"
+    yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm, on which walls under two steps may seem broken"
     neck = "none: not connected across the transition"
     if it.neck:
-        neck = f"{it.neck.diameter:.3g} mm at {point(it.neck.place)} mm, the narrowest of the widest path across"
+        neck = f"{it.neck.diameter:.3g} mm to within {it.step:.3g} mm, at {point(it.neck.place)} mm, the narrowest of the widest path across"
     yield f"  neck       {neck}"
     for word, bodies in (("loose", it.loose), ("dangling", it.dangling)):
         yield f"  {word:10} {bodies.bodies}" + (f", {figure(bodies.volume)} mm³" if bodies.bodies else "")

@@ -35,6 +35,8 @@ pub struct UnitCell {
     pub connected: Option<Vec<[f64; 2]>>,
     /// The thinnest wall or neck, mm.
     pub wall: Option<f64>,
+    /// What finds the diameter (mm) of the largest ball that passes through the pore, 0 where it is closed, if that is known.
+    pub pore: Option<Box<dyn Fn() -> f64 + Send + Sync>>,
 }
 
 /// How the voxels of a cell are made.

@@ -161,6 +161,24 @@ fn functions_and_files_are_short() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The first of two kinds of one name would be what the schema says of both.
+#[test]
+fn a_kind_has_a_name_of_its_own() {
+    let (mut names, mut wrong) = (BTreeSet::new(), Vec::new());
+    for (path, text) in files("trabecula") {
+        for before in ["#[kind(name = \"", "defs.named(\""] {
+            for rest in text.split(before).skip(1) {
+                let name = rest.split('"').next().unwrap_or_default();
+                if !names.insert(name.to_string()) {
+                    wrong.push(format!("{}: {name}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(names.len() > 50, "{}", names.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 #[test]
 fn a_file_name_occurs_once_in_a_crate() {
     let mut wrong = Vec::new();

@@ -158,7 +158,7 @@ pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> 
     let Some(sides) = built.solid.region.half_spaces() else {
         return Err(fault(
             "the region cuts some along other surfaces than those of a box, a tetrahedron, half-spaces or an intersection of \
-             these",
+             these; with trim = \"drop\" in a region that is smaller by the radius of the beams (region.offset) it cuts none",
         ));
     };
     let crossed = |side: &HalfSpace| (0..quadors.len()).any(|hub| side.bound(&quadors.hub_bounds(hub)).hi > 0.0);

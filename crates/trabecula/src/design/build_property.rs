@@ -31,13 +31,15 @@ const FAR: f64 = 7.0;
 const COARSE: usize = 16;
 /// Relative difference to what was asked for at which the search ends, on coarse and on fine voxels.
 const MET: [f64; 2] = [5e-3, 1e-3];
+/// The logarithm by which the properties found may miss the ends of what is asked for.
+const MISSED: f64 = 0.01;
 /// Steps on coarse voxels, and on fine ones.
-const STEPS: [usize; 2] = [24, 3];
+const STEPS: [usize; 2] = [24, 8];
 /// Fractions at which a property that varies is found, and stops of the function between them.
 const NODES: usize = 6;
 const STOPS: usize = 65;
-/// Part of a fraction by which the first and the last of these are further out than the coarse voxels say.
-const BEYOND: f64 = 0.05;
+/// Part of a fraction by which the first and the last of these are further out than the ends of what is asked for.
+const BEYOND: f64 = 0.01;
 
 /// A property of a cell by its fraction.
 struct Property<'a> {
@@ -248,7 +250,8 @@ impl Property<'_> {
 
     /// The fraction by the property, over the range of what is asked for.
     fn between(&self, asked: Varied) -> Result<Stops, DesignError> {
-        let ends = [self.coarse_root(asked.min)?.0, self.coarse_root(asked.max)?.0];
+        // On fine voxels: the coarse ones may be off by more than the range.
+        let ends = [self.fraction(asked.min)?, self.fraction(asked.max)?];
         let ([low, high], [least, most]) = (self.range()?, [ends[0].min(ends[1]), ends[0].max(ends[1])]);
         let (first, last) = ((least * (1.0 - BEYOND)).max(low).ln(), (most * (1.0 + BEYOND)).min(high).ln());
         let mut nodes: Vec<[f64; 2]> = Vec::new();
@@ -260,7 +263,8 @@ impl Property<'_> {
                 nodes.push([value, at]);
             }
         }
-        if nodes.len() < 2 {
+        let covers = |v: f64| (nodes[0][0] - MISSED..=nodes[nodes.len() - 1][0] + MISSED).contains(&v.ln());
+        if nodes.len() < 2 || !covers(asked.min) || !covers(asked.max) {
             let message = format!(
                 "{} could not be found between fractions of {:.3} and {:.3}; take more voxels (n)",
                 self.amount.key(),

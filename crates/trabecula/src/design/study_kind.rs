@@ -171,7 +171,7 @@ impl Kind for SweepKind {
 
     fn schema(_: &Key, defs: &mut Defs) -> Node {
         let values = ParameterKind::schema(&Key::NONE, defs);
-        defs.named("Sweep", |defs| {
+        defs.named("Study", |defs| {
             let settings = crate::kind::Open::of::<SweepSettings>(defs).closed();
             // Paths without quotes are tables of tables.
             let nested = Node::table([("type", "object".into())]);

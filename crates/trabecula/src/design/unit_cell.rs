@@ -69,6 +69,11 @@ pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell,
     cell.fraction = Some(lattice.fraction(level));
     cell.connected = Some(lattice.connected_fraction());
     cell.wall = wall;
+    if lattice.distance().is_none() {
+        let (lattice, to_phase) = (lattice.clone(), map.matrix);
+        let widest = move || lattice.cell.pores(lattice.part, level, &to_phase).into_iter().fold(0.0, f64::max);
+        cell.pore = Some(Box::new(widest));
+    }
     Ok(cell)
 }
 
@@ -138,6 +143,7 @@ fn pulled(path: String, field: Arc<dyn Implicit>, corner: Vec3, edges: Mat3) -> 
         fraction: None,
         connected: None,
         wall: None,
+        pore: None,
     }
 }
 

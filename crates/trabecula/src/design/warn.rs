@@ -19,6 +19,8 @@ const OUTSIDE: f64 = 0.05;
 const PRESSED: f64 = 0.05;
 /// The relative deviation of the fraction from the one asked for together with a thickness, above which it is warned of.
 const DRIFT: f64 = 0.05;
+/// Number of cells above which the unit of a wavelength is doubted.
+const MANY: f64 = 1e9;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
 
@@ -203,11 +205,19 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
         }
     }
     let wavelength = lattice.map.wavelength();
+    let cells = environment.region.bounds().size().iter().product::<f64>() / wavelength.powi(3);
+    if cells > MANY {
+        let message = format!(
+            "a wavelength of {} mm makes up to {cells:.1e} cells in the region's bounds: is the unit of both right?",
+            number(wavelength)
+        );
+        warnings.push(Warning { path: format!("{}.map.{}.wavelength", environment.path, spec.map.key()), message });
+    }
     let least = environment.region.bounds().size().into_iter().fold(f64::INFINITY, f64::min);
     if wavelength > least {
         let message = format!(
             "the wavelength, {} mm, is more than the region's least extent, {} mm: the part is less than one cell thick and \
-             its fraction is not the cell's",
+             its fraction is not the cell's. Is the unit of both right?",
             number(wavelength),
             number(least)
         );

@@ -28,6 +28,8 @@ const STEADY: f64 = 1e-7;
 const NOTHING: f64 = 1e-5;
 /// Steps across the hydraulic diameter below which the figures are to be doubted.
 const ACROSS: f64 = 6.0;
+/// Steps across the narrowest place of a pore that a flow needs at least to be found.
+const OPEN: f64 = 3.0;
 /// Strain of a cell, to be whole numbers of steps, that is worth a warning.
 const STRAINED: f64 = 0.005;
 /// Hydraulic radius of a pore, in steps, over the viscosity with which flow in it becomes steady soonest.
@@ -77,12 +79,20 @@ impl UnitCell {
         let lengths = self.edges.map(norm);
         let cube = finest.grid.lean == [0; 3] && lengths.iter().all(|l| (l / lengths[0] - 1.0).abs() < 1e-9);
         let strain = if cube { 0.0 } else { finest.grid.strain };
+        // No flow through a pore that is open says that it is too narrow for the grid.
+        let lost = (0..3).any(|i| k[i][i] == 0.0).then(|| self.pore.as_ref().map_or(0.0, |pore| pore()));
+        let lost = lost.filter(|pore| *pore > 0.0);
+        let error = if lost.is_some() { 1.0 } else { error };
         Ok(PermeabilityReport {
             k_n: clean(&finest.found.tensor),
             k_cell: cube.then(|| k.map(|row| row.map(|v| v / (lengths[0] * lengths[0])))),
             n,
             error: error + strain,
-            axis_errors: std::array::from_fn(|i| if k[i][i] > 0.0 { axis_errors[i] + strain } else { 0.0 }),
+            axis_errors: std::array::from_fn(|i| match lost {
+                _ if k[i][i] > 0.0 => axis_errors[i] + strain,
+                Some(_) => 1.0,
+                None => 0.0,
+            }),
             order,
             residual: flows.iter().map(|f| f.found.residual).fold(0.0, f64::max),
             iterations: finest.found.iterations,
@@ -97,7 +107,7 @@ impl UnitCell {
             edges: self.edges,
             pore_nodes: across,
             grids: flows.iter().map(grid).collect(),
-            warnings: doubt.into_iter().chain(self.doubts(&k, n, across, &finest.grid, strain)).collect(),
+            warnings: doubt.into_iter().chain(self.doubts(&k, n, (across, lost), &finest.grid, strain)).collect(),
             k,
         })
     }
@@ -135,10 +145,24 @@ impl UnitCell {
     }
 
     /// What may be wrong.
-    fn doubts(&self, k: &Mat3, n: usize, across: Option<f64>, grid: &CubicGrid, strain: f64) -> Vec<Warning> {
+    fn doubts(
+        &self,
+        k: &Mat3,
+        n: usize,
+        (across, lost): (Option<f64>, Option<f64>),
+        grid: &CubicGrid,
+        strain: f64,
+    ) -> Vec<Warning> {
         let mut said = Vec::new();
         let closed: Vec<&str> = (0..3).filter(|i| k[*i][*i] == 0.0).map(|i| ["x", "y", "z"][i]).collect();
-        if !closed.is_empty() {
+        if let Some(pore) = lost {
+            let steps = pore / grid.step;
+            let need = enough(n, OPEN / steps).map_or(String::new(), |need| format!(": take n = {need}"));
+            said.push(format!(
+                "no flow was found along {}, though a ball of {pore:.3} mm passes the pore: that is {steps:.1} steps of the grid, which closes it,                  and 0 is no figure{need}",
+                closed.join(", ")
+            ));
+        } else if !closed.is_empty() {
             said.push(format!("the pore does not go through along {}: nothing flows there", closed.join(", ")));
         }
         if let Some(across) = across.filter(|a| *a < ACROSS) {

@@ -4,13 +4,15 @@ use super::invariant::{Invariant, TensorOrder};
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
-use crate::kind::{DesignError, Key, Kind, Unit};
+use crate::kind::{DesignError, Key, Kind, Unit, Warning};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{self, Shape};
-use geometry::math::{Aabb, Vec3, scale};
+use geometry::math::{Aabb, Vec3, norm, scale};
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
+/// How many times as far as the region a result may reach before its unit is doubted.
+const FARTHER: f64 = 100.0;
 
 /// An array of a result on a mesh of volume elements, from a file.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -285,8 +287,15 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
         .collect();
     let (made, share) =
         Samples::meshed(&points, &tets, &values, &environment.region.bounds(), environment.points).map_err(wrong)?;
+    let reach = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
     if share > UNCOVERED {
-        return Err(uncovered("mesh", share, points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))));
+        return Err(uncovered("mesh", share, reach));
+    }
+    let times = norm(reach.size()) / norm(environment.region.bounds().size());
+    if times > FARTHER {
+        let message =
+            format!("{}: the mesh reaches {times:.0} times as far as the region; is that its unit?", spec.path);
+        environment.notes.borrow_mut().warnings.push(Warning { path: at, message });
     }
     Ok(made)
 }

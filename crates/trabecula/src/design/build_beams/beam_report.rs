@@ -1,6 +1,7 @@
 //! Warnings and figures of beams.
 
 use super::whole;
+use crate::design::build_tets::rounded;
 use crate::design::data::*;
 use crate::design::{Built, Warning, build_pattern};
 use crate::environment::Environment;
@@ -47,9 +48,9 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
             _ => "the fillet asked for".into(),
         };
         say(format!(
-            "{} cannot have {target}, only the largest that fits; the tightest has {:.3} mm, at {}",
+            "{} cannot have {target}, only the largest that fits; the tightest has {} mm, at {}",
             counted(truss.shortfalls.len(), "hub"),
-            tightest.fillets.radius[0],
+            rounded(tightest.fillets.radius[0], 3),
             position(truss.quadors.center(tightest.hub))
         ));
     }
