@@ -4,10 +4,10 @@
 //! is improved step by step. All is taken back unless everything touched is better than the tetrahedron was, so that the worst shapes never
 //! get worse. Nodes are inserted in this way by B. M. Klingner and J. R. Shewchuk (Aggressive tetrahedral mesh improvement, 2007).
 
-use super::node_surfaces::{HELD, SurfaceSet, onto};
+use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use super::tet_shape::shape;
-use geometry::math::{Vec3, add, norm, scale, sub};
+use geometry::math::{Vec3, add, scale};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{EDGES, FACES};
 
@@ -21,8 +21,6 @@ const LEAST: f64 = 0.01;
 const STEPS: usize = 40;
 /// The least relative gain.
 const GAIN: f64 = 1.05;
-/// Greatest distance of a new node on a surface from the middle of its edge, as a fraction of the edge.
-const REACH: f64 = 0.3;
 
 /// A change that can be taken back.
 pub(super) enum Change {
@@ -135,34 +133,11 @@ impl Shaping<'_> {
         worse.min_by(|a, b| self.shapes[*a as usize].total_cmp(&self.shapes[*b as usize]).then(a.cmp(b)))
     }
 
-    /// Bisects an edge, of the boundary on its surfaces; whether it was.
+    /// Bisects an edge within a domain; whether it was. Those of the boundary stay: where two sheets of it nearly touch, a new node could
+    /// be on both.
     fn bisect(&mut self, [a, b]: [u32; 2]) -> bool {
-        if [a, b].iter().all(|n| self.next[*n as usize] != *n) {
-            return false;
-        }
-        let on = self.surfaces_of([a, b]);
-        let [p, q] = [a, b].map(|n| self.nodes[n as usize]);
-        let middle = scale(add(p, q), 0.5);
-        let at = if on & !HELD == 0 || on & HELD != 0 {
-            Some(middle)
-        } else {
-            onto(self.surfaces, on, middle, REACH * norm(sub(p, q)))
-        };
-        at.is_some_and(|at| self.split_edge([a, b], at, on, LEAST))
-    }
-
-    /// The surfaces on which an edge lies by the faces of the boundary, and between domains, at it.
-    fn surfaces_of(&self, [a, b]: [u32; 2]) -> SurfaceSet {
-        let at = self.at_edge([a, b]);
-        let mut on = 0;
-        for c in at.iter().flat_map(|t| self.tets[*t as usize]).filter(|c| *c != a && *c != b) {
-            let mut of = at.iter().filter(|t| self.tets[**t as usize].contains(&c)).map(|t| self.domain[*t as usize]);
-            if of.next() != of.next() {
-                let set = [a, b, c].iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
-                on |= if set == 0 { HELD } else { set };
-            }
-        }
-        on
+        let middle = scale(add(self.nodes[a as usize], self.nodes[b as usize]), 0.5);
+        !self.on_boundary([a, b]) && self.split_edge([a, b], middle, 0, LEAST)
     }
 
     /// What restores some tetrahedra.

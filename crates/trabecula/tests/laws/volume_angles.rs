@@ -117,7 +117,7 @@ fn jacobians_of_random_solids_are_positive() {
 }
 
 /// Boundary edges cut across creases between beams in a chord that lies outside: followed, few of them are off by more than a twentieth
-/// of the background's edge. Without that one in eighteen was.
+/// of the background's edge. Without that one in 27 was.
 #[test]
 fn creases_between_beams_are_followed() {
     let text = "schema = 1\nregion.box.size = [5, 5, 5]\n[beams.core]\ncell = \"octet\"\nradius = 0.6\nmap.affine.wavelength = 5\n";
@@ -131,5 +131,5 @@ fn creases_between_beams_are_followed() {
     let mut values = vec![0.0; middles.len()];
     trabecula::Field::values(&design.solid, &middles, &mut values);
     let off = values.iter().filter(|v| v.abs() > 0.05 * edge).count();
-    assert!((off as f64) < 0.025 * middles.len() as f64, "{off} of {}", middles.len());
+    assert!((off as f64) < 0.015 * middles.len() as f64, "{off} of {}", middles.len());
 }
