@@ -12,7 +12,9 @@ const BATCH: usize = 4096;
 /// default mesh turn from their surface.
 const SAME_SIDE: f64 = 0.94;
 /// Cosine of the angle beyond which the field says nothing about a triangle: 80°. Facets of a beam that is two grid steps thick turn by 60°.
+/// 45° at the edge of a cut, where a coarse triangle of one side can lie within the other.
 const UNLIKE: f64 = 0.17;
+const UNLIKE_AT_CUTS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// How far to the middle of its triangle a corner on a crease is moved, off the crease.
 const INWARDS: f64 = 0.25;
 
@@ -36,10 +38,8 @@ pub fn corner_normals(field: &dyn Field, surface: &SurfaceMesh) -> Vec<[f32; 3]>
         .collect();
     let corners = mesh.triangles.as_flattened();
     let alike = |i: usize, n: Vec3, least: f64| norm(n) > 0.0 && dot(n, flats[i / 3]) > least;
-    let on_side = |i: usize| {
-        let v = corners[i] as usize;
-        !(cut[v] && lattice[v]) && alike(i, at_vertices[v], SAME_SIDE)
-    };
+    let at_cut = |i: usize| cut[corners[i] as usize] && lattice[corners[i] as usize];
+    let on_side = |i: usize| !at_cut(i) && alike(i, at_vertices[corners[i] as usize], SAME_SIDE);
     let apart: Vec<usize> = (0..corners.len()).into_par_iter().filter(|i| !on_side(*i)).collect();
     let moved = |i: &usize| {
         let [a, b, c] = mesh.corners(i / 3);
@@ -52,7 +52,10 @@ pub fn corner_normals(field: &dyn Field, surface: &SurfaceMesh) -> Vec<[f32; 3]>
     for (i, n) in apart.into_iter().zip(directions(field, &points)) {
         normals[i] = n;
     }
-    let known = |(i, n): (usize, &Vec3)| if alike(i, *n, UNLIKE) { n.map(|c| c as f32) } else { [0.0; 3] };
+    let known = |(i, n): (usize, &Vec3)| {
+        let least = if at_cut(i) { UNLIKE_AT_CUTS } else { UNLIKE };
+        if alike(i, *n, least) { n.map(|c| c as f32) } else { [0.0; 3] }
+    };
     normals.par_iter().enumerate().map(known).collect()
 }
 

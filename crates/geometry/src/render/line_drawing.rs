@@ -245,6 +245,40 @@ mod tests {
         assert!(svg.len() < 20_000, "{}", svg.len());
     }
 
+    /// A beam of six facets has edges along itself by its mesh, by the normals of the cylinder that it stands for two contours.
+    #[test]
+    fn a_beam_of_few_facets_is_drawn_by_its_normals() {
+        const SIDES: usize = 6;
+        let mut mesh = Mesh::default();
+        let mut normals: Vec<[f32; 3]> = Vec::new();
+        let out = |k: usize| {
+            let (s, c) = (core::f64::consts::TAU * (k % SIDES) as f64 / SIDES as f64 + 0.3).sin_cos();
+            [0.0, c, s]
+        };
+        for k in 0..SIDES {
+            let [_, y, z] = out(k);
+            mesh.vertices.extend([[-4.0, y, z], [4.0, y, z]]);
+        }
+        for k in 0..SIDES {
+            let [a, b, c, d] =
+                [2 * k, 2 * k + 1, (2 * k + 2) % (2 * SIDES), (2 * k + 3) % (2 * SIDES)].map(|v| v as u32);
+            mesh.triangles.extend([[a, d, b], [a, c, d]]);
+            for v in [k, k + 1, k, k, k + 1, k + 1] {
+                normals.push(out(v).map(|n| n as f32));
+            }
+        }
+        let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
+        let view = View { azimuth: -90.0, elevation: 20.0, ..VIEW };
+        let along = |normals: Option<Vec<[f32; 3]>>, name: &str| {
+            let svg = line_drawing(&surface, &view, &Look { normals, ..Look::default() }, [400.0, 300.0], "px");
+            let long = |line: &Vec<Point>| (line[0][0] - line[line.len() - 1][0]).abs() > 200.0;
+            lines(&svg, name).iter().filter(|line| long(line)).count()
+        };
+        assert!(along(None, "edges") >= 3);
+        assert_eq!(along(Some(normals.clone()), "edges"), 0);
+        assert_eq!(along(Some(normals), "contours"), 2);
+    }
+
     /// Half a ball: the outline of the section is hatched by as much as it has area.
     #[test]
     fn a_section_is_hatched() {

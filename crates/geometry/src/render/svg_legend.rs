@@ -11,7 +11,7 @@ use super::tint::Tint;
 
 /// The height of a capital, of the size of its font.
 const CAPITAL: f64 = 0.72;
-/// Stops of a scale: so many that the colours between two are even.
+/// Stops of a scale: colours between two are even to a step of a byte.
 const STOPS: usize = 33;
 
 /// Where elements are put: places on the paper of a legend times `part`.
