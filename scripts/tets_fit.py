@@ -96,7 +96,7 @@ def main():
         "",
         "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth and an eighth of the longest side of the part.",
         "Volume of the flat tetrahedra against the region's; distances from the part to the mesh and back, 99th percentile and",
-        "greatest, in sizes; dihedral angles; features that are listed as lost; processor seconds for the mesh and its fit. Then",
+        "greatest, in sizes; dihedral angles; features listed as lost; processor seconds for the mesh and its fit. Then",
         f"a lattice of `diamond` at a fraction of {FRACTION} over it, in {PER_CELL} steps along a cell: how it is meshed, its",
         f"volume against {FRACTION} of the region's, its pieces. See [tetrahedral meshes](../concepts/tets.md).",
     )

@@ -339,8 +339,8 @@ class Carrier(VolumeMesh):
     @cached_property
     def axes(self) -> NDArray[np.float64]:
         """The axes of each tetrahedron (m, 3, 3), unit vectors, one row each: those of the body-centred cubic lattice whose
-        tetrahedra it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside the
-        background mesh, they are the same everywhere but for their order and signs.
+        tetrahedra it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside
+        the background mesh, they are the same everywhere but for their order and signs.
         """
         return fixed(self._core.axes.reshape(-1, 3, 3))
 
