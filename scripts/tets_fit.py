@@ -1,9 +1,9 @@
-"""Writes docs/generated/tets_fit.md: how tetrahedral meshes of regions fit them, and the volume of lattices over them, at a fifteenth and an
-eighth of the longest side.
+"""Writes docs/generated/tets_fit.md: how tetrahedral meshes of regions fit them, and the volume of lattices over them.
 
 python scripts/tets_fit.py [MESH ...]
 
-The parts are those of the repository and mesh files that are given, such as fandisk.obj.
+Sizes are a fifteenth and an eighth of the longest side. The parts are those of the repository and mesh files that are given,
+such as fandisk.obj.
 """
 
 import sys
@@ -17,6 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated" / "tets_fit.md"
 #: Tetrahedra along the longest side, steps along a cell, and the solid fraction.
 ACROSS, PER_CELL, FRACTION = (15, 8), 12, 0.3
+COLUMNS = ["part", "tetrahedra", "volume", "part to mesh", "mesh to part", "angles", "pieces", "lost", "s"]
+COLUMNS += ["lattice", "its volume", "its pieces"]
 
 R = lt.region
 
@@ -58,9 +60,7 @@ def longest(region):
 def row(name, region, across):
     """One of the table, and what it loses."""
     size = longest(region) / across
-    core = lt.Lattice(
-        cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=size), level=lt.level.fraction(FRACTION)
-    )
+    core = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=size), level=lt.level.fraction(FRACTION))
     design = lt.Design(region=region, lattice={"a": core})
     start = time.process_time()
     report = lt.TetMesh.of(design).report()
@@ -94,17 +94,16 @@ def main():
     about = (
         "# Fit of tetrahedral meshes",
         "",
-        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth and an eighth of the longest side of the part. Volume of the",
-        "flat tetrahedra against the region's; distances from the part to the mesh and back, 99th percentile and greatest, in",
-        "sizes; dihedral angles; features that are listed as lost; processor seconds for the mesh and its fit. Then a lattice of `diamond` at a",
-        f"fraction of {FRACTION} over it, in {PER_CELL} steps along a cell: how it is meshed, its volume against {FRACTION} of the region's, its pieces. See",
-        "[tetrahedral meshes](../concepts/tets.md).",
+        "Written by `scripts/tets_fit.py`, with `map.tets.size` a fifteenth and an eighth of the longest side of the part.",
+        "Volume of the flat tetrahedra against the region's; distances from the part to the mesh and back, 99th percentile and",
+        "greatest, in sizes; dihedral angles; features listed as lost; processor seconds for the mesh and its fit. Then",
+        f"a lattice of `diamond` at a fraction of {FRACTION} over it, in {PER_CELL} steps along a cell: how it is meshed, its",
+        f"volume against {FRACTION} of the region's, its pieces. See [tetrahedral meshes](../concepts/tets.md).",
     )
     lines, reasons = list(about), []
     for across in ACROSS:
         lines += ["", f"## {across} tetrahedra along the longest side", ""]
-        lines += ["| part | tetrahedra | volume | part to mesh | mesh to part | angles | pieces | lost | s | lattice | its volume | its pieces |"]
-        lines += ["|---|---|---|---|---|---|---|---|---|---|---|---|"]
+        lines += [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
         for name, region in (regions() | given).items():
             line, reason = row(name, region, across)
             print(line, flush=True)

@@ -481,7 +481,7 @@ COMMANDS = {
             "orientation (unit vectors along the cell's axes), wavelength; and of a carrier's elements stiffness",
         ),
         option("--solver", choices=("calculix", "abaqus"), help="whose .inp of --of beams it is: calculix (default) or abaqus"),
-        option("--oriented", action="store_true", help="of a carrier's .inp: cubic materials along the axes of each tetrahedron"),
+        option("--oriented", action="store_true", help="of a carrier's .inp: cubic materials along each element's axes"),
         option("--hold", type=names, metavar="NAMES", help="sets whose nodes do not move, by commas, in .inp"),
         option(
             "--load",

@@ -171,7 +171,13 @@ class FiniteElements:
                 f"the field {name} has the shape {found.shape}; it must have a row for each of {counts[0]} nodes or "
                 f"{counts[1]} elements"
             )
-        if re.search(r'[<>&"\x00-\x1f]', name) or name in (*self._figures.sets, "fraction", "thickness", "domain", *self._of_elements()):
+        if re.search(r'[<>&"\x00-\x1f]', name) or name in (
+            *self._figures.sets,
+            "fraction",
+            "thickness",
+            "domain",
+            *self._of_elements(),
+        ):
             raise ValueError(f"a field cannot be named {name!r}; use another name")
         return found
 
@@ -312,8 +318,8 @@ class Carrier(VolumeMesh):
     mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume``
     (mm³) is that of the tetrahedra. A skin, keep zones and a net are no part of it.
 
-    In .msh, .vtu and .xdmf each tetrahedron has its ``fraction`` and its ``orientation``, the nine numbers of ``axes``; ``fields`` may
-    have materials: ``carrier.moduli()``, {"C": carrier.stiffness().reshape(-1, 36)}.
+    In .msh, .vtu and .xdmf each tetrahedron has its ``fraction`` and its ``orientation``, the nine numbers of ``axes``;
+    ``fields`` may have materials: ``carrier.moduli()``, {"C": carrier.stiffness().reshape(-1, 36)}.
     """
 
     def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
@@ -332,9 +338,9 @@ class Carrier(VolumeMesh):
 
     @cached_property
     def axes(self) -> NDArray[np.float64]:
-        """The axes of each tetrahedron (m, 3, 3), unit vectors, one row each: those of the body-centred cubic lattice whose tetrahedra
-        it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside the background
-        mesh, they are the same everywhere but for their order and signs.
+        """The axes of each tetrahedron (m, 3, 3), unit vectors, one row each: those of the body-centred cubic lattice whose
+        tetrahedra it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside
+        the background mesh, they are the same everywhere but for their order and signs.
         """
         return fixed(self._core.axes.reshape(-1, 3, 3))
 
@@ -342,8 +348,8 @@ class Carrier(VolumeMesh):
         self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
     ) -> NDArray[np.float64]:
         """The stiffness of each tetrahedron (m, 6, 6) over Young's modulus of the solid, in world axes, Voigt's order
-        11 22 33 23 13 12: cubic along ``axes``, that of the cell in equal tetrahedra at the mean fraction of the domain. See ``moduli``
-        for what it does not show, and for ``nu`` and ``n``.
+        11 22 33 23 13 12: cubic along ``axes``, that of the cell in equal tetrahedra at the mean fraction of the domain. See
+        ``moduli`` for what it does not show, and for ``nu`` and ``n``.
         """
         import numpy as np
 
@@ -368,9 +374,9 @@ class Carrier(VolumeMesh):
         fields: Mapping[str, ArrayLike] | None = None,
         oriented: bool = False,
     ) -> None:
-        """As ``VolumeMesh.write``. In .inp and .bdf each domain has a material: ``moduli(nu)`` times the ``E`` (MPa) of the solid.
-        With ``oriented`` it is cubic, along the ``axes`` of each element (*ORIENTATION by a *DISTRIBUTION), as ``stiffness(nu)``;
-        in .inp alone.
+        """As ``VolumeMesh.write``. In .inp and .bdf each domain has a material: ``moduli(nu)`` times the ``E`` (MPa) of the
+        solid. With ``oriented`` it is cubic, along the ``axes`` of each element (*ORIENTATION by a *DISTRIBUTION), as
+        ``stiffness(nu)``; in .inp alone.
         """
         kind = extension(path, VOLUME_WRITES)
         if not oriented:
@@ -402,8 +408,8 @@ class Carrier(VolumeMesh):
     def materials(
         self, nu: float, kind: str, threads: int | None = None, progress: Progress | None = None
     ) -> dict[str, NDArray[np.float64]]:
-        """``moduli`` and ``stiffness`` as fields of a file: the latter as ``stiffness``, its 36 numbers row by row, or, in .msh, as
-        C11, C12 and C44 along the axes.
+        """``moduli`` and ``stiffness`` as fields of a file: the latter as ``stiffness``, its 36 numbers row by row, or, in
+        .msh, as C11, C12 and C44 along the axes.
         """
         import numpy as np
 
