@@ -200,11 +200,11 @@ def test_streamed_files_are_those_of_the_mesh(tmp_path, kind):
     """Byte by byte, whatever is dropped; nothing else is left, not even when the work is stopped on its way."""
     solid = cube().build()
     for islands in ("keep", "drop"):
-        told = solid.save(tmp_path / f"a.{kind}", per_cell=9, islands=islands)
+        reported = solid.save(tmp_path / f"a.{kind}", per_cell=9, islands=islands)
         made = solid.mesh(per_cell=9, islands=islands)
         made.write(tmp_path / f"b.{kind}")
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
-        assert told.triangles == made.counts[1]
+        assert reported.triangles == made.counts[1]
 
     class Enough(Exception):
         pass
@@ -315,11 +315,11 @@ def test_warnings_are_python_warnings():
 
 
 def test_progress_and_interruption():
-    """Progress is told on the calling thread; what it raises stops the work and comes out."""
+    """Progress is reported on the calling thread; what it raises stops the work and comes out."""
     solid = cube(size=16).build()
-    told = []
-    solid.mesh(edge=0.08, progress=lambda done, total: told.append(done / total))
-    assert told and sorted(told) == told and told[-1] <= 1
+    reported = []
+    solid.mesh(edge=0.08, progress=lambda done, total: reported.append(done / total))
+    assert reported and sorted(reported) == reported and reported[-1] <= 1
 
     def stop(done, total):
         raise RuntimeError("enough")
@@ -486,13 +486,13 @@ def test_numbers_of_any_kind():
 def test_the_edge_is_told_where_the_grid_is_too_coarse():
     """And it is right: with it the fraction is the design's."""
     solid = cube(level=lt.level.fraction(0.5)).build()
-    with pytest.warns(lt.DesignWarning, match="too coarse") as told:
+    with pytest.warns(lt.DesignWarning, match="too coarse") as reported:
         solid.mesh(edge=1)
-    (text,) = [str(w.message) for w in told if "too coarse" in str(w.message)]
+    (text,) = [str(w.message) for w in reported if "too coarse" in str(w.message)]
     edge = float(text.split("edge of ")[1].split()[0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Without the crumbs in the box's corners, which are told of too.
+        # Without the crumbs in the box's corners, which are reported of too.
         assert abs(solid.mesh(edge=edge, islands="drop").solid_fraction - 0.5) < 0.02
 
 
@@ -508,7 +508,7 @@ def test_uniform_levels_are_exact():
 
 
 def test_memory_of_control_groups(tmp_path):
-    """Version 1 and 2, every group above counted, caches given back; without files nothing is told."""
+    """Version 1 and 2, every group above counted, caches given back; without files nothing is reported."""
     free = lt._core.free_memory
 
     def put(name, text):

@@ -22,7 +22,7 @@ def built(region=BOX, **beams):
         return lt.Design(region=region, beams=lt.Beams(**beams)).build()
 
 
-def told(solid):
+def reported(solid):
     """The report of the beams named core."""
     return solid.report()["beams"]["core"]
 
@@ -72,7 +72,7 @@ def test_every_cell_fills_a_region(cell):
     """Nodes well inside have the valence of the cell, the field is solid on beams and open in the middle of nothing."""
     wave = [4 * v for v in lt.beams.cell(cell)["aspect"]]
     solid = built(cell=cell, map=lt.map.affine(wavelength=wave, rotate=[5, 6, 7]), radius=0.12)
-    report = told(solid)
+    report = reported(solid)
     known = lt.beams.cell(cell)["valence"]
     assert set(report["valence"]) <= {str(v) for v in known}
     assert 0.001 < report["fraction"] < 0.3
@@ -88,10 +88,10 @@ def test_a_fraction_gives_the_radius_for_which_it_is_known():
     a, r = 5, 0.7
     fraction = (3 * np.pi * r**2 * a - 8 * np.sqrt(2) * r**3) / a**3
     solid = built(cell="sc", map=lt.map.affine(wavelength=a), fraction=fraction)
-    assert told(solid)["solved_radius"] == pytest.approx(r, rel=1e-9)
+    assert reported(solid)["solved_radius"] == pytest.approx(r, rel=1e-9)
     frame = built(nodes=SQUARE, struts=RING, fraction=0.03, fillet="auto")
-    again = built(nodes=SQUARE, struts=RING, radius=told(frame)["solved_radius"], fillet="auto")
-    assert told(again)["fraction"] == pytest.approx(0.03, rel=1e-9) and told(again)["solved_radius"] is None
+    again = built(nodes=SQUARE, struts=RING, radius=reported(frame)["solved_radius"], fillet="auto")
+    assert reported(again)["fraction"] == pytest.approx(0.03, rel=1e-9) and reported(again)["solved_radius"] is None
     # One that the region cuts, by 50 000 points: four deviations of as many chances.
     cut = [[-5, 5, 5], [5, 5, 5], [5, 5, 15], [5, 15, 5]]
     part = built(nodes=cut, struts=[[0, 1], [1, 2], [1, 3]], fraction=0.1)
@@ -108,7 +108,7 @@ def test_fillets_add_only_where_beams_meet():
     a, b = sharp.field(points), round_.field(points)
     assert np.all(b[a < 0] < 0)
     assert np.count_nonzero(b < 0) > np.count_nonzero(a < 0)
-    assert told(round_)["fillet_radius"][0] == pytest.approx(0.2, rel=1e-6)
+    assert reported(round_)["fillet_radius"][0] == pytest.approx(0.2, rel=1e-6)
     mesh = round_.mesh(edge=0.3)
     assert mesh.closed and mesh.pieces == 1
 
@@ -122,7 +122,7 @@ def test_other_maps_carry_nodes(map_):
         "phase": lt.map.phase(wavelength=4, rotate_z={"linear": {"along": [0, 0, 1], "stops": [[0, 0], [10, 30]]}}),
     }
     solid = built(cell="bcc", map=maps[map_], radius=0.2)
-    assert told(solid)["valence"].get("8", 0) > 10
+    assert reported(solid)["valence"].get("8", 0) > 10
     assert solid.mesh(edge=0.25).closed
     graph = solid.beams["core"]
     if map_ == "cylinder":
@@ -153,9 +153,9 @@ def test_radii_vary_with_place():
     z = graph["centers"][:, 2]
     inner = np.all((graph["centers"] > -1e-9) & (graph["centers"] < 10 + 1e-9), axis=1) & (z < 9.9)
     assert np.allclose(graph["radii"][inner], 0.2 + 0.04 * np.minimum(z[inner] + 1.25, 10))
-    assert told(solid)["thickness"] == pytest.approx(0.4, abs=0.02)
+    assert reported(solid)["thickness"] == pytest.approx(0.4, abs=0.02)
     waisted = built(cell="sc", map=lt.map.affine(wavelength=5), radius=0.3, hub=0.8)
-    assert told(waisted)["thickness"] == pytest.approx(0.6, rel=1e-9)
+    assert reported(waisted)["thickness"] == pytest.approx(0.6, rel=1e-9)
     on, off = waisted.field([[2.5, 0.01, 0.29], [2.5, 0.01, 0.31]])
     assert on < 0 < off
 
@@ -165,7 +165,7 @@ def test_what_leaves_the_region(trim):
     """Cut: solid up to the surface. Drop: no beam leaves. Snap: free ends lie on the surface."""
     ball = lt.region.sphere(radius=6)
     solid = built(ball, cell="bcc", map=lt.map.affine(wavelength=4), radius=0.3, trim=trim)
-    graph, report = solid.beams["core"], told(solid)
+    graph, report = solid.beams["core"], reported(solid)
     far = np.linalg.norm(graph["centers"], axis=1)
     assert solid.mesh(edge=0.2).closed
     if trim == "cut":
@@ -183,7 +183,7 @@ def test_what_begins_on_the_surface_is_outside_when_ends_are_snapped():
     box = lt.region.box(min=[0, 0, 0], max=[12, 12, 12])
     solid = built(box, cell="octet", map=lt.map.affine(wavelength=6), radius=0.4, trim="snap")
     graph = solid.beams["core"]
-    assert np.all((graph["centers"] > -1e-9) & (graph["centers"] < 12 + 1e-9)) and told(solid)["trimmed"]["snapped"] == 0
+    assert np.all((graph["centers"] > -1e-9) & (graph["centers"] < 12 + 1e-9)) and reported(solid)["trimmed"]["snapped"] == 0
 
 
 def test_a_grid_too_coarse_for_beams_is_warned_of():
@@ -202,12 +202,12 @@ def test_loose_ends_are_told_and_dropped():
     tail = [*RING, [0, 4], [4, 5]]
     with pytest.warns(lt.DesignWarning, match="1 node inside the region with a single beam"):
         kept = lt.Design(region=BOX, beams=lt.Beams(nodes=nodes, struts=tail, radius=0.5)).build()
-    assert told(kept)["dangling"] == 1
-    dropped = told(built(nodes=nodes, struts=tail, radius=0.5, dangling="drop"))
+    assert reported(kept)["dangling"] == 1
+    dropped = reported(built(nodes=nodes, struts=tail, radius=0.5, dangling="drop"))
     assert dropped["dangling"] == 0 and dropped["beams"] == 4 and dropped["cleaned"]["dangling"] == 2
 
 
-def test_what_is_twice_is_told():
+def test_what_is_twice_is_reported():
     """Merged nodes, beams of no length, beams that are there already, nodes without beams; beams within others."""
     nodes = [*SQUARE, [1, 1, 5], [2, 2, 2]]
     with pytest.warns(lt.DesignWarning, match="1 node merged .* 1 strut of no length .* 1 strut left out .* 1 node left out"):
@@ -252,7 +252,7 @@ def test_a_pattern_is_the_graph_that_it_stands_for(fillet):
     laid = built(region, pattern=SWIRL, profile="cone", fillet=fillet)
     graph = laid.beams["core"]
     nodes = np.column_stack([graph["centers"], graph["radii"]])
-    assert (len(nodes), told(laid)["hubs"], told(laid)["beams"]) == (180, 180, len(graph["struts"]))
+    assert (len(nodes), reported(laid)["hubs"], reported(laid)["beams"]) == (180, 180, len(graph["struts"]))
     whole = built(region, nodes=nodes, struts=graph["struts"], profile="cone", fillet=fillet)
     points = np.random.default_rng(3).uniform([-10, -10, -1], [10, 10, 6], (20000, 3))
     a, b = laid.field(points), whole.field(points)
@@ -270,10 +270,10 @@ def test_the_exact_volume_of_a_pattern_is_that_of_its_graph():
     graph = sharp.beams["core"]
     nodes = np.column_stack([graph["centers"], graph["radii"]])
     whole = built(region, nodes=nodes, struts=graph["struts"], profile="cone")
-    assert told(sharp)["volume"] == pytest.approx(told(whole)["volume"], rel=1e-9)
+    assert reported(sharp)["volume"] == pytest.approx(reported(whole)["volume"], rel=1e-9)
     # Steps of 0.2 mm, so that surfaces run along grid edges.
     rounded = built(region, pattern=pattern, profile="cone", fillet="auto").mesh(edge=0.2)
-    assert rounded.closed and rounded.volume > told(sharp)["volume"]
+    assert rounded.closed and rounded.volume > reported(sharp)["volume"]
 
 
 def test_beams_are_blended_with_a_lattice():
@@ -295,7 +295,7 @@ def test_a_thousand_million_hubs_are_checked_at_once():
     """A pattern is not written out; a graph of that size is refused before it is made."""
     steps = [{"count": 1000, "by": by} for by in ([1, 0, 0], [0, 1, 0], [0, 0, 1])]
     pattern = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0, 1]], "repeat": steps}
-    report = told(built(pattern=pattern, radius=0.2))
+    report = reported(built(pattern=pattern, radius=0.2))
     assert (report["hubs"], report["beams"], report["kinds"]) == (1e9, 3 * 1000 * 1000 * 999, 27)
     # Equal cylinders of radius x on a simple cubic graph: π x² ΣL − 8√2 x³ for each node, but for the ends.
     exact = 1e9 * (3 * math.pi * 0.2**2 - 8 * math.sqrt(2) * 0.2**3)
@@ -381,7 +381,7 @@ def test_each_slip_gets_one_error(beams, place, parts):
 
 
 def test_a_lattice_and_beams_need_a_blend():
-    """And a lattice whose cell is one of beams is told where it belongs."""
+    """And a lattice whose cell is one of beams is reported where it belongs."""
     lattice = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
     with pytest.raises(lt.DesignError, match="blend"):
         lt.Design(region=BOX, lattice=lattice, beams={"frame": lt.Beams(**GOOD)}).build()
@@ -431,7 +431,7 @@ def test_exact_figures_are_those_of_the_mesh_and_of_the_grid():
     import judges
 
     solid = whole()
-    exact = told(solid)
+    exact = reported(solid)
     assert np.allclose(exact["centroid"], [10, 10, 10], atol=1e-9)
     inertia = np.array(exact["inertia"])
     # A cube's symmetry leaves one number.
@@ -451,7 +451,7 @@ def test_exact_figures_are_those_of_the_mesh_and_of_the_grid():
 def test_whole_beams_are_meshed_from_their_patches_unless_a_grid_is_asked_for(tmp_path):
     """At a fiftieth of the radius: mesh, stream and the command. Beams that the region cuts, and islands, need a grid."""
     solid = whole(fillet="none")
-    chord, exact = solid.report().chord, told(solid)["volume"]
+    chord, exact = solid.report().chord, reported(solid)["volume"]
     assert chord == pytest.approx(0.6 / 50, rel=1e-9) and f"{chord:.3g} mm off at most" in str(solid.report())
     mesh = solid.mesh()
     assert np.array_equal(mesh.vertices, solid.mesh(chord=chord).vertices) and 0 < mesh.chord_error <= chord
@@ -510,21 +510,21 @@ def test_hubs_and_a_profile_are_enough():
     """A waist or a λ needs no radius of beams: the balls and it say all."""
     box = lt.region.box(min=[-1, -1, -1], max=[21, 21, 21])
     given = {"cell": "bcc", "hub": 0.7, "trim": "drop", "map": lt.map.affine(wavelength=10)}
-    assert told(built(region=box, **given, profile={"waist": 0.3}))["thickness"] == pytest.approx(0.6, rel=1e-9)
-    assert told(built(region=box, **given))["thickness"] == pytest.approx(1.4, rel=1e-9)
+    assert reported(built(region=box, **given, profile={"waist": 0.3}))["thickness"] == pytest.approx(0.6, rel=1e-9)
+    assert reported(built(region=box, **given))["thickness"] == pytest.approx(1.4, rel=1e-9)
 
 
 def test_the_fraction_is_exact_where_nothing_cuts():
     """Of uncut beams in a box the volume over the box's; of cut ones, or with a skin, by points."""
     solid = whole()
-    report = told(solid)
+    report = reported(solid)
     assert report["fraction_exact"] and report["fraction"] == pytest.approx(report["volume"] / 22**3, rel=1e-12)
     assert solid.quadors().whole
     box = lt.region.box(min=[-1, -1, -1], max=[21, 21, 21])
     beams = lt.Beams(cell="octet", radius=0.6, trim="drop", map=lt.map.affine(wavelength=10))
     skinned = lt.Design(region=box, beams=beams, skin={"thickness": 0.3}).build()
     for cut in (built(cell="octet", radius=0.3, map=lt.map.affine(wavelength=4)), skinned):
-        assert not told(cut)["fraction_exact"] and not cut.quadors().whole
+        assert not reported(cut)["fraction_exact"] and not cut.quadors().whole
         assert "uncut" in repr(cut.quadors())
 
 
@@ -534,12 +534,12 @@ def test_patterns_are_looked_through_for_beams_that_collide():
     pattern = {"nodes": [[0, 0, 0], [0, 0, 0.5]], "struts": [[0, 0, 1, 1, 0], [1, 1, 1, -1, 0]], "repeat": steps}
     region = lt.region.box(min=[-2, -2, -2], max=[62, 62, 2])
     clear = lt.Design(region=region, beams=lt.Beams(pattern=pattern, radius=0.24)).build()
-    report = told(clear)
+    report = reported(clear)
     assert report["collisions"] == 0 and report["fraction_exact"]
     assert report["fraction"] == pytest.approx(report["volume"] / (64 * 64 * 4), rel=1e-12)
     with pytest.warns(lt.DesignWarning, match="run into each other without a common node"):
         joined = lt.Design(region=region, beams=lt.Beams(pattern=pattern, radius=0.26)).build()
-    report = told(joined)
+    report = reported(joined)
     assert report["collisions"] > 0 and report["volume"] is None and not report["fraction_exact"]
 
 
@@ -549,12 +549,12 @@ def test_a_mesh_that_memory_has_no_room_for_is_refused_beforehand():
         whole().mesh(chord=1e-8)
 
 
-def test_beams_that_cross_without_a_node_are_told():
+def test_beams_that_cross_without_a_node_are_reported():
     """One solid on a grid, but without exact figures: what is shared would count twice."""
     apart = {"nodes": [[1, 5, 5], [9, 5, 5], [5, 1, 5.9], [5, 9, 5.9]], "struts": [[0, 1], [2, 3]], "radius": 0.5}
     with pytest.warns(lt.DesignWarning, match=r"1 pair of beams run into or touch each other .* at \(5, 5, 5.45\) mm"):
         solid = lt.Design(region=BOX, beams=lt.Beams(**apart)).build()
-    report = told(solid)
+    report = reported(solid)
     assert report["collisions"] == 1 and report["volume"] is None
     with pytest.raises(ValueError, match="intersects beam 1"):
         solid.quadors().volume()
@@ -562,8 +562,8 @@ def test_beams_that_cross_without_a_node_are_told():
         solid.mesh(chord=0.05)
     assert solid.mesh(edge=0.1).pieces == 1
     clear = built(**(apart | {"radius": 0.44}))
-    assert told(clear)["collisions"] == 0
-    assert clear.quadors().volume() == pytest.approx(told(clear)["volume"], rel=1e-12)
+    assert reported(clear)["collisions"] == 0
+    assert clear.quadors().volume() == pytest.approx(reported(clear)["volume"], rel=1e-12)
 
 
 def test_a_chord_error_takes_the_place_of_a_spacing():
@@ -591,7 +591,7 @@ def test_filleted_beams_of_many_sizes_are_meshed_within_any_chord_error(cell, wa
     solid = built(box, cell=cell, map=lt.map.affine(wavelength=wavelength), trim="drop", dangling="drop", **more)
     for chord in (None, 0.004, 0.005, 0.01, 0.02):
         mesh = solid.mesh(chord=chord)
-        assert mesh.closed and mesh.volume == pytest.approx(told(solid).volume, rel=1e-6)
+        assert mesh.closed and mesh.volume == pytest.approx(reported(solid).volume, rel=1e-6)
 
 
 def test_beams_may_be_called_as_one_of_their_keys_is(tmp_path):

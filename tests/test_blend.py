@@ -218,10 +218,10 @@ def test_check_warns_where_no_solid_leads_across(tmp_path):
     done = subprocess.run(run, capture_output=True, text=True, check=True)
     assert "cancel at (0, " in done.stderr and 'no solid leads from "a" to "b"' in done.stderr
     report = json.loads(subprocess.run([*run, "--json"], capture_output=True, text=True, check=True).stdout)
-    (told,) = report["blend"]["transitions"]
+    (reported,) = report["blend"]["transitions"]
     assert [w["path"] for w in report["warnings"]] == ["blend", "blend"]
     # A lattice's solid ends within a cell of where the other takes over.
-    assert told["neck"] is None and abs(told["gap"][0]) < 4
+    assert reported["neck"] is None and abs(reported["gap"][0]) < 4
 
 
 @pytest.mark.parametrize(
@@ -234,8 +234,8 @@ def test_check_warns_where_no_solid_leads_across(tmp_path):
 )  # fmt: skip
 def test_weights_that_may_not_be_meant_are_warned_of(tmp_path, weight, path, words):
     ramp = "{ linear = { along = [1, 0, 0], stops = [[-6, 0], [6, 1]] } }"
-    told = lt.load(bar(tmp_path, (ramp, weight))).build().warnings
-    assert any(w["path"] == path and words in w["message"] for w in told), told
+    reported = lt.load(bar(tmp_path, (ramp, weight))).build().warnings
+    assert any(w["path"] == path and words in w["message"] for w in reported), reported
     sound = lt.load(bar(tmp_path, (ramp, '{ formula = "0.5 + x/24" }'))).build()
     assert sound.warnings == []
 
@@ -243,16 +243,16 @@ def test_weights_that_may_not_be_meant_are_warned_of(tmp_path, weight, path, wor
 def test_check_tells_and_draws_the_transitions(tmp_path):
     file = bar(tmp_path)
     run = [sys.executable, "-m", "trabecula", "check", str(file)]
-    told = subprocess.run(run, capture_output=True, text=True, check=True).stdout
-    assert "transition a to b" in told and "neck" in told and "phases locked" in told
+    reported = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    assert "transition a to b" in reported and "neck" in reported and "phases locked" in reported
     picture = tmp_path / "bar.svg"
     run += ["--json", "--transitions", str(picture)]
     report = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     assert report["blend"]["transitions"][0]["between"] == ["a", "b"]
     assert "Transition from a to b" in picture.read_text(encoding="utf-8")
     run = [sys.executable, "-m", "trabecula", "measure", str(file), "--per-cell", "10"]
-    told = subprocess.run(run, capture_output=True, text=True, check=True).stdout
-    assert "transition a to b" in told and "pieces" in told and "dangling" in told
+    reported = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    assert "transition a to b" in reported and "pieces" in reported and "dangling" in reported
     drawn = tmp_path / "measured.svg"
     run += ["--json", "--transitions", str(drawn)]
     figures = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
@@ -324,7 +324,7 @@ def test_where_no_lattice_is_alone_not_all_is_loose(tmp_path):
     ramp = "weight = { linear = { along = [1, 0, 0], stops = [[-6, 0], [6, 1]] } }"
     slow = "weight = { linear = { along = [1, 0, 0], stops = [[-12, 0.2], [12, 0.8]] } }"
     for weight, crosses in ((slow, True), ("weight = 0.5", False)):
-        (told,) = lt.load(bar(tmp_path, (ramp, weight))).build().transitions()
-        assert (told["neck"] is not None) == crosses
+        (reported,) = lt.load(bar(tmp_path, (ramp, weight))).build().transitions()
+        assert (reported["neck"] is not None) == crosses
         # Crumbs that the sides of the bar cut off, of some 460 mm³ of solid.
-        assert told["loose"]["volume"] < 5
+        assert reported["loose"]["volume"] < 5

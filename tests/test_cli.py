@@ -145,8 +145,8 @@ def test_threads_do_not_change_a_byte(tmp_path, cube):
 
 
 def test_an_open_mesh_has_the_area_of_its_file(tmp_path, cube):
-    told = json.loads(run("mesh", "cube.toml", "-o", "a.stl", "--edge", "0.5", "--open", "--json", cwd=tmp_path).stdout)
-    assert told["open"] and told["area"] == pytest.approx(lt.Mesh.read(tmp_path / "a.stl").area, rel=1e-5)
+    reported = json.loads(run("mesh", "cube.toml", "-o", "a.stl", "--edge", "0.5", "--open", "--json", cwd=tmp_path).stdout)
+    assert reported["open"] and reported["area"] == pytest.approx(lt.Mesh.read(tmp_path / "a.stl").area, rel=1e-5)
 
 
 def test_voxels_and_pictures(tmp_path, cube):
@@ -297,8 +297,8 @@ def test_what_a_design_reads_is_kept(tmp_path, cube):
     made = (tmp_path / "cell.stl").read_bytes()
     text = 'schema = 1\n[region.box]\nsize = [8, 8, 8]\n[lattice.a]\ncell.file.path = "cell.stl"\npart = "lower"\n'
     (tmp_path / "a.toml").write_text(text + "map.affine.wavelength = 4\nlevel.fraction = 0.3\n")
-    told = run("mesh", "a.toml", "-o", "cell.stl", "--edge", "1", cwd=tmp_path, status=1).stderr
-    assert "read by this design" in told and (tmp_path / "cell.stl").read_bytes() == made
+    reported = run("mesh", "a.toml", "-o", "cell.stl", "--edge", "1", cwd=tmp_path, status=1).stderr
+    assert "read by this design" in reported and (tmp_path / "cell.stl").read_bytes() == made
 
 
 def test_output_can_be_closed_early(tmp_path):
@@ -503,7 +503,7 @@ def test_measures_of_odd_meshes(tmp_path):
 
 
 def test_voxels_and_meshes_that_are_too_coarse(tmp_path, cube):
-    """Thin walls, and a result that has little to do with the design, are told with the step to use."""
+    """Thin walls, and a result that has little to do with the design, are reported with the step to use."""
     cube.write_text(CUBE.replace("0.3", "0.05"))
     done = run("voxels", cube, "-o", "a.npy", "--step", "0.5", cwd=tmp_path)
     assert "thinnest wall" in done.stderr and "use a step of" in done.stderr
@@ -540,8 +540,8 @@ def test_long_series_are_checked(tmp_path, kind):
     design = {"schema": 1, "region": {"box": {"size": [8, 8, 8]}}, "lattice": {"a": {**lattice, "level": {"fraction": 0.3}}}}
     (tmp_path / "a.json").write_text(json.dumps(design))
     report = json.loads(run("check", "a.json", "--json", cwd=tmp_path).stdout)
-    told = [w["message"] for w in report["warnings"] if "rough" in w["message"]]
-    assert bool(told) == (kind == "fine")
+    reported = [w["message"] for w in report["warnings"] if "rough" in w["message"]]
+    assert bool(reported) == (kind == "fine")
 
 
 def test_cells_of_every_list_are_found_by_name(tmp_path):

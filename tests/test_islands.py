@@ -131,11 +131,11 @@ def test_python(tmp_path, balls):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         one = solid.mesh(edge=0.25, islands="drop")
-        told = solid.save(tmp_path / "a.stl", edge=0.25, islands="drop")
-    assert told["islands"] == one.islands
+        reported = solid.save(tmp_path / "a.stl", edge=0.25, islands="drop")
+    assert reported["islands"] == one.islands
     assert one.islands["dropped"] == mesh.pieces - 1 == mesh.islands["found"] and mesh.islands["dropped"] == 0
-    assert one.pieces == told["pieces"] == 1 and one.closed
-    assert one.volume == pytest.approx(told["volume"]) == pytest.approx(mesh.volume - mesh.islands["volume"])
+    assert one.pieces == reported["pieces"] == 1 and one.closed
+    assert one.volume == pytest.approx(reported["volume"]) == pytest.approx(mesh.volume - mesh.islands["volume"])
     assert len(one.cut) == len(one.triangles) and one.triangles.max() + 1 == len(one.vertices)
     assert lt.Mesh.read(tmp_path / "a.stl").islands is None
     assert one.within(solid).islands == one.islands

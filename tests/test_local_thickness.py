@@ -113,9 +113,9 @@ def test_refused(solid, tmp_path):
         lt.Mesh.read(box(tmp_path / "thin.obj", low=(0, 0, 0.01), high=(8, 8, 0.02))).within(
             lt.Design(region=lt.region.box(min=[0, 0, 0], max=[8, 8, 8]), lattice={"a": lattice()}).build()
         ).thickness(1.0)
-    told = []
-    mesh.thickness(0.05, progress=lambda done, total: told.append(done / total))
-    assert all(0 <= share <= 1 for share in told)
+    reported = []
+    mesh.thickness(0.05, progress=lambda done, total: reported.append(done / total))
+    assert all(0 <= share <= 1 for share in reported)
 
 
 def lattice():

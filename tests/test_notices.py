@@ -47,7 +47,7 @@ def test_figures_have_the_warnings_of_the_grid(tmp_path, cube, words):
 
 
 def test_figures_have_the_warnings_of_design_and_islands(tmp_path):
-    """A network below its limit, in pieces: both are told, the design's with the path of the key."""
+    """A network below its limit, in pieces: both are reported, the design's with the path of the key."""
     (tmp_path / "balls.toml").write_text(BALLS)
     for name in ("a.stl", "a.3mf"):
         found = json.loads(run("mesh", "balls.toml", "-o", name, "--edge", "0.3", "--json", cwd=tmp_path).stdout)["warnings"]

@@ -89,12 +89,12 @@ def test_parts_are_filled(tmp_path, name):
 
 
 def streams_whole(made, folder, **spacing):
-    """A part that many tiles make, each by itself, is closed and has the volume that was told."""
-    told = made.save(folder / "part.stl", **spacing)
+    """A part that many tiles make, each by itself, is closed and has the volume that was reported."""
+    reported = made.save(folder / "part.stl", **spacing)
     mesh = judges.of_stl(folder / "part.stl")
-    assert len(mesh[1]) == told["triangles"]
+    assert len(mesh[1]) == reported["triangles"]
     assert judges.status(*mesh) == judges.manifold3d.Error.NoError
-    assert judges.volume(*mesh) == pytest.approx(told["volume"], rel=1e-6)
+    assert judges.volume(*mesh) == pytest.approx(reported["volume"], rel=1e-6)
 
 
 @quiet
@@ -143,7 +143,7 @@ def whole(name):
 @quiet
 @pytest.mark.parametrize(("name", "damage", "cell", "skin"), CASES)
 def test_damaged_parts_are_filled_alike(tmp_path, name, damage, cell, skin):
-    """A damaged part comes out as the whole one does, and the repair is told."""
+    """A damaged part comes out as the whole one does, and the repair is reported."""
     part, volumes = whole(name)
     damaged = parts.DAMAGES[damage](part, np.random.default_rng(5))
     made = solid(tmp_path, damaged, cell, skin)

@@ -77,15 +77,15 @@ def test_tubes_and_balls_close():
 def test_cells_pinched_round_an_axis_are_warned_of(hole, words):
     """Twenty cells round a hole of 0.5 mm are 2 pi 0.5 / 20 = 0.157 mm wide there; round one of 5 mm all is well."""
 
-    def told(hole):
+    def reported(hole):
         rod = lt.region.cylinder(base=[0, 0, 0], radius=8, height=8)
         bored = rod if hole is None else lt.region.difference(rod, lt.region.cylinder(base=[0, 0, -1], radius=hole, height=10))
         core = lt.Lattice("gyroid", "sheet", lt.map.cylinder(wavelength=3, around=20), lt.level.fraction(0.3))
         return lt.Design(region=bored, lattice={"core": core}).build().warnings
 
-    (warning,) = told(hole)
+    (warning,) = reported(hole)
     assert warning["path"] == "lattice.core.map.cylinder.around" and words in warning["message"]
-    assert told(5) == []
+    assert reported(5) == []
 
 
 def test_faults_of_angles_name_the_key_that_was_given():

@@ -73,7 +73,7 @@ def test_the_area_of_a_slice_is_that_of_its_points(quadors, cut):
 
 
 def test_loops_are_closed_curves_on_their_conics(quadors):
-    """Each curve begins where the one before ended, and lies on the conic that is told with it."""
+    """Each curve begins where the one before ended, and lies on the conic that is reported with it."""
     found = quadors.slice(point=[5, 5, 5], normal=[1, 2, 0.5])
     for loop in found.loops:
         points, w = loop["points"], loop["weights"][:, None]
@@ -153,10 +153,10 @@ def test_the_command_draws_a_slice(tmp_path):
     assert part["area"] == pytest.approx(4 * math.pi, rel=1e-5) and part["loops"] == 9  # those on the sides are cut
     words += ["--beams", "core"]  # whole
     ran = subprocess.run(words, capture_output=True, text=True, check=True)
-    told = json.loads(ran.stdout)
-    assert told["area"] == pytest.approx(told["loops"] * math.pi, rel=1e-12) and told["loops"] >= 9
+    reported = json.loads(ran.stdout)
+    assert reported["area"] == pytest.approx(reported["loops"] * math.pi, rel=1e-12) and reported["loops"] >= 9
     drawn = (tmp_path / "o.svg").read_text()
-    assert drawn.count("M ") == told["loops"] and drawn.startswith("<svg")
+    assert drawn.count("M ") == reported["loops"] and drawn.startswith("<svg")
     words[words.index("--z") + 1] = "high"
     assert subprocess.run(words, capture_output=True).returncode == 2
 

@@ -41,7 +41,7 @@ def test_a_clean_mesh_has_nothing_to_tell(tmp_path):
         ([f[::-1] for f in FACES], "bodies_turned", 1, "inside out"),
     ],
 )
-def test_damage_is_repaired_and_told(tmp_path, faces, key, count, words):
+def test_damage_is_repaired_and_reported(tmp_path, faces, key, count, words):
     built = design(tmp_path, CORNERS, faces)
     solid = built.build()
     assert volume(solid) == pytest.approx(512, rel=1e-12)
@@ -85,7 +85,7 @@ def refused(folder, vertices, faces):
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "1e999"])
 def test_numbers_that_are_none(tmp_path, bad):
-    """A corner that is nowhere is told by its line."""
+    """A corner that is nowhere is reported by its line."""
     vertices = [list(map(str, v)) for v in CORNERS]
     vertices[5][1] = bad
     assert "line 6: coordinate" in refused(tmp_path, vertices, FACES) and "not finite" in refused(tmp_path, vertices, FACES)

@@ -29,8 +29,8 @@ def test_the_command_prints_the_same(tmp_path, cube):
     """`--json` has the keys and numbers of the report, its words are the report's."""
     solid = lt.load(cube).build()
     error = solid.volume_error()
-    told = json.loads(run("check", cube, "--json", cwd=tmp_path).stdout)
-    assert told == solid.report().to_dict() | {"volume_error": error}
+    reported = json.loads(run("check", cube, "--json", cwd=tmp_path).stdout)
+    assert reported == solid.report().to_dict() | {"volume_error": error}
     words = run("check", cube, cwd=tmp_path).stdout
     assert words.startswith(f"{solid.report()}\n") and f"{error:.1g}" in words.splitlines()[-1]
     measured = json.loads(run("measure", cube, "--edge", "0.5", "--json", cwd=tmp_path).stdout)

@@ -38,9 +38,9 @@ def test_a_goal_that_is_none(block, goal):
 
 def test_progress_is_told_and_stops(block):
     mesh = block.mesh(per_cell=24)
-    told = []
-    mesh.simplified(tolerance=0.02, progress=lambda done, total: told.append((done, total)))
-    assert told and all(0 < done <= total for done, total in told)
+    reported = []
+    mesh.simplified(tolerance=0.02, progress=lambda done, total: reported.append((done, total)))
+    assert reported and all(0 < done <= total for done, total in reported)
 
     def stop(done, total):
         raise KeyboardInterrupt

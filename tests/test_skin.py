@@ -101,7 +101,7 @@ def test_regions_that_do_not_touch():
 
 
 def test_a_ball_has_no_flat_face():
-    """A curved region cannot be opened, and is told how to."""
+    """A curved region cannot be opened, and is reported how to."""
     text = CUBE.replace("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = 5")
     error = refused('[skin]\nthickness = 1\nopen = ["-z"]\n', text)
     assert error.path == "skin.open[0]" and "cut it there with a half-space" in str(error)
@@ -185,7 +185,7 @@ def test_a_part_fraction_below_the_skin_is_refused():
 
 
 def test_a_closed_skin_traps_powder(tmp_path):
-    """A sheet in a closed skin: two labyrinths and the pockets of two corners, told with volume and place; an open face
+    """A sheet in a closed skin: two labyrinths and the pockets of two corners, reported with volume and place; an open face
     drains all but one."""
     closed = write(tmp_path / "closed.toml", CUBE + "[skin]\nthickness = 0.5\n")
     for name in ("a.stl", "a.ply"):
@@ -232,7 +232,7 @@ def test_a_void_has_its_volume_and_centre():
 
 
 def test_thin_skins_are_warned_of():
-    """Less than a step thick: kept closed, and told."""
+    """Less than a step thick: kept closed, and reported."""
     solid = design(skin=lt.skin(0.05)).build()
     with pytest.warns(lt.DesignWarning, match="skin: at its thinnest, 0.05 mm"):
         mesh = solid.mesh(edge=0.2)

@@ -80,8 +80,8 @@ def test_a_design_is_served_with_the_files_that_it_names_and_nothing_else(a_page
     with served(design) as url:
         home = url.removesuffix("?design")
         assert got(url) == (200, b"a page")
-        told = json.loads(got(home + "design.json")[1])
-        assert told == {
+        reported = json.loads(got(home + "design.json")[1])
+        assert reported == {
             "name": "corner",
             "text": design.read_text(),
             "files": [{"name": "parts/corner.stl", "url": "files/0"}],

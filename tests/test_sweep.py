@@ -746,8 +746,8 @@ def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.Ca
         status = cli.main(words)
     except SystemExit as left:
         status = left.code
-    told = capsys.readouterr().err
-    assert status == 2 and said in told and told.count("\n") == 1, told
+    reported = capsys.readouterr().err
+    assert status == 2 and said in reported and reported.count("\n") == 1, reported
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 

@@ -41,28 +41,28 @@ def test_a_part_is_closed_whole_and_as_full_as_asked():
 
 def test_the_stream_is_the_same_surface(tmp_path):
     solid = design(level=lt.level.fraction(lt.grade.linear([0, 0, 1], {-8: 0.15, 8: 0.4}))).build()
-    told = solid.save(tmp_path / "a.stl", edge=0.4)
+    reported = solid.save(tmp_path / "a.stl", edge=0.4)
     mesh = solid.mesh(edge=0.4)
     back = lt.Mesh.read(tmp_path / "a.stl")
-    assert told["triangles"] == len(mesh.triangles) == len(back.triangles)
-    assert back.closed and back.pieces == mesh.pieces == told["pieces"]
-    assert told["volume"] == pytest.approx(mesh.volume, rel=1e-12)
+    assert reported["triangles"] == len(mesh.triangles) == len(back.triangles)
+    assert back.closed and back.pieces == mesh.pieces == reported["pieces"]
+    assert reported["volume"] == pytest.approx(mesh.volume, rel=1e-12)
 
 
 def test_overlapping_cells_are_told_as_they_are_made():
     """A fraction within 0.002, the pieces, and creases before and after; by both methods one solid."""
     cell, keys = lt.cell.tet("primitive"), {"level": lt.level.fraction(0.5), "overlap": 0.2}
     solid = design(cell, **keys).build()
-    told = solid.report().lattices["a"]
-    mesh, grid = solid.mesh(edge=told.tets.edge / 24), design(cell, method="implicit", **keys).build()
+    reported = solid.report().lattices["a"]
+    mesh, grid = solid.mesh(edge=reported.tets.edge / 24), design(cell, method="implicit", **keys).build()
     by_grid = grid.report().lattices["a"].tets
-    assert (told.tets.method, by_grid.method) == ("explicit", "implicit")
-    assert told.tets.pieces == mesh.pieces == by_grid.pieces == 1
-    assert told.fraction == pytest.approx(0.5, abs=0.002)
+    assert (reported.tets.method, by_grid.method) == ("explicit", "implicit")
+    assert reported.tets.pieces == mesh.pieces == by_grid.pieces == 1
+    assert reported.fraction == pytest.approx(0.5, abs=0.002)
     # Second order in 24 steps.
     assert mesh.solid_fraction == pytest.approx(0.5, abs=0.005)
-    assert grid.mesh(edge=told.tets.edge / 16).volume == pytest.approx(mesh.volume, rel=0.02)
-    assert told.tets.creases.mean > 10 > 0.05 > told.tets.creases.smoothed
+    assert grid.mesh(edge=reported.tets.edge / 16).volume == pytest.approx(mesh.volume, rel=0.02)
+    assert reported.tets.creases.mean > 10 > 0.05 > reported.tets.creases.smoothed
 
 
 def test_crumbs_between_lattice_and_skin_are_closed():
@@ -141,7 +141,7 @@ def test_the_command_lists_them():
 
 
 def test_zones_pass_into_each_other_and_keep_the_fraction():
-    """Zones by region on the background mesh: told apart, one piece, and as full as asked, also between them."""
+    """Zones by region on the background mesh: reported apart, one piece, and as full as asked, also between them."""
     half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
     solid = design(lt.cell.tet(zones={0: "p43m", 1: "f43m"}), level=lt.level.fraction(0.3), zones={1: half}).build()
     report = solid.report()["lattices"]["a"]
@@ -173,7 +173,7 @@ def test_zones_that_do_not_join_are_told_before_a_surface_is_made():
     tets = solid.report()["lattices"]["a"]["tets"]
     (join,) = tets["joins"]
     assert join["zones"] == [0, 1] and join["joined"] and 0 < join["open"] <= join["faces"] and join["ports"] > 0
-    # As many steps as the pieces are told by.
+    # As many steps as the pieces are reported by.
     assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 16).pieces == 1
     with pytest.warns(lt.DesignWarning, match=r"zones 0 \(pn3m\) and 1 \(diamond\) do not join"):
         solid = built("pn3m", "diamond")
@@ -181,7 +181,7 @@ def test_zones_that_do_not_join_are_told_before_a_surface_is_made():
     # Several pieces are counted again in finer steps.
     assert not tets["joins"][0]["joined"] and tets["pieces"] > 1
     assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 48).pieces
-    # Without zones the pieces are told too.
+    # Without zones the pieces are reported too.
     assert design().build().report()["lattices"]["a"]["tets"]["pieces"] == 1
 
 
@@ -211,16 +211,18 @@ def test_a_single_tetrahedron_sharp_or_smooth():
 @pytest.mark.parametrize("surface", ["net", "rounded"])
 def test_ends_at_the_surface_count_in_the_fraction(surface):
     plain, solid = design().build(), design(surface=surface).build()
-    told = solid.report().lattices["a"]
+    reported = solid.report().lattices["a"]
     # On a grid chords cost of second order in its twenty steps, some per cent of the walls.
-    mesh = solid.mesh(edge=told.tets.edge / 20)
+    mesh = solid.mesh(edge=reported.tets.edge / 20)
     assert mesh.closed and mesh.pieces == 1
-    assert told.fraction == pytest.approx(0.25, abs=1e-3) and mesh.solid_fraction == pytest.approx(0.25, abs=5e-3)
-    assert told.tets.surface == surface and 0.1 < min(told.tets.end_radius) < max(told.tets.end_radius) < 2
+    assert reported.fraction == pytest.approx(0.25, abs=1e-3) and mesh.solid_fraction == pytest.approx(0.25, abs=5e-3)
+    assert reported.tets.surface == surface and 0.1 < min(reported.tets.end_radius) < max(reported.tets.end_radius) < 2
     # Every triangle has one port of the cell, and what the rods leave open is less than the largest of them.
-    net = told.tets.net
-    assert net is None if surface == "rounded" else net.ports == told.tets.mesh.quality.boundary_triangles and net.untied == 0
-    cut = mesh.measure()["area_cut"] / plain.mesh(edge=told.tets.edge / 20).measure()["area_cut"]
+    net = reported.tets.net
+    assert (
+        net is None if surface == "rounded" else net.ports == reported.tets.mesh.quality.boundary_triangles and net.untied == 0
+    )
+    cut = mesh.measure()["area_cut"] / plain.mesh(edge=reported.tets.edge / 20).measure()["area_cut"]
     # Of half balls nothing but points is on the surface; a net covers more of it than the ports that it ties.
     assert cut < 0.05 if surface == "rounded" else cut > 2
 
@@ -249,8 +251,8 @@ def test_open_ends_are_open_in_files(tmp_path):
     assert solid.open_ends and not design().build().open_ends and solid.mesh(edge=0.4).closed
     (tmp_path / "a.toml").write_text(design(surface="open").to_toml())
     run = [sys.executable, "-m", "trabecula", "mesh", tmp_path / "a.toml", "-o", tmp_path / "a.stl", "--edge", "0.4", "--json"]
-    told = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
-    assert told["open"] and not lt.Mesh.read(tmp_path / "a.stl").closed
+    reported = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
+    assert reported["open"] and not lt.Mesh.read(tmp_path / "a.stl").closed
 
 
 def test_a_region_cuts_a_mesh_that_is_not_one_of_it(tmp_path):

@@ -209,13 +209,13 @@ def test_what_is_not_installed_is_named(monkeypatch):
 
 
 def test_a_mesher_that_hangs_or_falls_is_stopped(tmp_path):
-    def told(program, limit):
+    def reported(program, limit):
         return children.run([sys.executable, "-c", program], str(tmp_path), limit)
 
-    assert told("pass", 60) is None
-    assert told("import time; time.sleep(60)", 0.5) == "did not finish within 0.5 s and was stopped"
-    assert told("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", 60) == "was ended by signal 9"
-    assert told("raise SystemExit('no inside')", 60) == "failed: no inside"
+    assert reported("pass", 60) is None
+    assert reported("import time; time.sleep(60)", 0.5) == "did not finish within 0.5 s and was stopped"
+    assert reported("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", 60) == "was ended by signal 9"
+    assert reported("raise SystemExit('no inside')", 60) == "failed: no inside"
 
 
 STAND_IN = {

@@ -144,7 +144,7 @@ def test_bits_that_dangle(tmp_path):
         "--dangling",
         "--json",
     ]
-    told = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)["dangling"]
-    assert set(told) == {"count", "volume", "largest", "neck", "step"}
+    reported = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)["dangling"]
+    assert set(reported) == {"count", "volume", "largest", "neck", "step"}
     with pytest.raises(ValueError, match="neck is 0"):
         design.build().dangling(neck=0)

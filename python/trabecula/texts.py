@@ -233,7 +233,8 @@ def _transition(it: Report) -> Iterator[str]:
     yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm, on which walls under two steps may seem broken"
     neck = "none: not connected across the transition"
     if it.neck:
-        neck = f"{it.neck.diameter:.3g} mm to within {it.step:.3g} mm, at {point(it.neck.place)} mm, the narrowest of the widest path across"
+        found = f"{it.neck.diameter:.3g} mm to within {it.step:.3g} mm"
+        neck = f"{found}, at {point(it.neck.place)} mm, the narrowest of the widest path across"
     yield f"  neck       {neck}"
     for word, bodies in (("loose", it.loose), ("dangling", it.dangling)):
         yield f"  {word:10} {bodies.bodies}" + (f", {figure(bodies.volume)} mm³" if bodies.bodies else "")

@@ -355,8 +355,9 @@ impl Mesh {
         let found = run(py, threads, progress, |p| analysis::thickness(&self.surface, region.as_ref(), step, p))?
             .map_err(error::stopped)?;
         let spread = |s: &analysis::Spread| ThicknessSpread::of(s, step, found.accuracy);
-        let told = ThicknessReport { wall_thickness: spread(&found.wall), pore_size: found.pore.as_ref().map(spread) };
-        report(py, "ThicknessReport", &told)
+        let reported =
+            ThicknessReport { wall_thickness: spread(&found.wall), pore_size: found.pore.as_ref().map(spread) };
+        report(py, "ThicknessReport", &reported)
     }
 
     /// Local thickness of the solid at each vertex (n,), mm, on voxels of edge `step` (mm); NaN where it is thinner than a step.

@@ -151,7 +151,7 @@ pub fn run<T: Send>(
             };
             let worker = std::thread::Builder::new().spawn_scoped(scope, work)?;
             let mut raised = None;
-            let mut told = 0;
+            let mut reported = 0;
             while let Err(RecvTimeoutError::Timeout) = waiting.recv_timeout(TICK) {
                 if raised.is_some() {
                     continue;
@@ -161,9 +161,9 @@ pub fn run<T: Send>(
                     let (done, total) = (shared.done.load(Relaxed), shared.total.load(Relaxed));
                     if let Some(tell) = &tell
                         && total > 0
-                        && done != told
+                        && done != reported
                     {
-                        told = done;
+                        reported = done;
                         tell.call1(py, (done, total))?;
                     }
                     Ok(())

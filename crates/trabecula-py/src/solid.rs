@@ -111,10 +111,10 @@ impl Solid {
     /// What was repaired in each mesh of the region, by the path of its table, as `reports.RepairReport`.
     #[getter]
     fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
-        let told = |(path, done): &(String, Repaired)| {
+        let reported = |(path, done): &(String, Repaired)| {
             Ok((path.clone(), report(py, "RepairReport", &RepairReport::from(done))?))
         };
-        self.built.repairs.iter().map(told).collect()
+        self.built.repairs.iter().map(reported).collect()
     }
 
     /// The design as TOML text.

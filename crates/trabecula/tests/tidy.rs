@@ -46,6 +46,8 @@ const PRIVATE: &[(&str, &str)] = &[
     ("as far as", "where"),
     ("rim", "boundary loop"),
     ("rims", "boundary loops"),
+    ("road", "method"),
+    ("roads", "methods"),
 ];
 
 fn root() -> PathBuf {

@@ -24,7 +24,7 @@ enum EdgeCurve {
     /// An arc between two of its angles; that of the lower-numbered vertex first.
     Arc(u32, f64, f64),
     /// An end circle, which is not subdivided.
-    Rim,
+    EndCircle,
 }
 
 /// A triangulation of the surface of a hub.
@@ -109,7 +109,7 @@ impl<'a> Facets<'a> {
             let n = end_circle.len() as u32;
             firsts.push(first);
             for k in 0..n {
-                out.boundary.insert(edge_key(first + k, first + (k + 1) % n), EdgeCurve::Rim);
+                out.boundary.insert(edge_key(first + k, first + (k + 1) % n), EdgeCurve::EndCircle);
             }
             first += n;
         }

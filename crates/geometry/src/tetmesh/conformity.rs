@@ -86,7 +86,7 @@ impl TetMesh {
                 inverted.push(i);
             }
         }
-        let told = |of: &[usize], what: &str, todo: &str| {
+        let reported = |of: &[usize], what: &str, todo: &str| {
             Err(Fault::new(
                 "",
                 format!(
@@ -99,13 +99,13 @@ impl TetMesh {
             ))
         };
         if !flat.is_empty() {
-            return told(&flat, "are flat (no volume)", "mesh again, or collapse them");
+            return reported(&flat, "are flat (no volume)", "mesh again, or collapse them");
         }
         if inverted.is_empty() {
             return Ok(false);
         }
         if inverted.len() < self.tets.len() {
-            return told(
+            return reported(
                 &inverted,
                 "are inverted (negative volume)",
                 "nodes were moved through faces, or are numbered in two ways: mesh again or renumber them",
@@ -155,7 +155,7 @@ impl TetMesh {
         let mut faces = self.faces();
         faces.sort_unstable();
         for same in faces.chunk_by(|a, b| a.0 == b.0) {
-            let told = |what: String| {
+            let reported = |what: String| {
                 let [a, b, c] = same[0].0;
                 let at = [a, b, c].map(|n| self.nodes[n as usize]);
                 Err(Fault::new(
@@ -173,10 +173,10 @@ impl TetMesh {
                     let (f, g) = (self.face(*f), self.face(*g));
                     let turn = (0..3).any(|k| [g[k], g[(k + 2) % 3], g[(k + 1) % 3]] == f);
                     if !turn {
-                        return told("has two tetrahedra on one side: they overlap".into());
+                        return reported("has two tetrahedra on one side: they overlap".into());
                     }
                 }
-                more => return told(format!("is shared by {} tetrahedra", more.len())),
+                more => return reported(format!("is shared by {} tetrahedra", more.len())),
             }
         }
         Ok(())

@@ -362,7 +362,7 @@ fn made(
     let alone = environment.filled.is_empty() && domain.fit != MeshFit::Cut && !finish.changes();
     let on_grid = on_grid(domain, environment, finish.changes());
     let done = match asked {
-        // Blended functions are evaluated by position on both roads.
+        // Blended functions are evaluated by position by both methods.
         _ if on_grid.is_none() && bent && map.overlap() <= 0.0 => {
             let volume = domain.report.region_volume.unwrap_or_else(|| map.boundary().volume());
             finish.bent(tiling, asked, volume)?

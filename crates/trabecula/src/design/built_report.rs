@@ -141,7 +141,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
 fn tessellated(region: &Region) -> Option<Vec<TessellationReport>> {
     let mut files = Vec::new();
     region.cad(&mut files);
-    let told = |f: Arc<CadMesh>| TessellationReport {
+    let reported = |f: Arc<CadMesh>| TessellationReport {
         path: f.file.clone(),
         chord: f.chord,
         angle: f.angle,
@@ -150,7 +150,7 @@ fn tessellated(region: &Region) -> Option<Vec<TessellationReport>> {
         volume: f.volume,
         volume_error: f.volume.map(|exact| f.mesh.volume() / exact - 1.0),
     };
-    (!files.is_empty()).then(|| files.into_iter().map(told).collect())
+    (!files.is_empty()).then(|| files.into_iter().map(reported).collect())
 }
 
 /// Share of a volume by which sums over tetrahedra and over triangles may differ.

@@ -49,7 +49,7 @@ pub fn stream_mesh(
         counts: spool.counts.map(|n| n as usize),
         files: Mutex::new(spool),
         numbers,
-        told: Mutex::new((0, total)),
+        reported: Mutex::new((0, total)),
         progress: Stage { whole: progress, from: 1.0 - WRITING, to: 1.0 },
     };
     let written = write_indexed(&mesh, suffix, meta, &mut AsideFile(aside), out).and_then(|()| out.flush());
@@ -176,7 +176,7 @@ struct Spooled<'a> {
     files: Mutex<Spool<'a>>,
     numbers: Option<Numbers>,
     /// Records that were read, of how many.
-    told: Mutex<(u64, u64)>,
+    reported: Mutex<(u64, u64)>,
     progress: Stage<'a>,
 }
 
@@ -184,9 +184,9 @@ impl Spooled<'_> {
     fn read(&self, of: impl FnOnce(&mut Spool) -> io::Result<Vec<u8>>, count: usize) -> io::Result<Vec<u8>> {
         {
             // Under the lock, so that progress rises.
-            let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-            told.0 += count as u64;
-            if !self.progress.step(told.0, told.1) {
+            let mut reported = self.reported.lock().unwrap_or_else(PoisonError::into_inner);
+            reported.0 += count as u64;
+            if !self.progress.step(reported.0, reported.1) {
                 return Err(io::Error::other(Interrupt));
             }
         }

@@ -139,7 +139,7 @@ fn by_value_material_is_lost_half_way() {
     assert!((found - 0.3).abs() < 0.002, "{found}");
 }
 
-/// Three lattices, each with its own weight, and one of them a plain field whose fraction nobody told.
+/// Three lattices, each with its own weight, and one of them a plain field whose fraction nobody gave.
 #[test]
 fn any_number_of_fields_takes_part() {
     struct Balls;
@@ -186,7 +186,7 @@ fn any_number_of_fields_takes_part() {
     }
 }
 
-/// A sheet or a network that passes into beams, whose fraction nobody told: the share of an octet's cell that is solid is
+/// A sheet or a network that passes into beams, whose fraction nobody gave: the share of an octet's cell that is solid is
 /// counted on one cell.
 #[test]
 fn lattices_pass_into_beams_with_their_fractions() {
@@ -309,24 +309,24 @@ fn gradients_blocks_and_bounds_agree_with_values() {
     }
 }
 
-/// Inside transitions, too, small boxes are told to be empty or full, and those that are told so are.
+/// Inside transitions, too, small boxes are proven empty or full, and those that are proven so are.
 #[test]
 fn bounds_tell_empty_places_within_transitions() {
     for (what, of, _) in pairs() {
         for by in [By::Fraction, By::Value] {
             let field = blend(&of, step(30.0), by);
-            let (mut told, mut clear) = (0, 0);
+            let (mut reported, mut clear) = (0, 0);
             for p in window([0.0; 3], 9.0, 400) {
                 let b = Aabb { min: p, max: p.map(|x| x + 0.1) };
                 let v = field.value(p.map(|x| x + 0.03));
                 let r = field.bound(&b);
                 assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
-                told += usize::from(r.lo > 0.0 || r.hi < 0.0);
+                reported += usize::from(r.lo > 0.0 || r.hi < 0.0);
                 // No face of any kind within some steps of the box.
                 let lipschitz = field.lipschitz();
                 clear += usize::from(v.abs() > 0.35 * lipschitz);
             }
-            assert!(told > 20 && 4 * told > clear, "{what} {by:?}: {told} of {clear}");
+            assert!(reported > 20 && 4 * reported > clear, "{what} {by:?}: {reported} of {clear}");
         }
     }
 }

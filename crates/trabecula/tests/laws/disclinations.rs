@@ -65,8 +65,8 @@ fn a_seam_is_never_silent() {
         match Design::from_toml(&text).expect("text").build(&NoFiles) {
             Err(why) => assert!(why.to_string().contains("folds") && why.to_string().contains("hole"), "{why}"),
             Ok(made) => {
-                let told = made.warnings.iter().any(|w| w.message.contains("nearly folds"));
-                assert!(told, "{orientation}: {:?}", made.warnings);
+                let reported = made.warnings.iter().any(|w| w.message.contains("nearly folds"));
+                assert!(reported, "{orientation}: {:?}", made.warnings);
             }
         }
     }

@@ -286,7 +286,7 @@ fn cells_come_from_files() {
     for p in places() {
         assert!((file.lattices[0].1.value(p) - named.lattices[0].1.value(p)).abs() < 1e-9);
     }
-    assert!(file.report().lattices["a"].truncation.expect("told") < 1e-6);
+    assert!(file.report().lattices["a"].truncation.expect("reported") < 1e-6);
     let e = lattice("{ file = { path = \"nan.npy\" } }", "iso = 0.3").err().expect("refused");
     assert!(e.path == "lattice.a.cell.file.path" && e.message.contains("[3, 2, 1]"), "{e}");
     let e = lattice("{ file = { path = \"gyroid.npy\", terms = 0 } }", "iso = 0.3").err().expect("refused");

@@ -86,24 +86,24 @@ fn largest(mesh: &Mesh) -> f64 {
 /// What is dropped by default: components at the region's boundary with less than eight grid cells' volume and a thousandth of the
 /// largest one's, and dust; and voids of less than a grid cell are filled.
 fn small(what: &str, solid: &Solid, edge: f64, all: &SurfaceMesh, found: &Components) {
-    let (most, told) = meshed(&GridSurface(solid), edge, Islands::DropSmall).expect("surface");
+    let (most, reported) = meshed(&GridSurface(solid), edge, Islands::DropSmall).expect("surface");
     check(what, &most);
     let left = size(&most.mesh);
     assert_eq!(
-        (told.count as usize, told.cavities as usize, told.euler),
+        (reported.count as usize, reported.cavities as usize, reported.euler),
         (left.pieces, left.cavities, left.euler),
         "{what}"
     );
-    assert_eq!((told.others, told.count), (found.others, found.count - told.dropped), "{what}");
+    assert_eq!((reported.others, reported.count), (found.others, found.count - reported.dropped), "{what}");
     let cell = edge.powi(3);
-    let limit = SMALL * told.dropped.min(found.border) as f64 + DUST * told.dropped as f64;
-    assert!(told.dropped_volume <= limit * cell, "{what}");
-    assert!(told.filled_volume <= CRUMB * told.filled as f64 * cell && found.filled == 0, "{what}");
+    let limit = SMALL * reported.dropped.min(found.border) as f64 + DUST * reported.dropped as f64;
+    assert!(reported.dropped_volume <= limit * cell, "{what}");
+    assert!(reported.filled_volume <= CRUMB * reported.filled as f64 * cell && found.filled == 0, "{what}");
     let change = left.volume - all.mesh.volume();
-    let wanted = told.filled_volume - told.dropped_volume;
+    let wanted = reported.filled_volume - reported.dropped_volume;
     assert!((change - wanted).abs() < 1e-9 * left.volume, "{what}: {change} of {wanted}");
     let (bytes, summary) = stream(solid, edge, Islands::DropSmall).expect("stl");
-    assert_eq!((summary.components, bytes), (told, stl(&most)), "{what}: the two roads differ");
+    assert_eq!((summary.components, bytes), (reported, stl(&most)), "{what}: the two methods differ");
 }
 
 /// All that is promised of pieces, for one solid.
@@ -118,8 +118,8 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Components {
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * measured.volume;
     assert!(near(found.largest, best), "{what}: {} for {best}", found.largest);
     assert!(near(found.largest + found.volume, measured.volume), "{what}");
-    let (_, told) = stream(solid, edge, Islands::Keep).expect("stl");
-    assert_eq!(told.components, found, "{what}");
+    let (_, reported) = stream(solid, edge, Islands::Keep).expect("stl");
+    assert_eq!(reported.components, found, "{what}");
 
     let (one, kept) = meshed(&GridSurface(solid), edge, Islands::Drop).expect("surface");
     check(what, &one);
@@ -131,7 +131,7 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Components {
     let (bytes, summary) = stream(solid, edge, Islands::Drop).expect("stl");
     assert_eq!(summary.components, kept, "{what}");
     assert_eq!(summary.triangles as usize, one.mesh.triangles.len());
-    assert_eq!(bytes, stl(&one), "{what}: the two roads differ");
+    assert_eq!(bytes, stl(&one), "{what}: the two methods differ");
     assert!(near(summary.volume, left.volume), "{what}");
 
     small(what, solid, edge, &all, &found);
@@ -189,7 +189,7 @@ fn many_tiles_and_any_number_of_threads() {
 }
 
 #[test]
-fn crumbs_and_islands_are_told_apart() {
+fn crumbs_and_islands_are_distinguished() {
     // Balls of |f| beyond the network's limit: those inside are islands, those that the box cuts are crumbs.
     let field = lattice("primitive", Part::Lower, 0.1, WAVELENGTH, [0.0; 3]);
     let region = Arc::new(Cuboid::new([0.3, 0.3, 0.3], [3.7, 3.7, 3.2]).expect("box"));
@@ -209,15 +209,18 @@ fn figures_are_those_of_the_file() {
     for islands in [Islands::Keep, Islands::Drop] {
         let (bytes, summary) = stream(&solid, 0.04, islands).expect("stl");
         let read = size(&read_mesh(&bytes, "stl").expect("file").mesh);
-        let told = summary.components;
-        assert_eq!((told.count as usize, told.cavities as usize, told.euler), (read.pieces, read.cavities, read.euler));
+        let reported = summary.components;
+        assert_eq!(
+            (reported.count as usize, reported.cavities as usize, reported.euler),
+            (read.pieces, read.cavities, read.euler)
+        );
         // Single precision.
         assert!((summary.volume / read.volume - 1.0).abs() < 1e-6);
         assert!(((summary.area_cut + summary.area_lattice) / read.area - 1.0).abs() < 1e-6);
     }
 }
 
-/// Stops at a share of the way; remembers how far it was told of.
+/// Stops at a share of the way; remembers how far it was.
 pub struct Until(pub f64, pub std::sync::Mutex<f64>);
 
 impl Progress for Until {

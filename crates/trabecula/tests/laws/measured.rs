@@ -1,4 +1,4 @@
-//! Figures taken while a surface is made are those of the mesh, and the volume error told beforehand bounds the realised one.
+//! Figures taken while a surface is made are those of the mesh, and the volume error reported beforehand bounds the realised one.
 
 use geometry::measure::quality;
 use geometry::progress::Silent;
@@ -53,11 +53,11 @@ proptest! {
 }
 
 /// The realised error of random sheets and networks (more in a campaign), stretched, turned, and cut anywhere, is at most three
-/// times the one told, at steps from coarse to fine. The reference is a mesh at two fifths of the step, whose own error is at most
+/// times the one reported, at steps from coarse to fine. The reference is a mesh at two fifths of the step, whose own error is at most
 /// 0.16 times as large as errors fall with the second power at least. Below 1e-5 the cut faces, of which a small box has many,
 /// decide.
 #[test]
-fn the_volume_error_told_bounds_the_realised_one() {
+fn the_volume_error_reported_bounds_the_realised_one() {
     let mut random = Random(11);
     let names: Vec<&str> = trabecula::cell::catalogue().iter().map(|c| c.name).collect();
     for _ in 0..cases(6) {
@@ -80,7 +80,7 @@ fn the_volume_error_told_bounds_the_realised_one() {
             GridSurface(&built.solid).measure(&options, &Silent).expect("surface").figures.size.volume
         };
         let realised = (volume(edge) / volume(0.4 * edge) - 1.0).abs();
-        let told = built.volume_error(edge).expect("a lattice");
-        assert!(realised <= 3.0 * told + 1e-5, "{realised:.1e}, told {told:.1e} at {edge:.4}:\n{text}");
+        let reported = built.volume_error(edge).expect("a lattice");
+        assert!(realised <= 3.0 * reported + 1e-5, "{realised:.1e}, reported {reported:.1e} at {edge:.4}:\n{text}");
     }
 }

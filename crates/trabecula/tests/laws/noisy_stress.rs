@@ -51,7 +51,7 @@ fn a_bent_beam_is_followed_through_noise() {
 }
 
 /// A peak of stress at one corner, of any height, changes nothing elsewhere: cells follow directions that a part a hundred times
-/// less loaded has as surely, and what they miss is told.
+/// less loaded has as surely, and what they miss is reported.
 #[test]
 fn a_peak_does_not_hide_the_rest() {
     let b = Aabb { min: [0.0; 3], max: [20.0; 3] };
@@ -66,9 +66,10 @@ fn a_peak_does_not_hide_the_rest() {
         let away: Vec<Vec3> = points(&b, 5000).filter(|p| norm(*p) > 6.0).collect();
         let along = |p: Vec3| [turned(p).cos(), turned(p).sin(), 0.0];
         let angle = mean(away.iter().map(|p| off_axis(&map.jacobian(*p), along(*p))));
-        let told = mean(map.misfits(&away).expect("misfits").iter().map(|m| m.angle.into_iter().fold(0.0, f64::max)));
+        let reported =
+            mean(map.misfits(&away).expect("misfits").iter().map(|m| m.angle.into_iter().fold(0.0, f64::max)));
         // No map follows a field that turns so; without a peak it is 4.1 degrees off.
-        assert!(angle < 5.0 && (angle / told - 1.0).abs() < 0.5, "peak {peak}: {angle}, told {told}");
+        assert!(angle < 5.0 && (angle / reported - 1.0).abs() < 0.5, "peak {peak}: {angle}, reported {reported}");
     }
 }
 

@@ -93,8 +93,11 @@ fn a_range_that_folds_is_left_out() {
         Design::from_toml(&text).expect("text").build(&NoFiles).expect("no fold")
     };
     let [free, held] = ["", "stretch = [0.67, 1.5]"].map(built);
-    let told = held.warnings.iter().find(|w| w.message.contains("stretch = [0.67, 1.5]")).expect("a warning");
-    assert!(told.message.contains("times as long as asked for at (") && told.message.contains("folding"), "{told:?}");
+    let reported = held.warnings.iter().find(|w| w.message.contains("stretch = [0.67, 1.5]")).expect("a warning");
+    assert!(
+        reported.message.contains("times as long as asked for at (") && reported.message.contains("folding"),
+        "{reported:?}"
+    );
     let density = |made: &Built| made.report().lattices["a"].distortion.as_ref().expect("solved").density;
     assert!(density(&free)[0] > 0.0 && density(&held)[0] > 0.0);
 }

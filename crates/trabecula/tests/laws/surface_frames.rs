@@ -39,7 +39,7 @@ fn cells_in_a_box_are_along_its_edges() {
     }
 }
 
-/// In a quarter of a tube, whose end faces are along radii, cells go round as well as those that are told the radius.
+/// In a quarter of a tube, whose end faces are along radii, cells go round as well as those that are given the radius.
 #[test]
 fn cells_in_a_curved_panel_follow_it() {
     let cylinder = |r: f64, base: f64, height: f64| -> Region {

@@ -1,4 +1,4 @@
-//! Tetrahedral cells over meshes: they fit for any numbering, are whole where their ports say so, and both roads agree.
+//! Tetrahedral cells over meshes: they fit for any numbering, are whole where their ports say so, and both methods agree.
 
 use std::f64::consts::TAU;
 use std::io::Cursor;
@@ -96,12 +96,12 @@ fn named_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
     for r in tet_catalogue() {
         let (s, part, t) = cell(r.name);
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
-        let (surface, told) = made(tiling, 16.0, true);
+        let (surface, reported) = made(tiling, 16.0, true);
         let found = size(&surface.mesh);
         assert!(found.closed, "{}", r.name);
         // By ports and union-find, and by the surface itself.
-        let told = (told.count as usize, told.cavities as usize, told.euler);
-        assert_eq!(told, (found.pieces, found.cavities, found.euler), "{}", r.name);
+        let reported = (reported.count as usize, reported.cavities as usize, reported.euler);
+        assert_eq!(reported, (found.pieces, found.cavities, found.euler), "{}", r.name);
         assert_eq!(found.pieces, 1, "{}", r.name);
     }
 }
@@ -122,11 +122,11 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
         let predicted = connectivity(&tiling).expect("few tetrahedra");
         assert_eq!((predicted.components, predicted.pairs.len()), (pieces, 0));
         let (maker, edge) = (TilingSurface(&tiling), 0.75);
-        let (all, told) = meshed(&maker, edge, Islands::Keep).expect("surface");
+        let (all, reported) = meshed(&maker, edge, Islands::Keep).expect("surface");
         assert_eq!(size(&all.mesh).pieces, pieces);
-        assert_eq!((told.count as usize, told.others as usize), (pieces, pieces - 1));
-        let (one, told) = meshed(&maker, edge, Islands::Drop).expect("surface");
-        assert_eq!((size(&one.mesh).pieces, told.count), (1, 1));
+        assert_eq!((reported.count as usize, reported.others as usize), (pieces, pieces - 1));
+        let (one, reported) = meshed(&maker, edge, Islands::Drop).expect("surface");
+        assert_eq!((size(&one.mesh).pieces, reported.count), (1, 1));
         let refused = meshed(&maker, edge, Islands::Error);
         assert!(matches!(refused, Err(Stopped::Refused(_))));
     }
@@ -144,11 +144,11 @@ fn surfaces_are_embedded_after_rounding_whatever_varies() {
         let each = (0..mesh.nodes.len()).map(|_| t + some.between(-spread, spread));
         for level in [Level::Same(t), Level::Nodes(Arc::new(each.collect()))] {
             let tiling = Tiling::new(map(&mesh), s.clone(), part, level);
-            let (surface, told) = made(tiling, 5.0, true);
+            let (surface, reported) = made(tiling, 5.0, true);
             check(name, &surface);
             let found = size(&surface.mesh);
-            assert_eq!(told.count as usize, found.pieces, "{name}");
-            assert_eq!(told.euler, found.euler, "{name}");
+            assert_eq!(reported.count as usize, found.pieces, "{name}");
+            assert_eq!(reported.euler, found.euler, "{name}");
         }
     }
     // Walls a hundredth of a step thick keep both their sides.
@@ -191,7 +191,7 @@ fn surfaces_of_graded_levels_enclose_their_fraction() {
 }
 
 #[test]
-fn both_roads_lead_to_one_surface() {
+fn both_methods_make_one_surface() {
     let mut some = Random(6);
     let mesh = shaken(1, 0.15, 8.0, &mut some);
     for name in ["diamond", "diamond_sheet"] {
@@ -251,14 +251,14 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
             let mut out = Cursor::new(Vec::new());
-            let told = maker.stream_stl(&Options::new(0.5), &mut out, &Silent);
-            (told.expect("stream"), out.into_inner())
+            let reported = maker.stream_stl(&Options::new(0.5), &mut out, &Silent);
+            (reported.expect("stream"), out.into_inner())
         })
     });
     assert!(streams[0].1 == streams[1].1, "bytes differ");
-    let (told, bytes) = &streams[0];
-    assert_eq!(told.components, pieces);
-    assert!((told.volume / surface.mesh.volume() - 1.0).abs() < 1e-12);
+    let (reported, bytes) = &streams[0];
+    assert_eq!(reported.components, pieces);
+    assert!((reported.volume / surface.mesh.volume() - 1.0).abs() < 1e-12);
     let back = geometry::formats::read_mesh(bytes, "stl").expect("STL").mesh;
     assert_eq!(back.triangles.len(), surface.mesh.triangles.len());
     assert_eq!(fault(&back), None);
@@ -322,8 +322,8 @@ fn connectivity_is_predicted_without_a_surface() {
     let known = [(["p43m", "f43m"], 0.3, Some(true)), (["pn3m", "diamond"], 0.3, Some(false))];
     for (names, fraction, joined) in known.into_iter().chain(drawn.collect::<Vec<_>>()) {
         let tiling = zoned(&mesh, names, Part::Lower, fraction);
-        let told = connectivity(&tiling).expect("few tetrahedra");
-        let [join] = &told.pairs[..] else { panic!("{names:?}: {told:?}") };
+        let reported = connectivity(&tiling).expect("few tetrahedra");
+        let [join] = &reported.pairs[..] else { panic!("{names:?}: {reported:?}") };
         let map = &tiling.map;
         let others = |t: usize| {
             let across = map.across(t).into_iter().filter(|o| (*o as usize) < map.len());
@@ -332,10 +332,10 @@ fn connectivity_is_predicted_without_a_surface() {
         let faces = (0..map.len()).map(others).sum::<usize>() / 2;
         assert_eq!((join.zones, join.faces), ([0, 1], faces), "{names:?}");
         // The same small steps: the surface's own pieces, by its bodies and by a look at the mesh.
-        let (surface, found) = made(tiling.clone(), told.steps as f64, true);
+        let (surface, found) = made(tiling.clone(), reported.steps as f64, true);
         let pieces = size(&surface.mesh).pieces;
         println!("{names:?} {fraction:.2}: {pieces} pieces, {join:?}");
-        assert_eq!((told.components, found.count as usize), (pieces, pieces), "{names:?} {fraction}");
+        assert_eq!((reported.components, found.count as usize), (pieces, pieces), "{names:?} {fraction}");
         assert!(pieces > 1 || join.joined, "{names:?}");
         if let Some(joined) = joined {
             assert_eq!(join.joined, joined, "{names:?}");

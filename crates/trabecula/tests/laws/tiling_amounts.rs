@@ -42,7 +42,7 @@ fn spread(map: &Tets, n: usize, some: &mut Random) -> Vec<(Vec3, f64)> {
     out
 }
 
-/// The fraction asked for is that of the solid with its tetrahedra overlapping, and so is the one told: within 0.002, as the docs
+/// The fraction asked for is that of the solid with its tetrahedra overlapping, and so is the one reported: within 0.002, as the docs
 /// say. Found by a point in each of 1 728 small tetrahedra: some 500 of them are cut and off by a third or so, at random, which is a
 /// standard error of 0.0045 in one tetrahedron and of 0.0007 in the 48 of the smallest mesh.
 #[test]
@@ -98,14 +98,14 @@ fn overlap_keeps_the_fraction() {
             tiling.values(&points, &mut values);
             let found = values.iter().zip(&volumes).filter(|(v, _)| **v < 0.0).map(|(_, w)| w).sum::<f64>() / all;
             let (whole, solid) = tiling.volumes();
-            println!("{name} {overlap}: {:+.5}, told {:+.5}", found - fraction, solid / whole - fraction);
+            println!("{name} {overlap}: {:+.5}, reported {:+.5}", found - fraction, solid / whole - fraction);
             assert!((found - fraction).abs() < 0.002, "{name} {overlap}: {found} of {fraction}");
-            assert!((solid / whole - found).abs() < 0.002, "{name} {overlap}: told {}, {found}", solid / whole);
+            assert!((solid / whole - found).abs() < 0.002, "{name} {overlap}: reported {}, {found}", solid / whole);
         }
     }
 }
 
-/// Where tetrahedra overlap, the surface without a grid keeps every guarantee, encloses the fraction that is told, at second order in
+/// Where tetrahedra overlap, the surface without a grid keeps every guarantee, encloses the fraction that is reported, at second order in
 /// its steps, and has the pieces that are predicted.
 #[test]
 fn overlapping_tetrahedra_are_cut_without_a_grid() {
@@ -119,10 +119,10 @@ fn overlapping_tetrahedra_are_cut_without_a_grid() {
         let predicted = connectivity(&tiling).expect("few tetrahedra").components;
         let (whole, _) = tiling.volumes();
         let shares = [12.0, 24.0].map(|steps| {
-            let (surface, told) = made(tiling.clone(), steps, true);
+            let (surface, reported) = made(tiling.clone(), steps, true);
             check(name, &surface);
             let found = size(&surface.mesh);
-            assert_eq!((told.count as usize, told.euler), (found.pieces, found.euler), "{name}");
+            assert_eq!((reported.count as usize, reported.euler), (found.pieces, found.euler), "{name}");
             assert!(steps < 16.0 || found.pieces == predicted, "{name}: {} of {predicted}", found.pieces);
             found.volume / whole
         });
@@ -161,23 +161,26 @@ fn walls_are_as_thick_as_asked_on_average() {
         let asked = 0.08 * Tiling::new(map.clone(), cell.clone(), part, Level::Same(1.0)).wavelength();
         let level = Level::of(&map, &cell, part, Amount::Thickness, vec![asked]);
         let tiling = Tiling::new(map.clone(), cell, part, level).walled(&[asked]);
-        let told = tiling.thickness().expect("walls");
+        let reported = tiling.thickness().expect("walls");
         let found = tiling.volumes().1 / area(&tiling);
         println!(
-            "{name} {overlap}: asked {asked:.4}, {:+.4} told, {:+.4} found",
-            told.mean / asked - 1.0,
+            "{name} {overlap}: asked {asked:.4}, {:+.4} reported, {:+.4} found",
+            reported.mean / asked - 1.0,
             found / asked - 1.0
         );
-        assert!((told.mean / asked - 1.0).abs() < 2e-3, "{name}: {told:?} of {asked}");
+        assert!((reported.mean / asked - 1.0).abs() < 2e-3, "{name}: {reported:?} of {asked}");
         assert!((found / asked - 1.0).abs() < 0.02, "{name}: {found} of {asked}");
         assert!(
-            told.min < told.low && told.low < asked && told.high > asked && told.max > told.high,
-            "{name}: {told:?}"
+            reported.min < reported.low
+                && reported.low < asked
+                && reported.high > asked
+                && reported.max > reported.high,
+            "{name}: {reported:?}"
         );
     }
 }
 
-/// The spread that is told is that of walls found one by one: from points on the mid-surface along its normal, in steps of a
+/// The spread that is reported is that of walls found one by one: from points on the mid-surface along its normal, in steps of a
 /// hundredth of a wall. Points near f = 0 are a sample by area over |∇f|, tetrahedron by tetrahedron, so they are weighted. Some 400 of
 /// them know a share of a twentieth within 0.04, four standard errors.
 #[test]
@@ -190,7 +193,7 @@ fn the_spread_of_walls_is_what_rays_find() {
         let asked = 0.08 * plain.wavelength();
         let level = Level::of(&map, &cell, part, Amount::Thickness, vec![asked]);
         let tiling = Tiling::new(map.clone(), cell.clone(), part, level).walled(&[asked]);
-        let told = tiling.thickness().expect("walls");
+        let reported = tiling.thickness().expect("walls");
         let near = 0.02 * cell.range().hi;
         let at = |p: Vec3| {
             let (mut f, mut t) = ([0.0], [0.0]);
@@ -235,8 +238,8 @@ fn the_spread_of_walls_is_what_rays_find() {
         }
         let weight: f64 = all.iter().map(|w| w.1).sum();
         let below = |limit: f64| all.iter().filter(|w| w.0 < limit).map(|w| w.1).sum::<f64>() / weight;
-        let [low, high] = [told.low, told.high].map(below);
-        println!("{name} {overlap}: {} rays, {low:.3} and {high:.3} of {told:?}", all.len());
-        assert!(all.len() > 200 && (low - 0.05).abs() < 0.04 && (high - 0.95).abs() < 0.04, "{name}: {told:?}");
+        let [low, high] = [reported.low, reported.high].map(below);
+        println!("{name} {overlap}: {} rays, {low:.3} and {high:.3} of {reported:?}", all.len());
+        assert!(all.len() > 200 && (low - 0.05).abs() < 0.04 && (high - 0.95).abs() < 0.04, "{name}: {reported:?}");
     }
 }

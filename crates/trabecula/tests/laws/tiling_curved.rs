@@ -1,4 +1,4 @@
-//! Lattices over tetrahedra that are bent onto the region's surface: they fill it, on both roads, and end on it.
+//! Lattices over tetrahedra that are bent onto the region's surface: they fill it, by both methods, and end on it.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -198,7 +198,7 @@ fn a_surface_finer_than_tetrahedra_is_followed_by_steps() {
 }
 
 #[test]
-fn both_roads_fill_the_region_with_the_fraction_asked_for() {
+fn both_methods_fill_the_region_with_the_fraction_asked_for() {
     for (region, size) in [(ball([0.0; 3], 12.0), 5.0), (can(), 4.0)] {
         let map = bent(&region, size, 0.0);
         for name in ["diamond", "diamond_sheet"] {
@@ -262,15 +262,15 @@ fn bent_lattices_have_the_fraction_that_is_reported() {
     ] {
         let design = built(region, lattice, size);
         let tiling = &design.tilings[0].tiling;
-        let told = design.tilings[0].finished.expect(lattice);
+        let reported = design.tilings[0].finished.expect(lattice);
         let [fine, limit] = in_steps(tiling, |s| s.mesh.volume());
         let found = limit / volume;
         println!(
-            "{region} {size}: {found:.5}, told {told:.5}, {:.5} of flat ones",
+            "{region} {size}: {found:.5}, reported {reported:.5}, {:.5} of flat ones",
             tiling.volumes().1 / tiling.volumes().0
         );
-        assert!((found / told - 1.0).abs() < near, "{region}: {found}, told {told}");
-        assert!(asked.is_none_or(|a| (told / a - 1.0).abs() < 1e-3), "{region}: told {told}");
+        assert!((found / reported - 1.0).abs() < near, "{region}: {found}, reported {reported}");
+        assert!(asked.is_none_or(|a| (reported / a - 1.0).abs() < 1e-3), "{region}: reported {reported}");
         let warned = design.coarse_steps(tiling.map.mean_edge() / 32.0, fine, 1);
         assert!(warned.is_none(), "{region}: {warned:?}");
     }
@@ -295,11 +295,11 @@ fn bent_walls_are_as_thick_as_asked_on_average() {
             (0..s.cut.len()).filter(|i| !s.cut[*i]).map(of).sum::<f64>()
         };
         let found = in_steps(tiling, |s| s.mesh.volume())[1] / in_steps(&middle, area)[1];
-        let told = tiling.thickness().expect("walls").mean;
-        println!("{region} {size}: {found:.5} mm, told {told:.5}");
+        let reported = tiling.thickness().expect("walls").mean;
+        println!("{region} {size}: {found:.5} mm, reported {reported:.5}");
         assert!(
-            (told / 0.5 - 1.0).abs() < 2e-3 && (found / 0.5 - 1.0).abs() < 0.01,
-            "{region} {size}: {found}, {told}"
+            (reported / 0.5 - 1.0).abs() < 2e-3 && (found / 0.5 - 1.0).abs() < 0.01,
+            "{region} {size}: {found}, {reported}"
         );
     }
 }

@@ -118,8 +118,8 @@ fn overlap_smooths_the_creases() {
         (worst, tiling)
     };
     let (sharp, tiling) = turn(0.0);
-    let told = tiling.creases().expect("creases");
-    assert!(sharp > 20.0 && told.max > 20.0 && told.mean > 5.0, "{sharp} {told:?}");
+    let reported = tiling.creases().expect("creases");
+    assert!(sharp > 20.0 && reported.max > 20.0 && reported.mean > 5.0, "{sharp} {reported:?}");
     let (smooth, tiling) = turn(0.1);
     let left = tiling.creases().and_then(|c| c.smoothed).expect("creases");
     assert!(smooth < 0.01 && left < 0.01, "{smooth} {left}");

@@ -1,4 +1,4 @@
-//! Lattices over tetrahedra that are meshed on a grid: their volume is that asked for at coarse steps, and the reason of the grid is told.
+//! Lattices over tetrahedra that are meshed on a grid: their volume is that asked for at coarse steps, and the reason of the grid is reported.
 
 use crate::common::{Random, cases, check};
 use geometry::progress::Silent;

@@ -128,7 +128,7 @@ impl Facets<'_> {
             most = most.max(self.distance(scale(add(a, add(b, c)), 1.0 / 3.0)));
             for k in 0..3 {
                 let (i, j) = (t[k], t[(k + 1) % 3]);
-                if self.boundary.get(&edge_key(i, j)) != Some(&EdgeCurve::Rim) {
+                if self.boundary.get(&edge_key(i, j)) != Some(&EdgeCurve::EndCircle) {
                     most = most.max(self.edge_distance(i, j)).max(self.distance(self.points[i as usize]));
                 }
             }

@@ -93,7 +93,7 @@ impl Facets<'_> {
                 let mut worst = (-1.0, [0, 0]);
                 for k in 0..3 {
                     let (i, j) = (t[k], t[(k + 1) % 3]);
-                    if self.boundary.get(&edge_key(i, j)) == Some(&EdgeCurve::Rim) {
+                    if self.boundary.get(&edge_key(i, j)) == Some(&EdgeCurve::EndCircle) {
                         within = self.at_circles.max(chord);
                         continue;
                     }
