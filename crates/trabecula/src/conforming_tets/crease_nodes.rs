@@ -3,7 +3,7 @@
 //! Nodes near a crease move onto it, corners first; then boundary edges that cut across one are bisected there. Such nodes
 //! stay where they are.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::chord_balance::{distances, interfaces};
 use super::mending::Change;
@@ -48,6 +48,11 @@ impl<'a> Index<'a> {
 
     fn key(&self, p: Vec3) -> [i64; 3] {
         p.map(|x| (x / self.cell).floor() as i64)
+    }
+
+    /// A position to a thousandth of a cell.
+    fn place(&self, p: Vec3) -> [i64; 3] {
+        p.map(|x| (1e3 * x / self.cell).round() as i64)
     }
 
     /// The nearest point of a crease within `reach` (mm, at most a cell), and the direction of the crease.
@@ -106,16 +111,18 @@ impl Shaping<'_> {
         if surfaces.iter().all(|s| s.creases.segments.is_empty()) {
             return false;
         }
+        // Sheets that nearly touch would meet in a place taken twice.
+        let mut taken = FxHashSet::default();
         for (s, surface) in surfaces.iter().enumerate().filter(|(_, s)| !s.creases.segments.is_empty()) {
             let index = Index::new(&surface.creases, step);
-            self.nodes_onto(s, &index);
-            self.edges_onto(s, &index);
+            self.nodes_onto(s, &index, &mut taken);
+            self.edges_onto(s, &index, &mut taken);
         }
         true
     }
 
     /// Moves nodes on a surface onto its creases: to corners first, then the nearest ones.
-    fn nodes_onto(&mut self, s: usize, index: &Index) {
+    fn nodes_onto(&mut self, s: usize, index: &Index, taken: &mut FxHashSet<[i64; 3]>) {
         let on = |n: usize| self.on[n] & only(s) != 0 && self.on[n] & HELD == 0 && self.next[n] as usize == n;
         let nodes: Vec<usize> = (0..self.nodes.len()).filter(|n| on(*n) && !self.around[*n].is_empty()).collect();
         let mut moves: Vec<(u8, f64, usize, Vec3)> = Vec::new();
@@ -144,6 +151,9 @@ impl Shaping<'_> {
         }
         moves.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
         for (_, _, n, to) in moves {
+            if taken.contains(&index.place(to)) {
+                continue;
+            }
             let old = core::mem::replace(&mut self.nodes[n], to);
             let worst = self.around[n].iter().map(|t| shape(self.corners(*t))).fold(f64::INFINITY, f64::min);
             let before = self.around[n].iter().map(|t| self.shapes[*t as usize]).fold(f64::INFINITY, f64::min);
@@ -152,6 +162,7 @@ impl Shaping<'_> {
                 continue;
             }
             self.on[n] |= HELD;
+            taken.insert(index.place(to));
             for i in 0..self.around[n].len() {
                 let t = self.around[n][i];
                 self.shapes[t as usize] = shape(self.corners(t));
@@ -170,7 +181,7 @@ impl Shaping<'_> {
     }
 
     /// Bisects boundary edges on a surface that cut across a crease, the farthest from the surface first.
-    fn edges_onto(&mut self, s: usize, index: &Index) {
+    fn edges_onto(&mut self, s: usize, index: &Index, taken: &mut FxHashSet<[i64; 3]>) {
         let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] & only(s) != 0);
         let mut edges: Vec<[u32; 2]> =
             faces.iter().flat_map(|([a, b, c], ..)| [[*a, *b], [*a, *c], [*b, *c]]).collect();
@@ -196,7 +207,10 @@ impl Shaping<'_> {
         }
         crossed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         for (_, [a, b], to, on) in crossed {
-            self.split_edge([a, b], to, on, LEAST);
+            let place = index.place(to);
+            if !taken.contains(&place) && self.split_edge([a, b], to, on, LEAST) {
+                taken.insert(place);
+            }
         }
     }
 
