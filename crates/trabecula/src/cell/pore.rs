@@ -15,7 +15,7 @@ use rustc_hash::FxHashSet;
 use super::Part;
 use super::foot_point::LevelSurface;
 use super::nearest::Search;
-use super::periodic_components::{AROUND, Forest, Int3, present};
+use super::periodic_components::{AROUND, Forest, Int3, critical, present};
 use super::series::Series;
 use super::thickness::distance;
 use super::throat::throat;
@@ -29,6 +29,8 @@ const EFFORT: f64 = 4e6;
 /// Share of a grid step by which values at the nodes may be too great, and by which they are uneven.
 const EXCESS: f64 = 0.25;
 const NOISE: f64 = 0.015;
+/// How far from the node of a pass a saddle of f is sought, turns.
+const ABOUT: f64 = 0.1;
 /// Share of a neck's radius within which two saddles are one.
 const SAME: f64 = 1e-3;
 /// Ratio of the nodes along each axis of the second grid, where the saddle is not found on the first.
@@ -233,7 +235,7 @@ impl Nodes<'_> {
             if open.is_empty() {
                 return Some((radius, passes[last].found));
             }
-            let found: Vec<Option<f64>> = open.par_iter().map(|p| self.narrow(p).or_else(|| self.sharp(p))).collect();
+            let found: Vec<Option<f64>> = open.par_iter().map(|p| self.found(p)).collect();
             for (pass, found) in open.iter_mut().zip(found) {
                 pass.found = found.is_some();
                 let radius = found.unwrap_or(pass.radius);
@@ -259,6 +261,19 @@ impl Nodes<'_> {
             }
         }
         passes.len() - 1
+    }
+
+    /// Radius of a pass, where its saddle is found.
+    fn found(&self, pass: &Pass) -> Option<f64> {
+        self.narrow(pass).or_else(|| self.sharp(pass)).or_else(|| self.symmetric(pass))
+    }
+
+    /// Radius at the saddle of the distance that is one of f too, as in the middle of symmetric necks.
+    fn symmetric(&self, pass: &Pass) -> Option<f64> {
+        let start = self.search.phase(pass.node as usize);
+        let at = critical(&|u, v, g| self.series.gradients(u, v, g), start, ABOUT)?.at;
+        let (node, from) = self.search.nearest_node(at);
+        self.saddle(node, from).filter(|r| (r - pass.radius).abs() < EXCESS * self.step)
     }
 
     /// Radius at the saddle of the distance near the node of a pass: from the largest ball near it, or from the node itself.

@@ -126,17 +126,17 @@ fn saddle(patches: &[Patch], start: Vec3, reach: f64, radius: f64) -> Option<Vec
 /// Positions are mm from the phase u; `cloud` are points of the surface all about; `step` is the distance that `start` may be off.
 /// `None` where no saddle is found.
 pub(super) fn throat(surface: &LevelSurface, u: Vec3, start: Vec3, cloud: &[Vec3], step: f64) -> Option<f64> {
-    let (mut x, mut reach, mut last) = (start, 2.0 * step, [0.0; 3]);
+    let (mut x, mut reach, mut last) = (start, 2.0 * step, None::<Vec3>);
     for _ in 0..12 {
         let feet = feet(surface, u, x, cloud, reach);
         let radius = norm(sub(x, *feet.first()?));
-        // The next move would be its square, and the distance is stationary at the saddle.
-        if last != [0.0; 3] && norm(last) < 1e-5 * radius {
+        // The next move would be its square, and the distance is stationary at the saddle. By symmetry it can be none at all.
+        if last.is_some_and(|last| norm(last) < 1e-5 * radius) {
             return Some(radius);
         }
         let patches: Vec<Patch> = feet.iter().filter_map(|p| Patch::new(surface, u, x, *p)).collect();
         let mut to = sub(saddle(&patches, x, reach, radius)?, x);
-        if dot(to, last) < -0.25 * dot(last, last) {
+        if last.is_some_and(|last| dot(to, last) < -0.25 * dot(last, last)) {
             to = scale(to, 0.5);
         }
         x = add(x, to);
@@ -144,7 +144,7 @@ pub(super) fn throat(surface: &LevelSurface, u: Vec3, start: Vec3, cloud: &[Vec3
             return None;
         }
         reach = (4.0 * norm(to)).clamp(0.04 * step, reach);
-        last = to;
+        last = Some(to);
     }
     None
 }
