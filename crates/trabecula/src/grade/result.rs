@@ -11,7 +11,7 @@ use geometry::math::{Aabb, Vec3, norm, scale};
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
-/// How many times as far as the region a result may reach before its unit is doubted.
+/// The size of a result over that of the region above which its unit is doubted.
 const FARTHER: f64 = 100.0;
 
 /// An array of a result on a mesh of volume elements, from a file.
@@ -294,7 +294,7 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     let times = norm(reach.size()) / norm(environment.region.bounds().size());
     if times > FARTHER {
         let message =
-            format!("{}: the mesh reaches {times:.0} times as far as the region; is that its unit?", spec.path);
+            format!("{}: the mesh is {times:.0} times the size of the region; is that its unit?", spec.path);
         environment.notes.borrow_mut().warnings.push(Warning { path: at, message });
     }
     Ok(made)
