@@ -35,9 +35,13 @@ pub struct UnitCell {
     pub connected: Option<Vec<[f64; 2]>>,
     /// The thinnest wall or neck, mm.
     pub wall: Option<f64>,
-    /// What finds the diameter (mm) of the largest ball that passes through the pore, 0 where it is closed, if that is known.
-    pub pore: Option<Box<dyn Fn() -> f64 + Send + Sync>>,
+    /// What finds the diameter (mm) of the largest ball that passes in all directions through the pore, or through that on one side of a
+    /// sheet; 0 if none does. Only where it is known.
+    pub pore: Option<Box<Passing>>,
 }
+
+/// The diameter (mm) of a ball that passes through the pore on a side, or on any.
+pub type Passing = dyn Fn(Option<Side>) -> f64 + Send + Sync;
 
 /// How the voxels of a cell are made.
 #[derive(Clone, Copy, Debug, PartialEq)]

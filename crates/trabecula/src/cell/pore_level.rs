@@ -41,6 +41,15 @@ impl Cell {
         voids.into_iter().map(|(side, level)| self.pore(side, level, to_phase)).collect()
     }
 
+    /// Of each void of a part whether it is connected with its translates in all three directions.
+    pub fn passages(&self, part: Part, iso: f64) -> Vec<bool> {
+        let through = |(side, level): (Part, f64)| {
+            let beyond = |open: f64| if side == Part::Lower { level > open } else { level < open };
+            self.openings(side).iter().flatten().take_while(|(at, _)| beyond(*at)).count() == 3
+        };
+        voids(part, iso).into_iter().map(through).collect()
+    }
+
     /// Diameter (mm) of the largest ball that passes through the void f ≤ `level` (`Lower`) or f ≥ `level` (`Upper`), where phases
     /// relate to millimetres by u = `to_phase` · x: in as many independent directions as the void is connected with its
     /// translates. Zero where it is in none, infinite where nothing is solid. To about 1e-7 of the diameter; where several passes

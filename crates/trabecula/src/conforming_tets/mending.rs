@@ -4,10 +4,13 @@
 //! is improved step by step. All is taken back unless everything touched is better than the tetrahedron was, so that the worst shapes never
 //! get worse. Nodes are inserted in this way by B. M. Klingner and J. R. Shewchuk (Aggressive tetrahedral mesh improvement, 2007).
 
+use super::interfaces;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use super::tet_shape::shape;
 use geometry::math::{Vec3, add, scale};
+use geometry::measure::self_intersections;
+use geometry::mesh::Mesh;
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{EDGES, FACES};
 
@@ -19,6 +22,8 @@ const ROUNDS: usize = 3;
 const LEAST: f64 = 0.01;
 /// The most steps after it.
 const STEPS: usize = 40;
+/// The most pairs of triangles that cross that are counted.
+const COUNTED: usize = 1000;
 /// The least relative gain.
 const GAIN: f64 = 1.05;
 
@@ -26,6 +31,8 @@ const GAIN: f64 = 1.05;
 pub(super) enum Change {
     /// A node that was elsewhere.
     Moved(u32, Vec3),
+    /// A node that was on more surfaces.
+    Freed(u32, SurfaceSet),
     /// A new node.
     Added,
     /// Tetrahedra, with their nodes and domains, in place of which there are others; how many numbers there were.
@@ -42,43 +49,72 @@ enum First {
 }
 
 impl Shaping<'_> {
-    /// Mends the neighbourhoods of the worst tetrahedra; whether any was.
+    /// Mends the neighbourhoods of the worst tetrahedra; whether any was. Where sheets of the boundary nearly touch, they could come to cross:
+    /// if more of it crosses than before, all is taken back.
     pub fn mend(&mut self) -> bool {
-        let mut mended = false;
+        let made = self.mend_all();
+        if made.is_empty() {
+            return false;
+        }
+        let after = self.crossings();
+        if after > 0 {
+            self.take_back(made);
+            if after > self.crossings() {
+                return false;
+            }
+            self.mend_all();
+        }
+        true
+    }
+
+    /// The pairs of triangles of the boundary that cross.
+    fn crossings(&self) -> usize {
+        let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
+        let triangles = faces.into_iter().map(|(face, _, _)| face).collect();
+        self_intersections(&Mesh { vertices: self.nodes.clone(), triangles }, COUNTED)
+    }
+
+    /// Mends what it can; the changes.
+    fn mend_all(&mut self) -> Vec<Change> {
+        let mut made = Vec::new();
         for _ in 0..ROUNDS {
-            let mut changed = false;
+            let before = made.len();
             for t in self.bad() {
                 checkpoint();
                 if self.tets[t as usize] != GONE && self.shapes[t as usize] < MENDED {
-                    changed |= self.mend_at(t) || self.mend_free(t);
+                    let _ = self.mend_at(t, &mut made) || self.mend_free(t, &mut made);
                 }
             }
-            mended |= changed;
-            if !changed {
+            if made.len() == before {
                 break;
             }
         }
-        mended
+        made
     }
 
     /// Mends the neighbourhood of a tetrahedron with its nodes on creases set free; whether it is better. If not, they stay.
-    fn mend_free(&mut self, t: u32) -> bool {
+    fn mend_free(&mut self, t: u32, made: &mut Vec<Change>) -> bool {
         let held = |on: SurfaceSet| on & HELD != 0 && on != HELD;
-        let nodes = self.tets[t as usize].map(|n| n as usize);
-        let before = nodes.map(|n| self.on[n]);
-        nodes.into_iter().zip(before).filter(|(_, on)| held(*on)).for_each(|(n, _)| self.on[n] &= !HELD);
-        if nodes.map(|n| self.on[n]) == before {
-            return false;
+        let nodes = self.tets[t as usize];
+        let freed: Vec<Change> = nodes.into_iter().map(|n| Change::Freed(n, self.on[n as usize])).collect();
+        for n in nodes.into_iter().map(|n| n as usize) {
+            if held(self.on[n]) {
+                self.on[n] &= !HELD;
+            }
         }
-        let mended = self.mend_at(t);
-        if !mended {
-            nodes.into_iter().zip(before).for_each(|(n, on)| self.on[n] = on);
+        let any = freed.iter().any(|f| matches!(f, Change::Freed(n, on) if self.on[*n as usize] != *on));
+        let from = made.len();
+        made.extend(freed);
+        if any && self.mend_at(t, made) {
+            return true;
         }
-        mended
+        let freed = made.split_off(from);
+        self.take_back(freed);
+        false
     }
 
     /// Mends the neighbourhood of a tetrahedron; whether it is better.
-    fn mend_at(&mut self, t: u32) -> bool {
+    fn mend_at(&mut self, t: u32, made: &mut Vec<Change>) -> bool {
         let (nodes, before) = (self.tets[t as usize], self.shapes[t as usize]);
         let bar = (before * GAIN).max(LEAST);
         let edges = EDGES.map(|e| e.map(|k| nodes[k]));
@@ -97,6 +133,7 @@ impl Shaping<'_> {
             let better = done && self.improved_beyond(bar);
             let changes = self.changes.take().unwrap_or_default();
             if better {
+                made.extend(changes);
                 return true;
             }
             self.take_back(changes);
@@ -127,7 +164,7 @@ impl Shaping<'_> {
         let each = self.changes.iter().flatten().flat_map(|c| match c {
             Change::Moved(n, _) => &self.around[*n as usize][..],
             Change::Replaced { made, .. } => made,
-            Change::Added => &[],
+            Change::Freed(..) | Change::Added => &[],
         });
         let worse = each.copied().filter(|t| self.shapes[*t as usize] <= bar);
         worse.min_by(|a, b| self.shapes[*a as usize].total_cmp(&self.shapes[*b as usize]).then(a.cmp(b)))
@@ -156,6 +193,7 @@ impl Shaping<'_> {
                         self.shapes[t as usize] = shape(self.corners(t));
                     }
                 }
+                Change::Freed(n, on) => self.on[n as usize] = on,
                 Change::Added => {
                     self.nodes.pop();
                     self.on.pop();

@@ -171,10 +171,14 @@ impl Kind for SweepKind {
 
     fn schema(_: &Key, defs: &mut Defs) -> Node {
         let values = ParameterKind::schema(&Key::NONE, defs);
+        // Paths without quotes are tables of tables.
+        let nested = defs.named("StudyTable", |defs| {
+            let own = defs.named("StudyTable", |_| Value::Table(Vec::new()).into());
+            let below = crate::kind::any_schema("", vec![values.clone(), own]);
+            Node::table([("type", "object".into()), ("additionalProperties", below)])
+        });
         defs.named("Study", |defs| {
             let settings = crate::kind::Open::of::<SweepSettings>(defs).closed();
-            // Paths without quotes are tables of tables.
-            let nested = Node::table([("type", "object".into())]);
             settings
                 .with("description", Self::DOC.into())
                 .with("additionalProperties", crate::kind::any_schema("", vec![values, nested]))

@@ -80,7 +80,7 @@ impl UnitCell {
         let cube = finest.grid.lean == [0; 3] && lengths.iter().all(|l| (l / lengths[0] - 1.0).abs() < 1e-9);
         let strain = if cube { 0.0 } else { finest.grid.strain };
         // No flow through a pore that is open says that it is too narrow for the grid.
-        let lost = (0..3).any(|i| k[i][i] == 0.0).then(|| self.pore.as_ref().map_or(0.0, |pore| pore()));
+        let lost = (0..3).any(|i| k[i][i] == 0.0).then(|| self.pore.as_ref().map_or(0.0, |pore| pore(side)));
         let lost = lost.filter(|pore| *pore > 0.0);
         let error = if lost.is_some() { 1.0 } else { error };
         Ok(PermeabilityReport {

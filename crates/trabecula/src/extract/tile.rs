@@ -430,6 +430,8 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: 
     }
     let (mut features, vertices, seams) = features(s, grid, local, nodes);
     if featured {
+        // First to where a feature cell alone has them: an adjacent tile may not know the plain cell beyond.
+        snap(&mut features, vertices);
         features.all(own);
     }
     snap(&mut features, vertices);

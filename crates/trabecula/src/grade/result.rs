@@ -293,8 +293,7 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     }
     let times = norm(reach.size()) / norm(environment.region.bounds().size());
     if times > FARTHER {
-        let message =
-            format!("{}: the mesh is {times:.0} times the size of the region; is that its unit?", spec.path);
+        let message = format!("{}: the mesh is {times:.0} times the size of the region; is that its unit?", spec.path);
         environment.notes.borrow_mut().warnings.push(Warning { path: at, message });
     }
     Ok(made)

@@ -1,10 +1,11 @@
 //! Nets of rods on the surface of lattices over tetrahedra: as thick as what they tie, everywhere.
 
-use crate::common::{Random, cases, check};
+use crate::common::{Random, cases, check, stl, stream};
 use geometry::progress::Silent;
 use trabecula::design::{Built, Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::report::{DesignReport, NetReport, TilingReport, Varying};
+use trabecula::surface_maker::Islands;
 
 fn built(text: &str) -> Built {
     Design::from_toml(text).expect(text).build(&NoFiles).unwrap_or_else(|e| panic!("{text}\n{}: {}", e.path, e.message))
@@ -151,4 +152,29 @@ fn openings_are_those_of_the_triangles() {
     assert!(
         said(&format!(", opening = {}", 0.9 * found.opening)) && !said(&format!(", opening = {}", 1.1 * found.opening))
     );
+}
+
+/// Where a lattice meets its net at the border of two tiles, both have the same vertices, in a cell that is cut again, too: a file that
+/// is written tile by tile is the mesh. Found among random designs.
+#[test]
+fn tiles_agree_where_a_lattice_meets_its_net() {
+    let found = [
+        (
+            "difference = [{ box.size = [18, 14, 12] }, { cylinder = { base = [1, 0.7, -9], radius = 3.1, height = 18 } }]",
+            [3.742896433454007, 0.27199651777744294, 0.1923953879031345],
+        ),
+        (
+            "intersection = [{ sphere.radius = 9 }, { halfspace = { point = [0,0,2], normal = [0.3,0.2,1] } }]",
+            [3.712084347847849, 0.3749476133100689, 0.24423181280977344],
+        ),
+    ];
+    for (region, [size, fraction, edge]) in found {
+        let text = format!(
+            "schema = 1\nregion.{region}\n[lattice.a]\npart = \"lower\"\ncell.tet.name = \"diamond\"\n\
+             level.fraction = {fraction}\nmap.tets = {{ size = {size}, surface = \"net\", method = \"implicit\" }}\n"
+        );
+        let built = built(&text);
+        let (bytes, _) = stream(&built.solid, edge, Islands::Keep).expect("stream");
+        assert!(bytes == stl(&surface(&built.solid, edge, &Silent).expect("surface")), "{text}");
+    }
 }

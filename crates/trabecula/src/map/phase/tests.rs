@@ -236,8 +236,8 @@ fn what_cannot_be_solved_is_refused_with_its_place() {
         let f = solve(w, None).expect("refused");
         assert!(f.at == key && f.message.contains(words), "{f}");
     };
-    refused(&about_z("x", formula("5 - x")), "wavelength", "(5.0000, 0.0000, 0.0000)");
-    refused(&about_z("1/(x-5)", Grade::Constant(2.0)), "rotate", "(5.0000, 0.0000, 0.0000)");
+    refused(&about_z("x", formula("5 - x")), "wavelength", "(5, 0, 0) mm");
+    refused(&about_z("1/(x-5)", Grade::Constant(2.0)), "rotate", "(5, 0, 0) mm");
     let jump = Linear::new([1.0, 0.0, 0.0], vec![[5.0, 2.0], [5.001, 4.0]]).expect("grade");
     refused(&about_z("0*x", jump.into()), "wavelength", "faster than the grid");
     refused(&about_z("0*x", formula("4 + 3*sin(40*x*y*z)")), "wavelength", "faster than the grid");
