@@ -48,6 +48,13 @@ def test_each_direction_of_a_stretched_cell_has_its_error():
     assert slab.k[2][2] == 0 == slab.axis_errors[2] and slab.axis_errors[0] > 0
 
 
+def test_a_pore_narrower_than_the_grid_is_not_said_to_be_closed():
+    """A ball of 0.2 mm passes this cell of 4 mm, whose grid has steps of 0.25 mm: nothing is known of the flow."""
+    found = solid("neovius", "sheet").permeability(n=16)
+    assert not np.any(np.diag(found.k)) and found.error == 1 and np.all(np.equal(found.axis_errors, 1))
+    assert any("no flow was found along x, y, z" in w.message and "take n = " in w.message for w in found.warnings)
+
+
 def test_the_sides_of_a_sheet_add_up_and_are_apart():
     both, lower, upper = (solid().permeability(n=24, side=side) for side in (None, "lower", "upper"))
     assert np.allclose(np.add(lower.k, upper.k), both.k, rtol=1e-5, atol=1e-9)
@@ -229,6 +236,16 @@ def test_a_grade_may_ask_for_a_stiffness():
     # Monotone cubics in logarithms through six fractions.
     for fraction, wanted in ((low, 0.08), (high, 0.2)):
         assert solid(amount=level.fraction(fraction)).stiffness(n=8).E[0] == pytest.approx(wanted, rel=0.03)
+
+
+def test_a_graded_stiffness_has_the_fractions_of_constant_ones():
+    """Also where 16 voxels, on which the search begins, are far off."""
+    amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.13, 4: 0.2}), n=24)
+    lattice = lt.Lattice("diamond", "sheet", map.affine(wavelength=4), amount)
+    graded = lt.Design(region.box(size=[4, 4, 8]), lattice).build().report().lattices["core"].fraction
+    for found, e in zip(graded, (0.13, 0.2), strict=True):
+        constant = solid("diamond", "sheet", level.stiffness(e, n=24)).report().lattices["core"].fraction
+        assert found == pytest.approx(constant, rel=5e-3)
 
 
 @pytest.mark.parametrize(

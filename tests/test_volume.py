@@ -1,6 +1,7 @@
 """Volume meshes: angles, volume, conformity, sets, domains, periodic pairs."""
 
 import numpy as np
+import parts
 import pytest
 import trabecula as lt
 from finite_elements import CORNERS, area_of, faces_of, solid, volumes
@@ -52,6 +53,22 @@ def test_flat_tetrahedra_at_sharp_edges_are_shelled_off():
 def test_surfaces_that_cross_are_warned_of():
     with pytest.warns(lt.DesignWarning, match="8 pairs of boundary triangles cross"):
         coarse("gyroid", "lower", 0.31719099926265243, 3.2541060728788698).volume_mesh(per_cell=10)
+
+
+@pytest.mark.parametrize("zones", [42, 43])
+def test_more_surfaces_than_a_node_can_know_are_refused(tmp_path, zones):
+    """Of a mesh with feature edges, too, whose patches are surfaces as well."""
+    parts.write(tmp_path / "block.obj", parts.box())
+    keep = {
+        f"k{i}": lt.region.cylinder(base=[-5 + i % 7 * 1.6, -5 + i // 7 * 1.6, -7], radius=0.3, height=14) for i in range(zones)
+    }
+    core = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=6), lt.level.fraction(0.3))
+    design = lt.Design(region=lt.region.mesh(path=str(tmp_path / "block.obj")), lattice=core, keep=keep)
+    if zones == 43:
+        with pytest.raises(ValueError, match="the design has 130 surfaces; a volume mesh takes at most 127"):
+            design.build().volume_mesh(edge=1.5)
+    else:
+        assert design.build().volume_mesh(edge=1.5).volume > 0
 
 
 def coarse(cell, part, fraction, radius):
@@ -169,8 +186,8 @@ def test_curved_regions_skins_and_keep_zones():
 
 def test_flat_faces_of_a_mesh_at_its_bounds_are_sets(tmp_path):
     trimesh = pytest.importorskip("trimesh")
-    trimesh.creation.box([8, 8, 8]).export(tmp_path / "cube.stl")
-    region = lt.region.mesh(str(tmp_path / "cube.stl"))
+    trimesh.creation.box([8, 8, 8]).export(tmp_path / "block.obj")
+    region = lt.region.mesh(str(tmp_path / "block.obj"))
     part = lt.Lattice("primitive", "lower", lt.map.affine(4), lt.level.fraction(0.5))
     mesh = lt.Design(region=region, lattice=part).build().volume_mesh(edge=0.8)
     own = solid("primitive", "lower", 0.5, lt.region.box([8, 8, 8])).volume_mesh(edge=0.8)

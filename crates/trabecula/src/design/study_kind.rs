@@ -171,12 +171,9 @@ impl Kind for SweepKind {
 
     fn schema(_: &Key, defs: &mut Defs) -> Node {
         let values = ParameterKind::schema(&Key::NONE, defs);
-        // Paths without quotes are tables of tables.
-        let nested = defs.named("StudyTable", |defs| {
-            let own = defs.named("StudyTable", |_| Value::Table(Vec::new()).into());
-            let below = crate::kind::any_schema("", vec![values.clone(), own]);
-            Node::table([("type", "object".into()), ("additionalProperties", below)])
-        });
+        let words = "The keys of a path that is written without quotes, each a table in another.";
+        let nested =
+            defs.named("StudyTable", |_| Node::table([("type", "object".into()), ("description", words.into())]));
         defs.named("Study", |defs| {
             let settings = crate::kind::Open::of::<SweepSettings>(defs).closed();
             settings
