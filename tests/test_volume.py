@@ -62,13 +62,13 @@ def test_more_surfaces_than_a_node_can_know_are_refused(tmp_path, zones):
     keep = {
         f"k{i}": lt.region.cylinder(base=[-5 + i % 7 * 1.6, -5 + i // 7 * 1.6, -7], radius=0.3, height=14) for i in range(zones)
     }
-    core = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=6), lt.level.fraction(0.3))
+    core = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=12), lt.level.fraction(0.5))
     design = lt.Design(region=lt.region.mesh(path=str(tmp_path / "block.obj")), lattice=core, keep=keep)
     if zones == 43:
         with pytest.raises(ValueError, match="the design has 130 surfaces; a volume mesh takes at most 127"):
-            design.build().volume_mesh(edge=1.5)
+            design.build().volume_mesh(edge=1.2)
     else:
-        assert design.build().volume_mesh(edge=1.5).volume > 0
+        assert design.build().volume_mesh(edge=1.2).volume > 0
 
 
 def coarse(cell, part, fraction, radius):

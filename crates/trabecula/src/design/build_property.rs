@@ -129,6 +129,11 @@ impl Property<'_> {
         }
     }
 
+    /// The property as a guide of the search: at its limit where it cannot be solved for. Fine voxels decide, and say why.
+    fn guess(&self, fraction: f64, n: usize) -> f64 {
+        self.value(fraction, n).unwrap_or(if self.grows() { 0.0 } else { f64::INFINITY })
+    }
+
     /// Whether the property grows with the fraction.
     fn grows(&self) -> bool {
         matches!(self.amount, AmountSpec::Stiffness(_))
@@ -189,17 +194,17 @@ impl Property<'_> {
     fn bracket(&self, asked: f64, n: usize) -> Result<([f64; 2], [f64; 2]), DesignError> {
         let [low, high] = self.range()?;
         let [mut a, mut b] = [LIKELY[0].clamp(low, high), LIKELY[1].clamp(low, high)];
-        let [mut at_a, mut at_b] = [self.value(a, n)?, self.value(b, n)?];
+        let [mut at_a, mut at_b] = [self.guess(a, n), self.guess(b, n)];
         let grows = self.grows();
         while a > low && (asked < at_a) == grows && asked != at_a {
             (b, at_b) = (a, at_a);
             a = (0.6 * a).max(low);
-            at_a = self.value(a, n)?;
+            at_a = self.guess(a, n);
         }
         while b < high && (asked > at_b) == grows && asked != at_b {
             (a, at_a) = (b, at_b);
             b = (1.25 * b).min(high);
-            at_b = self.value(b, n)?;
+            at_b = self.guess(b, n);
         }
         Ok(([a, b], [at_a, at_b]))
     }
@@ -228,7 +233,7 @@ impl Property<'_> {
         let mut last = [a, fa];
         for _ in 0..STEPS[0] {
             let at = (a - fa * (b - a) / (fb - fa)).clamp(a, b);
-            let f = far(self.value(at.exp(), n)?);
+            let f = far(self.guess(at.exp(), n));
             if at != last[0] && (f - last[1]) / (at - last[0]) * sign > 0.0 {
                 slope = (f - last[1]) / (at - last[0]);
             }
