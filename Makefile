@@ -187,7 +187,7 @@ docs: $(VENV)/.release
 	$(BIN)/python scripts/thickness_accuracy.py
 	$(BIN)/python scripts/turning_tables.py
 	$(BIN)/python scripts/blend_tables.py
-	$(BIN)/python scripts/blend_by_normal_cores.py
+	$(BIN)/python scripts/blend_by_normal_scores.py
 	$(BIN)/python scripts/beam_tables.py
 	$(BIN)/python scripts/gallery.py
 	$(BIN)/python scripts/builders.py

@@ -492,7 +492,7 @@ def test_the_edge_is_told_where_the_grid_is_too_coarse():
     edge = float(text.split("edge of ")[1].split()[0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Without the crumbs in the box's corners, which are reported of too.
+        # Without the crumbs in the box's corners, which are warned of too.
         assert abs(solid.mesh(edge=edge, islands="drop").solid_fraction - 0.5) < 0.02
 
 

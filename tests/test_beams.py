@@ -381,7 +381,7 @@ def test_each_slip_gets_one_error(beams, place, parts):
 
 
 def test_a_lattice_and_beams_need_a_blend():
-    """And a lattice whose cell is one of beams is reported where it belongs."""
+    """And a lattice whose cell is one of beams is said to belong elsewhere."""
     lattice = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
     with pytest.raises(lt.DesignError, match="blend"):
         lt.Design(region=BOX, lattice=lattice, beams={"frame": lt.Beams(**GOOD)}).build()

@@ -704,7 +704,9 @@ def test_runs_whose_workers_are_killed_at_random_moments_give_equal_files(tmp_pa
         left_alone(path)
         path.unlink()
     print(f"{equal} of {RUNS} files equal, {sum(kills)} workers killed, in {sum(map(bool, kills))} of the runs")
-    assert equal == RUNS and sum(kills) > RUNS / 2
+    assert equal == RUNS
+    # How many are killed depends on the machine where runs are few.
+    assert RUNS < 10 or sum(kills) > RUNS / 2
 
 
 @contextlib.contextmanager

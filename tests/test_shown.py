@@ -214,7 +214,7 @@ def test_a_fraction_is_a_colour_on_the_surface_and_in_a_section():
     part = graded()
     given, mesh = shown(part, "fraction")
     assert given["label"] == "solid fraction of the cell"
-    assert np.allclose(given["color"], 0.2 + 0.025 * mesh.vertices[:, 0], atol=1e-6)
+    assert np.allclose(given["color"](mesh.vertices), 0.2 + 0.025 * mesh.vertices[:, 0], atol=1e-6)
     draw = {"size": (160, 130), "azimuth": -90, "elevation": 90, "section": "z=4", "projection": "orthographic"}
     seen = pixels(mesh.png(**draw, **given, span=(0.2, 0.5)))
     # Seen from above with x to the right, 92 % of the width: what is cut has the colour of the fraction in its column.
@@ -228,17 +228,28 @@ def test_a_fraction_is_a_colour_on_the_surface_and_in_a_section():
         assert np.abs(seen[cut, column] - alone[cut, column]).max() <= 8
 
 
+@pytest.mark.parametrize("show", ["fraction", "overhang", "thickness"])
+def test_a_picture_that_turns_has_the_colours_too(tmp_path, show):
+    design = tmp_path / "a.toml"
+    design.write_text(graded()._core.design)
+    words = ("render", design, "-o", tmp_path / "a.png", "--show", show, "--size", "120x90", "--per-cell", 6)
+    in_process(*words)
+    still = (tmp_path / "a.png").stat().st_size
+    in_process(*words, "--turn", 2)
+    assert (tmp_path / "a.png").stat().st_size > 1.5 * still
+
+
 def test_stiffness_is_by_the_law_of_the_cell():
     part = graded()
     given, mesh = shown(part, "stiffness", per_cell=4)
     known = lt.law("gyroid", "sheet", 0.2, 0.5, 4, n=32, properties=["stiffness"])
     at = np.clip(0.2 + 0.025 * mesh.vertices[:, 0], 0.2, 0.5)
     # Both are cubics through points of the law: 8 and 4 of them.
-    assert np.allclose(given["color"], known.at("E", at), rtol=0.02)
+    assert np.allclose(given["color"](mesh.vertices), known.at("E", at), rtol=0.02)
     assert given["label"] == "E of the cell along its axes, over that of the solid"
     even = solid()
-    constant, _ = shown(even, "stiffness", per_cell=4)
-    assert np.ptp(constant["color"]) < 1e-9
+    constant, mesh = shown(even, "stiffness", per_cell=4)
+    assert np.ptp(constant["color"](mesh.vertices)) < 1e-9
     for wrong, words in (
         (graded(wavelength=[4, 4, 5]), "edges differ by up to 25%"),
         (graded(skew={"xz": 20}), "the cells of lattice.core are none"),

@@ -101,7 +101,7 @@ def test_regions_that_do_not_touch():
 
 
 def test_a_ball_has_no_flat_face():
-    """A curved region cannot be opened, and is reported how to."""
+    """A curved region cannot be opened; the message says how to."""
     text = CUBE.replace("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = 5")
     error = refused('[skin]\nthickness = 1\nopen = ["-z"]\n', text)
     assert error.path == "skin.open[0]" and "cut it there with a half-space" in str(error)

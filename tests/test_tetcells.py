@@ -141,7 +141,7 @@ def test_the_command_lists_them():
 
 
 def test_zones_pass_into_each_other_and_keep_the_fraction():
-    """Zones by region on the background mesh: reported apart, one piece, and as full as asked, also between them."""
+    """Zones by region on the background mesh: distinguished, one piece, and as full as asked, also between them."""
     half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
     solid = design(lt.cell.tet(zones={0: "p43m", 1: "f43m"}), level=lt.level.fraction(0.3), zones={1: half}).build()
     report = solid.report()["lattices"]["a"]
@@ -173,7 +173,7 @@ def test_zones_that_do_not_join_are_told_before_a_surface_is_made():
     tets = solid.report()["lattices"]["a"]["tets"]
     (join,) = tets["joins"]
     assert join["zones"] == [0, 1] and join["joined"] and 0 < join["open"] <= join["faces"] and join["ports"] > 0
-    # As many steps as the pieces are reported by.
+    # As many steps as the pieces are counted in.
     assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 16).pieces == 1
     with pytest.warns(lt.DesignWarning, match=r"zones 0 \(pn3m\) and 1 \(diamond\) do not join"):
         solid = built("pn3m", "diamond")

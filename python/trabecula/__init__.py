@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from . import beams, blend, cell, grade, level, map, region, reports
+    from .carrier import Carrier
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
     from .laws import Law, law
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from .thickness import Thickness
     from .transition import Transitions
     from .viewer import View, view
-    from .volumes import BeamMesh, Carrier, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
+    from .volumes import BeamMesh, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
@@ -100,7 +101,7 @@ _HOMES = {
     "TetMesh": "tets",
     "Thickness": "thickness",
     "Transitions": "transition",
-    "Carrier": "volumes",
+    "Carrier": "carrier",
     "VolumeMesh": "volumes",
     "BeamMesh": "volumes",
     "ShellMesh": "volumes",

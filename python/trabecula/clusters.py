@@ -75,17 +75,15 @@ def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
         here = _started(dask, int(cluster.removeprefix("local:")), opened)
         # Results do not go by way of the scheduler, which is in this process.
         return opened.enter_context(dask.Client(here, direct_to_workers=True))
-    if cluster.partition(":")[0] in QUEUES:
-        client = opened.enter_context(dask.Client(_queued(cluster, opened)))
-        client.patience = QUEUED
-        client.wait_for_workers(1, timeout=QUEUED)
-        return client
+    queued = cluster.partition(":")[0] in QUEUES
+    at, patience = (_queued(cluster, opened), QUEUED) if queued else (cluster, PATIENCE)
     try:
-        client = opened.enter_context(dask.Client(cluster, timeout=PATIENCE))
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client = opened.enter_context(dask.Client(at, timeout=PATIENCE))
+        client.patience = patience
+        client.wait_for_workers(1, timeout=patience)
         return client
     except (OSError, TimeoutError, ValueError) as error:
-        raise ValueError(f"cluster {cluster} does not answer within {PATIENCE} s: {error}") from None
+        raise ValueError(f"cluster {cluster} does not answer within {patience} s: {error}") from None
 
 
 def _started(dask: Any, count: int, opened: ExitStack) -> Any:

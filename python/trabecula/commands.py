@@ -22,6 +22,7 @@ from .formats import (
     dotted,
     kind_of,
 )
+from .given import shard_bytes
 from .inputs import build, design_of, keep_file, keep_inputs, meshed, resolution, stdin_text
 from .local_fields import fields_at
 from .measuring import draw, measure, transitions
@@ -121,7 +122,7 @@ def voxels(args) -> None:
     options = {"step" if k == "edge" else k: v for k, v in resolution(args).items()}
     with Progress("sampling", args.progress) as progress:
         if args.resume or args.cluster or args.new or args.shards:
-            apart = {"cluster": args.cluster, "new": args.new, "shards": args.shards and int(args.shards * 1e9)}
+            apart = {"cluster": args.cluster, "new": args.new, "shards": shard_bytes(args.shards)}
             size = options.get("step"), options.get("per_cell")
             made = solid._save_voxels(args.output, *size, args.threads, progress, apart, settle)
         else:

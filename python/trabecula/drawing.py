@@ -33,7 +33,7 @@ def render(args) -> None:
     else:
         solid = build(args.file)
         try:
-            seen = look(solid, args.show) if args.show else lambda *_: {}
+            seen = look(solid, args.show, args.threads) if args.show else lambda *_: {}
         except ValueError as error:
             raise Refused(f"{args.file}: {error}") from None
         made = meshed(solid, args)
@@ -115,8 +115,11 @@ def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, floa
     """Pictures from all round as one that is animated."""
     from .turntable import animated
 
-    if shown.get("color") == "thickness":
-        shown |= {"color": made.thickness_at_vertices(), "label": WALL}  # once for all pictures
+    color = shown.get("color")  # found once for all pictures
+    if callable(color):
+        shown |= {"color": color(made.vertices), "inside": color}
+    elif color == "thickness":
+        shown |= {"color": made.thickness_at_vertices(), "label": WALL}
     frames = []
     with Progress("drawing", args.progress) as progress:
         for i in range(args.turn):

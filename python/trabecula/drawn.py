@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import TypedDict, Unpack
 
     from . import _core
     from .mesh import Mesh
@@ -32,7 +33,27 @@ if TYPE_CHECKING:
     #: A plane by its unit normal and offset.
     Plane = tuple[tuple[float, float, float], float]
 
-__all__ = ["OVERHANG", "WALL", "Drawn", "Picture"]
+    class Look(TypedDict, total=False):
+        """How a picture looks: the keywords of ``Mesh.png``."""
+
+        color: ArrayLike | At | str | None
+        label: str
+        span: tuple[float, float] | None
+        shares: Mapping[str, ArrayLike] | None
+        lines: Mapping[str, Iterable[ArrayLike]] | None
+        width: float | None
+        section: str | None
+        background: str
+        dpi: float | None
+        projection: str
+        scale_bar: bool
+        axes: bool
+        solid: Solid | None
+        inside: At | None
+        up: Sequence[float]
+
+
+__all__ = ["OVERHANG", "WALL", "Drawn", "Picture", "numbers"]
 
 #: What colours say that are computed.
 WALL, OVERHANG = "wall thickness, mm", "overhang, degrees to the layers (grey: none)"
@@ -43,8 +64,8 @@ ACROSS = 240
 class Picture:
     """Things that show themselves as a picture in a notebook."""
 
-    def _picture(self) -> Mesh:
-        raise NotImplementedError
+    #: The mesh that it shows.
+    _picture: Callable[[], Mesh]
 
     @cached_property
     def _png(self) -> bytes:
@@ -59,20 +80,10 @@ class Drawn(Picture):
 
     _core: _core.Mesh
 
-    @property
-    def counts(self) -> tuple[int, int]:
-        raise NotImplementedError
-
-    @property
-    def bounds(self) -> list[list[float]]:
-        raise NotImplementedError
-
-    @property
-    def vertices(self) -> NDArray[np.float64]:
-        raise NotImplementedError
-
-    def thickness_at_vertices(self) -> NDArray[np.float64]:
-        raise NotImplementedError
+    counts: tuple[int, int]
+    bounds: list[list[float]]
+    vertices: NDArray[np.float64]
+    thickness_at_vertices: Callable[[], NDArray[np.float64]]
 
     def png(
         self,
@@ -112,9 +123,9 @@ class Drawn(Picture):
         and z. ``solid``, of which this is the mesh, gives the normals that the surface is shaded by: its facets do not show
         then. ValueError for what cannot be drawn; a DesignWarning where the picture is too small for legend, bar or axes.
         """
-        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         if background not in BACKGROUNDS:
             raise ValueError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}")
+        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         inch = None if dpi is None else positive("dpi", dpi)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
         made, fits_foot = self._core.png(seen, cut, solid and solid._core, *colours, background, inch)
@@ -162,33 +173,18 @@ class Drawn(Picture):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
-        color: ArrayLike | At | str | None = None,
-        label: str = "",
-        span: tuple[float, float] | None = None,
-        shares: Mapping[str, ArrayLike] | None = None,
-        lines: Mapping[str, Iterable[ArrayLike]] | None = None,
-        width: float | None = None,
-        section: str | None = None,
         background: str = "shaded",
-        dpi: float | None = None,
-        projection: str = "perspective",
-        scale_bar: bool = False,
-        axes: bool = False,
-        solid: Solid | None = None,
-        inside: At | None = None,
-        up: Sequence[float] = (0, 0, 1),
+        **look: Unpack[Look],
     ) -> None:
-        """Writes a picture to a .png file, see ``png``; or a line drawing to an .svg file, see ``svg``.
+        """Writes a picture to a .png file, see ``png``, whose keywords ``look`` are; or a line drawing to an .svg file, see
+        ``svg``, without a background.
 
         Raises ValueError for another suffix, and for what cannot be drawn.
         """
-        shown = {"color": color, "label": label, "span": span, "shares": shares, "lines": lines, "width": width}
-        shown |= {"inside": inside, "up": up, "section": section, "dpi": dpi, "solid": solid}
-        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes}
         if extension(path, ("png", "svg")) == "svg":
-            made = self.svg(size, azimuth, elevation, **shown).encode()
+            made = self.svg(size, azimuth, elevation, **look).encode()
         else:
-            made = self.png(size, azimuth, elevation, background=background, **shown)
+            made = self.png(size, azimuth, elevation, background=background, **look)
         write_bytes(path, made)
 
     def view(self, values: ArrayLike | At | str | None = None, label: str = "", **look: Any) -> View:
@@ -262,8 +258,12 @@ class Drawn(Picture):
         if plane is None or at is None or not (tint or mixed):
             return tint, mixed, drawn, None
         places, grid = self._on(plane)
-        found = at(places)
-        values = np.stack([found[name] for name in shares], axis=1) if shares else np.asarray(found, dtype=np.float64)
+        found, many = at(places), (len(places), "point")
+        if shares is None:
+            return tint, mixed, drawn, (*grid, numbers("what inside gives", found, many).tolist())
+        if missing := [name for name in shares if name not in found]:
+            raise ValueError(f"inside gives no share of {missing[0]}; it must give one of each of {', '.join(shares)}")
+        values = np.stack([numbers(f"inside[{name!r}]", found[name], many) for name in shares], axis=1)
         return tint, mixed, drawn, (*grid, values.ravel().tolist())
 
     def _on(self, plane: Plane) -> tuple[NDArray[np.float64], tuple]:
@@ -303,7 +303,7 @@ class Drawn(Picture):
                 raise ValueError("up is [0, 0, 0]; it must be a direction")
             direction, label, span = [v / length for v in vector_of("up", up)], label or OVERHANG, span or (0.0, 90.0)
         else:
-            values = self._at_vertices("color", color(self.vertices) if callable(color) else color)
+            values = numbers("color", color(self.vertices) if callable(color) else color, (self.counts[0], "vertex"))
         if span is None:
             finite = values[np.isfinite(values)]
             span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
@@ -319,16 +319,9 @@ class Drawn(Picture):
 
         if not shares:
             raise ValueError("shares has no names; give numbers for each vertex by at least one")
-        values = np.stack([self._at_vertices(f"shares[{name!r}]", of) for name, of in shares.items()], axis=1)
+        of_vertices = (self.counts[0], "vertex")
+        values = np.stack([numbers(f"shares[{name!r}]", of, of_vertices) for name, of in shares.items()], axis=1)
         return label, list(shares), values.ravel().tolist()
-
-    def _at_vertices(self, what: str, given: ArrayLike) -> NDArray[np.float64]:
-        import numpy as np
-
-        values = np.asarray(given, dtype=np.float64)
-        if values.shape != (self.counts[0],):
-            raise ValueError(f"{what} must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
-        return values
 
     def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> tuple:
         import numpy as np
@@ -344,6 +337,16 @@ class Drawn(Picture):
                 found.append((kind, points.tolist()))
         wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
         return label, list(lines), found, wide / 2
+
+
+def numbers(what: str, given: ArrayLike, many: tuple[int, str]) -> NDArray[np.float64]:
+    """Numbers, as ``many`` as there are points of a kind, such as (8, "vertex"); a ValueError for anything else."""
+    import numpy as np
+
+    values = np.asarray(given, dtype=np.float64)
+    if values.shape != (many[0],):
+        raise ValueError(f"{what} must be {many[0]} numbers, one for each {many[1]}, found shape {values.shape}")
+    return values
 
 
 def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:

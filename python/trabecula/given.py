@@ -38,6 +38,7 @@ __all__ = [
     "positions",
     "positive",
     "settings",
+    "shard_bytes",
     "thread_count",
     "three",
     "whole",
@@ -241,3 +242,8 @@ def cluster_name(text: str) -> str:
 def thread_count(threads: int | None) -> int | None:
     """A number of threads, 1 to 4096, or None for as many as there are processors. ValueError for others."""
     return None if threads is None else whole("threads", threads, 1, 4096)
+
+
+def shard_bytes(shards: float | None) -> int | None:
+    """Gigabytes of a file of several as bytes, one at least; None of none. A ValueError for what is no positive number."""
+    return None if shards is None else max(int(1e9 * positive("shards", shards)), 1)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from .errors import Refused, WrongUsage
 from .files import check_place
 from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, dotted, kind_of
+from .given import shard_bytes
 from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
 from .mesh import Mesh
 from .parts import part_files, write_parts
@@ -258,7 +259,7 @@ def files_in(name: str) -> list[str]:
 
 def apart_of(args) -> dict | None:
     """How a surface is to be made in ranges of tiles, if it is."""
-    shards = int(args.shards * 1e9) if args.shards else None
+    shards = shard_bytes(args.shards)
     apart = args.resume or args.cluster or args.new or shards
     return {"cluster": args.cluster, "new": args.new, "shards": shards} if apart else None
 

@@ -50,8 +50,8 @@ HEADER, RECORD, MOST = _core.STL_HEADER, _core.STL_RECORD, 2**32 - 1
 
 #: For each kind of work what gives its ranges, of a solid and settings.
 KINDS: dict[str, Callable[..., Any]] = {
-    "surface": lambda solid, edge: _core.TileRanges.of(solid, edge),
-    "figures": lambda solid, edge: _core.TileRanges.of(solid, edge, True),
+    "surface": lambda solid, edge, moved=None: _core.TileRanges.of(solid, edge, False, moved),
+    "figures": lambda solid, edge, moved=None: _core.TileRanges.of(solid, edge, True, moved),
     "voxels": lambda solid, edge: _core.VoxelRanges.of(solid, edge),
     "layers": lambda solid, plan, **file: _core.LayerRanges.of(_core.Layers.of(solid, **plan), **file),
 }
@@ -240,7 +240,9 @@ class _Work:
         self.folder = Unfinished(output, head, first)
         self.limit = HEADER + RECORD * MOST if kind == "surface" and "shards" not in more else None
         key = hashlib.sha256(repr(sorted(head.items())).encode()).hexdigest()
-        about = {"key": key, "of": kind, "version": _core.__version__, "settings": settings}
+        # What was found by measuring the solid is not found again by each worker.
+        known = {"moved": self.ranges.moved} if "edge" in settings and kind != "voxels" else {}
+        about = {"key": key, "of": kind, "version": _core.__version__, "settings": settings | known}
         self.job = about | {"design": text, "files": files}
 
     @contextmanager

@@ -1375,7 +1375,7 @@ class VolumeReport(Report):
     """Number of edges of quadratic tetrahedra that stayed straight, because a tetrahedron would be distorted."""
     volume: float
     """Volume, mm³."""
-    worst: list[float]
+    worst_angle_at: list[float]
     """The middle of the tetrahedron with the angle nearest to 0 or 180, mm."""
 
 

@@ -9,6 +9,8 @@ from .errors import DesignWarning
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from . import _core
     from .reports import DesignReport
 
@@ -28,8 +30,7 @@ class Resolution:
     wavelength: float
     bounds: list[list[float]]
 
-    def report(self) -> DesignReport:
-        raise NotImplementedError
+    report: Callable[[], DesignReport]
 
     def _warn_coarser(self, edge: float | None, per_cell: float | None) -> None:
         """Tells of a spacing that nobody asked for and that is coarser than the walls need."""

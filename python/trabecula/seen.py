@@ -7,18 +7,20 @@ import os
 from .camera import towards
 from .drawn import Picture
 from .given import positions
-from .mesh import Mesh
 from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from typing import Any
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Unpack
 
     from . import _core
+    from .drawn import Look
+    from .mesh import Mesh
     from .reports import DesignReport
     from .viewer import View
 
@@ -30,11 +32,8 @@ class Seen(Picture):
 
     _core: _core.Solid
 
-    def report(self) -> DesignReport:
-        raise NotImplementedError
-
-    def mesh(self, edge: float | None = None, per_cell: float | None = None, threads: int | None = None) -> Mesh:
-        raise NotImplementedError
+    report: Callable[[], DesignReport]
+    mesh: Callable[..., Mesh]
 
     def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
         """Deviation of a solved map (``map.phase``) from the one asked for, at points (n, 3) in mm; arrays (n,).
@@ -99,16 +98,10 @@ class Seen(Picture):
         edge: float | None = None,
         per_cell: float | None = None,
         threads: int | None = None,
-        section: str | None = None,
-        background: str = "shaded",
-        dpi: float | None = None,
-        projection: str = "perspective",
-        scale_bar: bool = False,
-        axes: bool = False,
-        up: Sequence[float] = (0, 0, 1),
+        **style: Unpack[Look],
     ) -> None:
         """Writes a picture of the solid, meshed at a spacing as for ``mesh``, to a .png file, or a line drawing to an .svg
-        file; camera, section, background, dpi, projection, scale bar and axes as for ``Mesh.png``.
+        file; camera and ``style`` (section, background, dpi, projection, scale_bar, axes, up) as for ``Mesh.png``.
 
         ``show`` is what it shows beside the form: ``thickness``, the local thickness of walls; ``overhang``, see ``Mesh.png``,
         of layers stacked along ``up``; ``fraction``, the solid fraction of the cell; ``stiffness``, Young's modulus of the cell
@@ -118,11 +111,10 @@ class Seen(Picture):
         surface; ``singularities``, the lines round which they do not come back to themselves. Of a blend: ``lattice``, which
         lattice is where. A ValueError where the design has none.
         """
-        seen = None if show is None else look(self, show)
+        seen = None if show is None else look(self, show, threads)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
         shown = dict(seen(made, towards(azimuth, elevation))) if seen else {}
-        shown |= {"projection": projection, "scale_bar": scale_bar, "axes": axes, "solid": self, "up": up}
-        made.render(path, size, azimuth, elevation, section=section, background=background, dpi=dpi, **shown)
+        made.render(path, size, azimuth, elevation, **{**shown, "solid": self, **style})
 
     def view(
         self,

@@ -34,7 +34,7 @@ VOXELS, CUBE = 32, 0.05
 
 def _number(at: Callable[[NDArray], NDArray], label: str) -> Look:
     """The look that shows a number at points."""
-    return lambda mesh, _: {"color": at(mesh.vertices), "inside": at, "label": label}
+    return lambda *_: {"color": at, "label": label}
 
 
 def _error(key: str, label: str) -> Callable[[Solid], Look]:
@@ -54,7 +54,7 @@ def _fraction(solid: Solid) -> Look:
     return _number(at, "solid fraction of the cell")
 
 
-def _stiffness(solid: Solid) -> Look:
+def _stiffness(solid: Solid, threads: int | None = None) -> Look:
     """Young's modulus by the law of the cell: of cubes, told by their fraction alone."""
     import numpy as np
 
@@ -72,7 +72,8 @@ def _stiffness(solid: Solid) -> Look:
     low, high = np.broadcast_to(solid.report().lattices[name].fraction, 2)
     # Fractions a twentieth apart: between them the law is a monotone cubic. One alone has another close by.
     start, stop = (float(low), float(high)) if high > 1.01 * low else (0.99 * float(low), min(1.01 * float(high), 0.999))
-    found = law(given["cell"], given["part"], start, stop, 2 + int(20 * (stop - start)), n=VOXELS, properties=["stiffness"])
+    count, how = 2 + int(20 * (stop - start)), {"n": VOXELS, "properties": ["stiffness"], "threads": threads}
+    found = law(given["cell"], given["part"], start, stop, count, **how)
     found.at("E", start)  # a ValueError where it falls apart
 
     def at(points: NDArray) -> NDArray:
@@ -183,11 +184,13 @@ SHOWN: dict[str, Callable[[Solid], Look]] = {
 }
 
 
-def look(solid: Solid, show: str) -> Look:
-    """The look of meshes of a solid that shows ``show``; a ValueError where the solid has none, or there is no such thing."""
+def look(solid: Solid, show: str, threads: int | None = None) -> Look:
+    """The look of meshes of a solid that shows ``show``, found by ``threads``; a ValueError where the solid has none, or
+    there is no such thing.
+    """
     if show not in SHOWN:
         raise ValueError(f'show is "{show}"; it must be one of {", ".join(SHOWN)}')
-    return SHOWN[show](solid)
+    return _stiffness(solid, threads) if show == "stiffness" else SHOWN[show](solid)
 
 
 def _diagonal(solid: Solid) -> float:

@@ -9,10 +9,11 @@ from collections.abc import Callable
 from functools import cached_property
 
 from . import _core
+from .carrier import Carrier
 from .errors import DesignWarning
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, Carrier, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -54,8 +55,7 @@ class Simulated:
     bounds: list[list[float]]
     _thinnest: dict[str, float]
 
-    def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
-        raise NotImplementedError
+    spacing: Callable[..., float]
 
     def volume_mesh(
         self,

@@ -14,7 +14,7 @@ from .beam_files import save_beams
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
-from .given import flag, number, positions, positive, thread_count
+from .given import flag, number, positions, positive, shard_bytes, thread_count
 from .implicit import save_implicit
 from .islands import check_islands, left_out, warn_islands
 from .layers import Layers
@@ -451,7 +451,7 @@ class Solid(Seen, Simulated, Resolution):
         ``shards`` (GB) the output is a folder with the name of ``path`` without .stl: files of about this size, the triangles
         in the same order, and ``manifest.json``, with their number, bytes and SHA-256; it may have more than 2³² triangles.
         """
-        size = _shard_bytes(shards)
+        size = shard_bytes(shards)
         apart = {"cluster": cluster, "new": new, "shards": size} if resume or cluster or new or size else None
         return self._save(path, edge, per_cell, threads, progress, islands, chord, apart=apart)
 
@@ -643,7 +643,7 @@ class Solid(Seen, Simulated, Resolution):
         this size, whole layers each, ``manifest.json``, and of .vti ``all.pvti``, by which ParaView opens them as one. Gives
         ``shape``, ``step`` and ``origin`` (mm), ``volume`` (mm³).
         """
-        apart = {"cluster": cluster, "new": new, "shards": _shard_bytes(shards)}
+        apart = {"cluster": cluster, "new": new, "shards": shard_bytes(shards)}
         return self._save_voxels(path, step, per_cell, threads, progress, apart)
 
     def _save_voxels(
@@ -734,11 +734,6 @@ class Solid(Seen, Simulated, Resolution):
     def _picture(self) -> Mesh:
         low, high = self.bounds
         return self.mesh(edge=max(self.wavelength / 20, max(b - a for a, b in zip(low, high, strict=True)) / 160))
-
-
-def _shard_bytes(shards: float | None) -> int | None:
-    """Gigabytes of a file of several as bytes, one at least."""
-    return None if shards is None else max(int(1e9 * positive("shards", shards)), 1)
 
 
 def _shards_in(name: str) -> str:

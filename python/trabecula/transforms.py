@@ -9,7 +9,7 @@ from .given import number, three
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Any, TypeVar
 
     Self = TypeVar("Self", bound="Transformed")
@@ -27,8 +27,8 @@ class Transformed:
     and zones. It belongs to no region and no design any more; the region's volume, where it is known, is scaled along.
     """
 
-    def _transformed(self: Self, matrix: list[list[float]], center: list[float], shift: list[float]) -> Self:
-        raise NotImplementedError
+    #: The mesh c + M (x − c) + s, of the rows of M, c and s.
+    _transformed: Callable[[list[list[float]], list[float], list[float]], Any]
 
     def moved(self: Self, vector: Sequence[float]) -> Self:
         """The mesh moved by ``vector`` (three numbers, mm): x + v.

@@ -11,7 +11,7 @@ from html import escape
 from importlib.resources import files
 
 from .camera import section_plane, towards
-from .drawn import WALL
+from .drawn import WALL, numbers
 from .files import extension, write_text
 from .given import number
 
@@ -92,9 +92,9 @@ def _of_solid(solid: Seen, mesh: Mesh, show: str, label: str) -> tuple[At, str]:
     from .shown import look
 
     given = look(solid, show)(mesh, (0.0, 0.0, 1.0))
-    if "color" not in given or "inside" not in given:
+    if not callable(given.get("color")):
         raise ValueError(f'values is "{show}", which is no number at points; `render` shows it')
-    return given["inside"], label or given["label"]
+    return given["color"], label or given["label"]
 
 
 def checked(view: View, name: str, value: Any) -> Any:
@@ -160,7 +160,7 @@ class View:
         self.label = label or (WALL if self._computed else "")
         self._at: At | None = values if callable(values) else None
         known = values is None or self._computed or self._at is not None
-        self._values = None if known else mesh._at_vertices("values", values)
+        self._values = None if known else numbers("values", values, (mesh.counts[0], "vertex"))
         self._solid: Seen | None = None
         self._progress = progress
         self._widget: Widget | None = None
@@ -209,7 +209,7 @@ class View:
     def values(self) -> NDArray | None:
         """The values at the vertices of the mesh that is shown, None without."""
         if self._at is not None:
-            return self._light._at_vertices("values", self._at(self._light.vertices))
+            return numbers("values", self._at(self._light.vertices), (self._light.counts[0], "vertex"))
         return self._light.thickness_at_vertices(progress=self._progress) if self._computed else self._values
 
     @cached_property

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
-from .given import fixed, number, poisson, positive, thread_count, whole
+from .given import fixed, number, poisson, positive
 from .mesh import Mesh
 from .texts import counted
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], Any]
 
-__all__ = ["BeamMesh", "Carrier", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
+__all__ = ["BeamMesh", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
@@ -65,7 +65,9 @@ class FiniteElements:
 
     #: What a set needs that is held or loaded.
     _of_sets = "faces on the boundary"
-    #: Formats with fields.
+    #: The formats of its files.
+    _writes: ClassVar[tuple[str, ...]]
+    #: Those with fields.
     _with_fields: tuple[str, ...] = ("vtu", "xdmf")
     sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
@@ -100,6 +102,21 @@ class FiniteElements:
         if not self._figures.sets[name].faces:
             raise ValueError(f"{what}: the set {name} has no {self._of_sets}")
         return name
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        E: float = 1.0,
+        nu: float = 0.3,
+        hold: Iterable[str] = (),
+        load: Mapping[str, Sequence[float]] | None = None,
+        fields: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Writes a file of one of the formats of its kind, with its sets: material ``E`` (MPa) and ``nu``, steps ``hold`` and
+        ``load``, and ``fields`` as of ``VolumeMesh.write``. Raises ValueError for another suffix, and for what a format cannot
+        carry.
+        """
+        self._write(path, extension(path, self._writes), (E, nu), (hold, load), fields)
 
     def _write(
         self,
@@ -310,143 +327,16 @@ class VolumeMesh(FiniteElements):
                 raise
 
 
-class Carrier(VolumeMesh):
-    """The tetrahedra of a lattice over tetrahedra, each a material by the solid fraction of its cell: a model of the whole part
-    with as many elements as the lattice has cells. Made by ``Solid.carrier``.
-
-    Its domains are classes of the solid fraction, in twentieths: FRACTION_005 to FRACTION_100, or ZONE_NAME_FRACTION_005 in a
-    mesh of several zones. Its sets are SURFACE, the whole boundary; X0 X1 Y0 Y1 Z0 Z1; and those of the design. ``volume``
-    (mm³) is that of the tetrahedra. A skin, keep zones and a net are no part of it.
-
-    In .msh, .vtu and .xdmf each tetrahedron has its ``fraction`` and its ``orientation``, the nine numbers of ``axes``;
-    ``fields`` may have materials: ``carrier.moduli()``, {"C": carrier.stiffness().reshape(-1, 36)}.
-    """
-
-    def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
-        super().__init__(core)
-        self._solid = solid
-        self._found: dict[tuple[float, int], list[list[float]]] = {}
-        self._constants: dict[tuple[float, int], list[list[float]]] = {}
-
-    def __repr__(self) -> str:
-        return super().__repr__().replace("VolumeMesh", "Carrier")
-
-    @cached_property
-    def fraction(self) -> NDArray[np.float64]:
-        """The solid fraction of each tetrahedron."""
-        return fixed(self._core.fraction)
-
-    @cached_property
-    def axes(self) -> NDArray[np.float64]:
-        """The axes of each tetrahedron (m, 3, 3), unit vectors, one row each: those of the body-centred cubic lattice whose
-        tetrahedra it is most like, along its two longest opposite edges and across. Where all are such tetrahedra, as inside
-        the background mesh, they are the same everywhere but for their order and signs.
-        """
-        return fixed(self._core.axes.reshape(-1, 3, 3))
-
-    def stiffness(
-        self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
-    ) -> NDArray[np.float64]:
-        """The stiffness of each tetrahedron (m, 6, 6) over Young's modulus of the solid, in world axes, Voigt's order
-        11 22 33 23 13 12: cubic along ``axes``, that of the cell in equal tetrahedra at the mean fraction of the domain. See
-        ``moduli`` for what it does not show, and for ``nu`` and ``n``.
-        """
-        import numpy as np
-
-        c11, c12, c44 = np.array(self._cubic(poisson("nu", nu), whole("n", n, 8, 512), threads, progress))[self.domain].T
-        alike = np.zeros((2, 6, 6))
-        alike[0, :3, :3] = 1
-        alike[1] = np.diag([2.0, 2, 2, 1, 1, 1])
-        x, y, z = np.moveaxis(self.axes, -1, 0)
-        # The squares of an axis as a tensor, a ⊗ a.
-        squares = np.stack([x * x, y * y, z * z, y * z, x * z, x * y], axis=-1)
-        along = np.einsum("eai,eaj->eij", squares, squares)
-        cut = [c12, c44, c11 - c12 - 2 * c44]
-        return sum(c[:, None, None] * of for c, of in zip(cut, [*alike, along], strict=True))
-
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        E: float = 1.0,
-        nu: float = 0.3,
-        hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
-        fields: Mapping[str, ArrayLike] | None = None,
-        oriented: bool = False,
-    ) -> None:
-        """As ``VolumeMesh.write``. In .inp and .bdf each domain has a material: ``moduli(nu)`` times the ``E`` (MPa) of the
-        solid. With ``oriented`` it is cubic, along the ``axes`` of each element (*ORIENTATION by a *DISTRIBUTION), as
-        ``stiffness(nu)``; in .inp alone.
-        """
-        kind = extension(path, VOLUME_WRITES)
-        if not oriented:
-            return super().write(path, E, nu, hold, load, fields)
-        if kind != "inp":
-            raise ValueError(f"oriented materials are for .inp, not .{kind}; leave oriented out")
-        check_order(kind, self._figures.order)
-        of_solid = positive("E", E)
-        cubic = [[of_solid * c for c in of] for of in self._cubic(poisson("nu", nu), 32, None, None)]
-        self._write(path, kind, (E, nu), (hold, load), fields, cubic)
-
-    def moduli(
-        self, nu: float = 0.3, n: int = 32, threads: int | None = None, progress: Progress | None = None
-    ) -> dict[str, NDArray[np.float64]]:
-        """The material of each tetrahedron: ``young``, Young's modulus over that of the solid, and ``poisson``, Poisson's
-        ratio, where that of the solid is ``nu``.
-
-        A domain has that of its mean fraction: Hill's mean over all directions of the effective stiffness of the cell in equal
-        tetrahedra, those of the body-centred cubic lattice, found on ``n`` voxels along its edge as by ``Solid.stiffness``.
-        Tetrahedra whose edges are much longer one way are stiffer that way, which a mean does not show.
-
-        Raises ValueError for a cell that carries no load at the fraction of a domain, and for ``nu`` outside -1 to 0.5.
-        """
-        import numpy as np
-
-        found = np.array(self._moduli(poisson("nu", nu), whole("n", n, 8, 512), threads, progress))[self.domain]
-        return {"young": found[:, 0], "poisson": found[:, 1]}
-
-    def materials(
-        self, nu: float, kind: str, threads: int | None = None, progress: Progress | None = None
-    ) -> dict[str, NDArray[np.float64]]:
-        """``moduli`` and ``stiffness`` as fields of a file: the latter as ``stiffness``, its 36 numbers row by row, or, in
-        .msh, as C11, C12 and C44 along the axes.
-        """
-        import numpy as np
-
-        found = self.moduli(nu, threads=threads, progress=progress)
-        if kind != "msh":
-            return found | {"stiffness": self.stiffness(nu).reshape(-1, 36)}
-        constants = np.array(self._cubic(nu, 32, threads, None))[self.domain]
-        return found | dict(zip(("C11", "C12", "C44"), constants.T, strict=True))
-
-    def _moduli(self, nu: float, n: int, threads: int | None, progress: Progress | None) -> list[list[float]]:
-        """Of each domain."""
-        if (nu, n) not in self._found:
-            self._found[nu, n] = _core.VolumeMesh.carrier_moduli(self._solid, nu, n, thread_count(threads), progress)
-        return self._found[nu, n]
-
-    def _cubic(self, nu: float, n: int, threads: int | None, progress: Progress | None) -> list[list[float]]:
-        """C11, C12 and C44 of each domain, over Young's modulus of the solid."""
-        if (nu, n) not in self._constants:
-            self._constants[nu, n] = _core.VolumeMesh.carrier_stiffness(self._solid, nu, n, thread_count(threads), progress)
-        return self._constants[nu, n]
-
-    def _of_elements(self) -> dict[str, NDArray]:
-        return super()._of_elements() | {"fraction": self.fraction, "orientation": self.axes.reshape(-1, 9)}
-
-    def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
-        if kind not in ("inp", "bdf"):
-            return []
-        return [[E * young, poisson] for young, poisson in self._moduli(nu, 32, None, None)]
-
-    def _check_loads(self) -> None:
-        """All of it is solid."""
-
-
 class VoxelElements(FiniteElements):
     """Voxels as finite elements: hexahedra of a regular grid, each with its solid fraction, in one piece. Made by
     ``Solid.voxel_elements``.
+
+    ``write`` makes .inp (Abaqus, CalculiX: C3D8), .msh or .msh2 (Gmsh 2.2), .vtu (VTK) or .xdmf, with fractions and sets. In
+    .inp elements are in sets by their solid fraction, in twentieths; with ``hold`` and ``load`` it runs as it is: Young's
+    modulus in each set is ``E`` (MPa) times its mean fraction.
     """
+
+    _writes = VOXEL_ELEMENT_WRITES
 
     def __init__(self, core: _core.VoxelElements):
         self._core = core
@@ -484,27 +374,16 @@ class VoxelElements(FiniteElements):
         """The figures: numbers of elements and nodes, solid volume, what was left out, sets."""
         return copy.deepcopy(self._figures)
 
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        E: float = 1.0,
-        nu: float = 0.3,
-        hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
-        fields: Mapping[str, ArrayLike] | None = None,
-    ) -> None:
-        """Writes .inp (Abaqus, CalculiX: C3D8), .msh or .msh2 (Gmsh 2.2), .vtu (VTK) or .xdmf, with fractions and sets.
-
-        In .inp elements are in sets by their solid fraction, in twentieths. With ``hold`` and ``load``, as of
-        ``VolumeMesh.write``, it runs as it is: Young's modulus in each set is ``E`` (MPa) times its mean fraction. ``fields``
-        are those of ``VolumeMesh.write``.
-        """
-        self._write(path, extension(path, VOXEL_ELEMENT_WRITES), (E, nu), (hold, load), fields)
-
 
 class ShellMesh(FiniteElements):
-    """Triangles on the mid-surface of a sheet, with the wall's thickness at each node. Made by ``Solid.shell_mesh``."""
+    """Triangles on the mid-surface of a sheet, with the wall's thickness at each node. Made by ``Solid.shell_mesh``.
 
+    ``write`` makes .inp (Abaqus, CalculiX: S3 or S6), .bdf (Nastran: CTRIA3 or CTRIA6) or .vtu (VTK), with the thickness at
+    nodes and sets. With ``hold`` and ``load`` an .inp runs as it is: the nodes of the sets ``hold`` neither move nor turn, and
+    each resultant is that of a uniform traction on the wall's faces at the border. ``fields`` are for .vtu.
+    """
+
+    _writes = SHELL_WRITES
     _of_sets = "edges on the border"
 
     def __init__(self, core: _core.Shells):
@@ -542,24 +421,6 @@ class ShellMesh(FiniteElements):
     def report(self) -> ShellReport:
         """The figures: numbers of triangles and nodes, area, volume, thickness, angles, sets."""
         return copy.deepcopy(self._figures)
-
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        E: float = 1.0,
-        nu: float = 0.3,
-        hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
-        fields: Mapping[str, ArrayLike] | None = None,
-    ) -> None:
-        """Writes .inp (Abaqus, CalculiX: S3 or S6), .bdf (Nastran: CTRIA3 or CTRIA6) or .vtu (VTK), with the thickness at nodes
-        and sets.
-
-        With ``hold`` and ``load``, as of ``VolumeMesh.write``, an .inp runs as it is: the nodes of the sets ``hold`` neither
-        move nor turn, and each resultant is that of a uniform traction on the wall's faces at the border. ``fields`` are those
-        of ``VolumeMesh.write``, for .vtu.
-        """
-        self._write(path, extension(path, SHELL_WRITES), (E, nu), (hold, load), fields)
 
 
 class BeamMesh(FiniteElements):

@@ -85,7 +85,7 @@ pub struct Angles {
     /// 1 % of them have.
     pub max_p99: f64,
     /// The middle of the tetrahedron with the angle nearest to 0 or 180 (mm).
-    pub worst: Vec3,
+    pub worst_at: Vec3,
 }
 
 /// The order of the edges' nodes in Abaqus, CalculiX, Nastran and VTK, by indices of `EDGES`.
@@ -136,7 +136,7 @@ impl FeMesh {
             min_p50: at(&least, 0.5),
             max_p50: at(&most, 0.5),
             max_p99: at(&most, 0.99),
-            worst: scale(corners.into_iter().fold([0.0; 3], add), 0.25),
+            worst_at: scale(corners.into_iter().fold([0.0; 3], add), 0.25),
         })
     }
 

@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use geometry::fault::Fault;
 use geometry::formats::{Encoded, LayerFormat, Raster, Stack};
@@ -17,7 +16,7 @@ use trabecula::report::LayersReport;
 use crate::error;
 use crate::file;
 use crate::layers::Layers;
-use crate::ranges::{ended, hand_over};
+use crate::ranges::handing_over;
 use crate::report::report;
 use crate::run::run;
 
@@ -174,24 +173,21 @@ impl LayerRanges {
         take: Py<PyAny>,
         threads: Option<usize>,
     ) -> PyResult<()> {
-        let raised: Mutex<Option<PyErr>> = Mutex::default();
         let (end, size) = (end.min(self.count()), size.max(1));
         let (mut data, mut partial, mut first) = (Vec::new(), Vec::new(), start);
-        let work = |p: &dyn Progress| {
+        handing_over(py, threads, &take, |hand, p| {
             self.make(start..end, p, |index, made| {
                 made.pack(&mut data, &mut partial);
                 let next = index + 1;
                 if next % size == 0 || next == end {
-                    hand_over(&take, &raised, (first, next, &data, &partial))?;
+                    hand(first, next, &data, &partial)?;
                     data.clear();
                     partial.clear();
                     first = next;
                 }
                 Ok(())
             })
-        };
-        let made = run(py, threads, None, work)?;
-        ended(raised, made)
+        })
     }
 
     /// Writes the file of what `each` has made of all layers, in order: their bytes in the file `data`, and what there is besides. As `save`.

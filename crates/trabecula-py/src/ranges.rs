@@ -20,8 +20,28 @@ use crate::solid::{Measured, Solid, islands_word, measured};
 /// A range: its first item and the one after its last, its bytes of the output, its partial result.
 type Range<'py> = (usize, usize, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
-/// Calls `take` with a range; what it raises is put aside and ends the work.
-pub fn hand_over(
+/// What a range is handed over to: its first item and the one after its last, its bytes of the output, its partial result.
+pub type HandOver<'a> = dyn Fn(usize, usize, &[u8], &[u8]) -> Result<(), Stopped> + Sync + 'a;
+
+/// Does work that hands ranges over to `take`, from another thread; what that raises ends the work.
+pub fn handing_over(
+    py: Python<'_>,
+    threads: Option<usize>,
+    take: &Py<PyAny>,
+    work: impl FnOnce(&HandOver, &dyn Progress) -> Result<(), Stopped> + Send,
+) -> PyResult<()> {
+    let raised: Mutex<Option<PyErr>> = Mutex::default();
+    let made = run(py, threads, None, |p| {
+        work(&|first, next, data, partial| hand_over(take, &raised, (first, next, data, partial)), p)
+    })?;
+    match raised.into_inner().ok().flatten() {
+        Some(e) => Err(e),
+        None => made.map_err(error::stopped),
+    }
+}
+
+/// Calls `take` with a range; what it raises is put aside.
+fn hand_over(
     take: &Py<PyAny>,
     raised: &Mutex<Option<PyErr>>,
     range: (usize, usize, &[u8], &[u8]),
@@ -38,35 +58,32 @@ pub fn hand_over(
     })
 }
 
-/// What the work ended with, if nothing was raised.
-pub fn ended(raised: Mutex<Option<PyErr>>, made: Result<(), Stopped>) -> PyResult<()> {
-    match raised.into_inner().ok().flatten() {
-        Some(e) => Err(e),
-        None => made.map_err(error::stopped),
-    }
-}
-
 /// A solid on its grid, whose tiles are taken range by range.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct TileRanges {
     tiles: Arc<trabecula::extract::TileRanges>,
     figures: bool,
+    /// By how much a level is moved on this grid.
+    #[pyo3(get)]
+    moved: f64,
 }
 
 #[pymethods]
 impl TileRanges {
     /// The tiles of a solid at grid spacing `edge` (mm), for its triangles or for its `figures`; a ValueError for a solid that is not
-    /// meshed on a grid.
+    /// meshed on a grid. `moved` is what others of the same solid and spacing have found by measuring it.
     #[staticmethod]
-    #[pyo3(signature = (solid, edge, figures=false))]
-    fn of(solid: Py<Solid>, py: Python<'_>, edge: f64, figures: bool) -> PyResult<TileRanges> {
+    #[pyo3(signature = (solid, edge, figures=false, moved=None))]
+    fn of(solid: Py<Solid>, py: Python<'_>, edge: f64, figures: bool, moved: Option<f64>) -> PyResult<TileRanges> {
         let work = move || {
             let built: &Built = solid.get().built();
             built.on_grid().map_err(Stopped::Refused)?;
-            let solid = built.grid_solid(edge, &Silent)?;
-            trabecula::extract::TileRanges::new(&solid, edge).map_err(Stopped::Refused)
+            let moved = moved.map_or_else(|| built.grid_move(edge, &Silent), Ok)?;
+            let tiles = trabecula::extract::TileRanges::new(&built.grid_solid(moved), edge);
+            Ok((Arc::new(tiles.map_err(Stopped::Refused)?), moved))
         };
-        Ok(TileRanges { tiles: Arc::new(run_apart(py, None, work)?.map_err(error::stopped)?), figures })
+        let (tiles, moved) = run_apart(py, None, work)?.map_err(error::stopped)?;
+        Ok(TileRanges { tiles, figures, moved })
     }
 
     /// Number of tiles.
@@ -88,13 +105,13 @@ impl TileRanges {
         take: Py<PyAny>,
         threads: Option<usize>,
     ) -> PyResult<()> {
-        let raised: Mutex<Option<PyErr>> = Mutex::default();
-        let taken = |m: RangeMade| hand_over(&take, &raised, (m.tiles.start, m.tiles.end, &m.records, &m.partial));
-        let made = run(py, threads, None, |p| match self.figures {
-            false => self.tiles.surface(start..end, size, p, taken),
-            true => self.tiles.figures(start..end, size, p, taken),
-        })?;
-        ended(raised, made)
+        handing_over(py, threads, &take, |hand, p| {
+            let taken = |m: RangeMade| hand(m.tiles.start, m.tiles.end, &m.records, &m.partial);
+            match self.figures {
+                false => self.tiles.surface(start..end, size, p, taken),
+                true => self.tiles.figures(start..end, size, p, taken),
+            }
+        })
     }
 }
 
@@ -159,22 +176,19 @@ impl VoxelRanges {
         take: Py<PyAny>,
         threads: Option<usize>,
     ) -> PyResult<()> {
-        let raised: Mutex<Option<PyErr>> = Mutex::default();
         let (end, size) = (end.min(self.count()), size.max(1));
         let solid = self.solid.get().solid();
-        let work = |p: &dyn Progress| {
+        handing_over(py, threads, &take, |hand, p| {
             let mut at = start;
             while at < end {
                 let next = ((at / size + 1) * size).min(end);
                 let voxels = self.grid.layers(solid, at..next, p)?;
                 let count = voxels.iter().map(|v| u64::from(*v)).sum::<u64>();
-                hand_over(&take, &raised, (at, next, &voxels, &count.to_le_bytes()))?;
+                hand(at, next, &voxels, &count.to_le_bytes())?;
                 at = next;
             }
             Ok(())
-        };
-        let made = run(py, threads, None, work)?;
-        ended(raised, made)
+        })
     }
 }
 

@@ -9,6 +9,7 @@ use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use trabecula::design::CarrierMaterial;
 use trabecula::report::VolumeReport;
 use trabecula::volume_mesh::{Made, Of, Options};
 
@@ -67,32 +68,19 @@ impl VolumeMesh {
         Ok(VolumeMesh { made: made.map_err(error::fault)? })
     }
 
-    /// Young's modulus, over that of the solid, and Poisson's ratio of each domain of the carrier: the solid's ratio, and voxels along cells.
+    /// The material of each domain of the carrier: C11, C12 and C44; Young's modulus and Poisson's ratio of their mean over all directions;
+    /// moduli over that of the solid, whose Poisson's ratio is `nu`; `n` voxels along cells.
     #[staticmethod]
     #[pyo3(signature = (solid, nu, n, threads=None, progress=None))]
-    fn carrier_moduli(
+    fn carrier_materials(
         py: Python<'_>,
         solid: &Solid,
         nu: f64,
         n: usize,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Vec<[f64; 2]>> {
-        run(py, threads, progress, |p| solid.built().carrier_moduli(nu, n, p))?.map_err(error::stopped)
-    }
-
-    /// C11, C12 and C44 of each domain of the carrier, over Young's modulus of the solid: its ratio, and voxels along cells.
-    #[staticmethod]
-    #[pyo3(signature = (solid, nu, n, threads=None, progress=None))]
-    fn carrier_stiffness(
-        py: Python<'_>,
-        solid: &Solid,
-        nu: f64,
-        n: usize,
-        threads: Option<usize>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Vec<[f64; 3]>> {
-        run(py, threads, progress, |p| solid.built().carrier_stiffness(nu, n, p))?.map_err(error::stopped)
+    ) -> PyResult<Vec<CarrierMaterial>> {
+        run(py, threads, progress, |p| solid.built().carrier_materials(nu, n, p))?.map_err(error::stopped)
     }
 
     /// The axes of each tetrahedron of a carrier (m, 9), one after the other.

@@ -362,6 +362,9 @@ pub fn cell(node: &Node) -> Result<Arc<Cell>, DesignError> {
     Ok(build_cell::cell(&spec, "cell", &NoFiles)?.1)
 }
 
+/// C11, C12 and C44 of a domain of the carrier; Young's modulus and Poisson's ratio of their mean over all directions.
+pub type CarrierMaterial = ([f64; 3], [f64; 2]);
+
 impl Built {
     /// The figures of the design, without meshing it.
     pub fn report(&self) -> DesignReport {
@@ -381,12 +384,17 @@ impl Built {
         }
     }
 
-    /// The solid whose surface on a grid in steps of `edge` (mm) is that of `surface`.
+    /// By how much the level of a lattice over tetrahedra is moved where its surface is made on a grid in steps of `edge` (mm).
     ///
     /// # Errors
     /// A spacing at which there is no grid; an interruption.
-    pub fn grid_solid(&self, edge: f64, progress: &dyn Progress) -> Result<Cow<'_, Solid>, Stopped> {
-        compensated_grid::compensated(self, edge, progress)
+    pub fn grid_move(&self, edge: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
+        compensated_grid::move_at(self, edge, progress)
+    }
+
+    /// The solid whose surface on a grid is that of `surface`, where the level is moved by this.
+    pub fn grid_solid(&self, moved: f64) -> Cow<'_, Solid> {
+        compensated_grid::moved(self, moved)
     }
 
     /// Whether `surface` meshes it on a grid, so that it can be made range by range of the grid's tiles.
@@ -469,21 +477,19 @@ impl Built {
         build_carrier::carrier(self, order).map(|made| made.0)
     }
 
-    /// Young's modulus, over that of the solid, and Poisson's ratio of each domain of the carrier, where the solid has Poisson's ratio `nu`
-    /// and cells are solved for on `n` voxels along an edge.
+    /// The material of each domain of the carrier, where the solid has Poisson's ratio `nu` and cells are solved for on `n` voxels along an edge:
+    /// C11, C12 and C44 along the axes of its elements, and Young's modulus and Poisson's ratio of their mean over all directions; moduli
+    /// over Young's modulus of the solid.
     ///
     /// # Errors
     /// As `carrier`; a cell that carries no load at the fraction of a domain; a solid that is none; an interruption.
-    pub fn carrier_moduli(&self, nu: f64, n: usize, progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
-        build_carrier::moduli(self, (nu, n), progress)
-    }
-
-    /// C11, C12 and C44 of each domain of the carrier, over Young's modulus of the solid, along the axes of its elements.
-    ///
-    /// # Errors
-    /// As `carrier_moduli`.
-    pub fn carrier_stiffness(&self, nu: f64, n: usize, progress: &dyn Progress) -> Result<Vec<[f64; 3]>, Stopped> {
-        build_carrier::cubic(self, (nu, n), progress)
+    pub fn carrier_materials(
+        &self,
+        nu: f64,
+        n: usize,
+        progress: &dyn Progress,
+    ) -> Result<Vec<CarrierMaterial>, Stopped> {
+        build_carrier::materials(self, (nu, n), progress)
     }
 
     /// The shells of its mid-surface, with the design's own sets.

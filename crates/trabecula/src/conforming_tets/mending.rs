@@ -52,22 +52,19 @@ impl Shaping<'_> {
     /// Mends the neighbourhoods of the worst tetrahedra; whether any was. Where sheets of the boundary nearly touch, they could come to cross:
     /// if more of it crosses than before, all is taken back.
     pub fn mend(&mut self) -> bool {
-        let made = self.mend_all();
-        if made.is_empty() {
+        if self.bad().is_empty() {
             return false;
         }
-        let after = self.crossings();
-        if after > 0 {
+        let before = self.crossings();
+        let made = self.mend_all();
+        if self.crossings() > before {
             self.take_back(made);
-            if after > self.crossings() {
-                return false;
-            }
-            self.mend_all();
+            return false;
         }
-        true
+        !made.is_empty()
     }
 
-    /// The pairs of triangles of the boundary that cross.
+    /// The pairs of triangles of the boundary that cross, up to `COUNTED`.
     fn crossings(&self) -> usize {
         let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
         let triangles = faces.into_iter().map(|(face, _, _)| face).collect();

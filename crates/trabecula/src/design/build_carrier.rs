@@ -5,7 +5,7 @@
 //! (1952) 349).
 
 use super::tiled_cell::TiledCell;
-use super::{Built, Tiled, unit_cell};
+use super::{Built, CarrierMaterial, Tiled, unit_cell};
 use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::effective::Resolution;
 use crate::volume_mesh::{self, Carried, Made};
@@ -46,13 +46,13 @@ fn only(built: &Built) -> Result<&Tiled, Fault> {
     }
 }
 
-/// Young's modulus, over that of the solid, and Poisson's ratio of each domain, at the mean fraction of its tetrahedra.
-pub(super) fn moduli(built: &Built, of: (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 2]>, Stopped> {
-    Ok(cubic(built, of, progress)?.into_iter().map(isotropic).collect())
-}
-
-/// C11, C12 and C44 of each domain, over Young's modulus of the solid, at the mean fraction of its tetrahedra.
-pub(super) fn cubic(built: &Built, (nu, n): (f64, usize), progress: &dyn Progress) -> Result<Vec<[f64; 3]>, Stopped> {
+/// C11, C12 and C44 of each domain, and Young's modulus and Poisson's ratio of their mean over all directions, at the mean fraction of its
+/// tetrahedra; moduli over Young's modulus of the solid.
+pub(super) fn materials(
+    built: &Built,
+    (nu, n): (f64, usize),
+    progress: &dyn Progress,
+) -> Result<Vec<CarrierMaterial>, Stopped> {
     let tiled = only(built).map_err(Stopped::Refused)?;
     let (made, zone_of) = carrier(built, 1).map_err(Stopped::Refused)?;
     let solid = Material::isotropic(1.0, nu).map_err(Stopped::Refused)?;
@@ -87,11 +87,11 @@ pub(super) fn cubic(built: &Built, (nu, n): (f64, usize), progress: &dyn Progres
             found.iter_mut().zip(eigenvalues).for_each(|(f, v)| f.push([fraction.ln(), v.ln()]));
         }
         for d in own {
-            let [bulk, slant, shear] = [0, 1, 2].map(|k| monotone(&found[k], means[d].ln()).exp());
-            out[d] = [(bulk + 2.0 * slant) / 3.0, (bulk - slant) / 3.0, shear];
+            let [three_k, two_c, c44] = [0, 1, 2].map(|k| monotone(&found[k], means[d].ln()).exp());
+            out[d] = [(three_k + 2.0 * two_c) / 3.0, (three_k - two_c) / 3.0, c44];
         }
     }
-    Ok(out)
+    Ok(out.into_iter().map(|of| (of, isotropic(of))).collect())
 }
 
 /// The cell of a zone.
@@ -116,16 +116,16 @@ fn constants(c: &Voigt) -> [f64; 3] {
     [mean([[0, 0], [1, 1], [2, 2]]), mean([[0, 1], [1, 2], [0, 2]]), mean([[3, 3], [4, 4], [5, 5]])]
 }
 
-/// What the three kinds of strain of a cubic stiffness are multiplied by: dilatation, C11 + 2 C12; stretches along the axes, C11 − C12; shears
-/// between these, C44. All are positive, as C12 may not be.
+/// What the three kinds of strain of a cubic stiffness are multiplied by: dilatation, 3K = C11 + 2 C12; stretches along the axes, 2C′ = C11 − C12,
+/// twice the tetragonal shear modulus; shears between these, C44. All are positive, as C12 may not be.
 fn eigenvalues([c11, c12, c44]: [f64; 3]) -> [f64; 3] {
     [c11 + 2.0 * c12, c11 - c12, c44]
 }
 
 /// Young's modulus and Poisson's ratio of Hill's mean over all directions of a cubic stiffness.
 fn isotropic(of: [f64; 3]) -> [f64; 2] {
-    let [bulk, slant, c44] = eigenvalues(of);
-    let bulk = bulk / 3.0;
-    let shear = 0.5 * ((slant + 3.0 * c44) / 5.0 + 5.0 * slant * c44 / (4.0 * c44 + 3.0 * slant));
+    let [three_k, two_c, c44] = eigenvalues(of);
+    let bulk = three_k / 3.0;
+    let shear = 0.5 * ((two_c + 3.0 * c44) / 5.0 + 5.0 * two_c * c44 / (4.0 * c44 + 3.0 * two_c));
     [9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))]
 }

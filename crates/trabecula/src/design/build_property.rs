@@ -129,7 +129,7 @@ impl Property<'_> {
         }
     }
 
-    /// The property as a guide of the search: at its limit where it cannot be solved for. Fine voxels decide, and say why.
+    /// The property as a guide of the search: at its limit where it cannot be solved for. Fine voxels decide.
     fn guess(&self, fraction: f64, n: usize) -> f64 {
         self.value(fraction, n).unwrap_or(if self.grows() { 0.0 } else { f64::INFINITY })
     }
@@ -218,6 +218,8 @@ impl Property<'_> {
         if !(ends[0].min(ends[1]) <= asked && asked <= most) {
             let above = asked > most;
             let (limit, at) = if above == grows { (ends[1], range[1]) } else { (ends[0], range[0]) };
+            // What could not be solved there says so itself.
+            self.value(at, n)?;
             let (word, unit) = (if above { "most" } else { "least" }, if grows { "" } else { " mm²" });
             let message = format!(
                 "{} is {}{unit}; that of this cell is at {word} about {limit:.3}{unit}, at a solid fraction of {at:.3}",

@@ -23,7 +23,6 @@ use crate::map::{Ends, Tets};
 use crate::region::{Intersection, MeshRegion, Notes, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
 use geometry::fault::{Fault, position};
-use geometry::math::Vec3;
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
@@ -378,7 +377,6 @@ fn made(
 
 /// Why the surface of a lattice is made on a grid, with the place if there is one; `None` where each tetrahedron has its own.
 fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<String> {
-    let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     if domain.joined.method == Method::Implicit {
         return Some("method = \"implicit\"".into());
     }
@@ -394,11 +392,14 @@ fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<Str
         MeshFit::Nearly => Some(match (domain.report.lost().first(), domain.map.farthest_off()) {
             (Some(lost), _) => {
                 let size = rounded(lost.size, 3);
-                format!("the tetrahedra do not follow a {} of {size} mm at {}", lost.kind.word(), at(lost.at))
+                format!("the tetrahedra do not follow a {} of {size} mm at {}", lost.kind.word(), position(lost.at))
             }
             (None, Some((off, place))) => {
                 let off = rounded(off * domain.map.mean_edge(), 3);
-                format!("the surface is finer than the tetrahedra: bent onto it they are {off} mm off at {}", at(place))
+                format!(
+                    "the surface is finer than the tetrahedra: bent onto it they are {off} mm off at {}",
+                    position(place)
+                )
             }
             (None, None) => "the tetrahedra are not bent onto the region".into(),
         }),

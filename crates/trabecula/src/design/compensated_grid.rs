@@ -46,9 +46,9 @@ pub(super) fn aimed(built: &Built) -> Option<(&Tiled, [f64; 2])> {
     }
 }
 
-/// The solid to be meshed in steps of `edge` (mm).
-pub(super) fn compensated<'a>(built: &'a Built, edge: f64, progress: &dyn Progress) -> Result<Cow<'a, Solid>, Stopped> {
-    let Some((tiled, aim)) = aimed(built) else { return Ok(Cow::Borrowed(&built.solid)) };
+/// By how much the level is moved for steps of `edge` (mm).
+pub(super) fn move_at(built: &Built, edge: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
+    let Some((tiled, aim)) = aimed(built) else { return Ok(0.0) };
     let step = edge.max(tiled.tiling.wavelength() / STEPS);
     let known = built.moves.lock().ok().and_then(|moves| moves.get(&step.to_bits()).copied());
     let by = match known {
@@ -61,7 +61,15 @@ pub(super) fn compensated<'a>(built: &'a Built, edge: f64, progress: &dyn Progre
             by
         }
     };
-    Ok(if by == 0.0 { Cow::Borrowed(&built.solid) } else { Cow::Owned(at(built, tiled, by * (edge / step).powi(2))) })
+    Ok(by * (edge / step).powi(2))
+}
+
+/// The solid to be meshed where the level is moved.
+pub(super) fn moved(built: &Built, by: f64) -> Cow<'_, Solid> {
+    match aimed(built) {
+        Some((tiled, _)) if by != 0.0 => Cow::Owned(at(built, tiled, by)),
+        _ => Cow::Borrowed(&built.solid),
+    }
 }
 
 /// The design's solid with the level of its lattice moved.
@@ -126,7 +134,7 @@ impl CompensatedGrid<'_> {
     /// The solid to be meshed, and the progress of meshing it.
     fn solid<'p>(&self, edge: f64, whole: &'p dyn Progress) -> Result<(Cow<'_, Solid>, Stage<'p>), Stopped> {
         let first = Stage { whole, from: 0.0, to: MEASURED };
-        Ok((compensated(self.0, edge, &first)?, Stage { whole, from: MEASURED, to: 1.0 }))
+        Ok((moved(self.0, move_at(self.0, edge, &first)?), Stage { whole, from: MEASURED, to: 1.0 }))
     }
 }
 

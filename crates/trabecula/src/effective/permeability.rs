@@ -159,7 +159,8 @@ impl UnitCell {
             let steps = pore / grid.step;
             let need = enough(n, OPEN / steps).map_or(String::new(), |need| format!(": take n = {need}"));
             said.push(format!(
-                "no flow was found along {}, though a ball of {pore:.3} mm passes the pore: that is {steps:.1} steps of the grid, which closes it,                  and 0 is no figure{need}",
+                "no flow was found along {}, though a ball of {pore:.3} mm passes the pore: that is {steps:.1} steps of the grid, which closes it, \
+                 and 0 is no figure{need}",
                 closed.join(", ")
             ));
         } else if !closed.is_empty() {

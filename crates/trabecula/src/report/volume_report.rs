@@ -38,7 +38,7 @@ pub struct VolumeReport {
     /// 99th percentile of each tetrahedron's greatest dihedral angle, degrees.
     pub max_angle_p99: f64,
     /// The middle of the tetrahedron with the angle nearest to 0 or 180, mm.
-    pub worst: [f64; 3],
+    pub worst_angle_at: [f64; 3],
     /// Number of components connected by faces.
     pub pieces: usize,
     /// Greatest distance of boundary faces from the surface, mm, at their corners, edges and centroids; faces on flat cuts have none.
@@ -251,7 +251,7 @@ impl From<&Made> for VolumeReport {
             min_angle_p50: angles.min_p50,
             max_angle_p50: angles.max_p50,
             max_angle_p99: angles.max_p99,
-            worst: angles.worst,
+            worst_angle_at: angles.worst_at,
             pieces: made.pieces,
             deviation: made.deviation,
             straight: made.straight,

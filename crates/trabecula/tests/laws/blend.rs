@@ -315,18 +315,18 @@ fn bounds_tell_empty_places_within_transitions() {
     for (what, of, _) in pairs() {
         for by in [By::Fraction, By::Value] {
             let field = blend(&of, step(30.0), by);
-            let (mut reported, mut clear) = (0, 0);
+            let (mut proven, mut clear) = (0, 0);
             for p in window([0.0; 3], 9.0, 400) {
                 let b = Aabb { min: p, max: p.map(|x| x + 0.1) };
                 let v = field.value(p.map(|x| x + 0.03));
                 let r = field.bound(&b);
                 assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
-                reported += usize::from(r.lo > 0.0 || r.hi < 0.0);
+                proven += usize::from(r.lo > 0.0 || r.hi < 0.0);
                 // No face of any kind within some steps of the box.
                 let lipschitz = field.lipschitz();
                 clear += usize::from(v.abs() > 0.35 * lipschitz);
             }
-            assert!(reported > 20 && 4 * reported > clear, "{what} {by:?}: {reported} of {clear}");
+            assert!(proven > 20 && 4 * proven > clear, "{what} {by:?}: {proven} of {clear}");
         }
     }
 }

@@ -220,7 +220,7 @@ fn figures_are_those_of_the_file() {
     }
 }
 
-/// Stops at a share of the way; remembers how far it was.
+/// Stops at a share of the way; remembers how far the work was.
 pub struct Until(pub f64, pub std::sync::Mutex<f64>);
 
 impl Progress for Until {

@@ -99,7 +99,7 @@ pub(super) fn decimal(text: &mut String, x: f64) {
 
 /// The materials of the domains: one of all, or where they are classes of the solid fraction one of each.
 fn materials(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
-    if let (false, [_, ..]) = (mesh.axes.is_empty(), &text.cubic[..]) {
+    if !text.cubic.is_empty() {
         return oriented(mesh, text, out);
     }
     let own = !mesh.fraction.is_empty();

@@ -1,4 +1,4 @@
-"""Writes docs/generated/blend_by_normal_cores.md: how well blends of normal variables would hold the fraction.
+"""Writes docs/generated/blend_by_normal_scores.md: how well blends of normal variables would hold the fraction.
 
 Each cell's function is made a standard normal variable by its own distribution, g = Φ⁻¹(V(f)). The blend is solid where
 Σ w g ≤ √(wᵀ C w) Φ⁻¹(Σ w p), with the correlations C of the place itself: the fraction is right wherever the g are jointly
@@ -10,7 +10,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-OUT = Path(__file__).resolve().parent.parent / "docs" / "generated" / "blend_by_normal_cores.md"
+OUT = Path(__file__).resolve().parent.parent / "docs" / "generated" / "blend_by_normal_scores.md"
 TURN = 2 * np.pi
 SAMPLES = 400_000
 POINTS = 200_000
