@@ -70,6 +70,12 @@ def test_a_line_drawing_is_small_within_its_size_and_hatched_where_it_is_cut(mes
         assert crossings % 2 == 1, line
     assert len(svg) < 250_000
     assert mesh.svg((850, 600), 40, 30, section="z=4", dpi=254) == svg
+    thin = mesh.svg((850, 600), 40, 30, section="z=4", dpi=254, line_width=0.1)
+    widths = [[float(w) for w in re.findall(r'stroke-width="([\d.]+)"', text)] for text in (svg, thin)]
+    assert max(widths[0]) == pytest.approx(85 / 340, abs=1e-3) and max(widths[1]) == 0.1
+    assert np.divide(*widths) == pytest.approx(2.5, rel=0.02)
+    with pytest.raises(ValueError, match="line_width"):
+        mesh.svg(line_width=0)
 
 
 def test_what_lies_behind_is_not_drawn():

@@ -777,6 +777,12 @@ COMMANDS = {
             help="pixels, or mm as 85mm or 85x60mm (default: 1600x1200)",
         ),
         option("--dpi", type=DPI, metavar="N", help="pixels an inch in print (default, of a size in mm: 300)"),
+        option(
+            "--line-width",
+            type=LENGTH,
+            metavar="W",
+            help="of an SVG: width of contours, in mm or pixels as --size (default: 1/340 of its width)",
+        ),
         option("--background", choices=BACKGROUNDS, help="what is behind the part in a PNG (default: shaded)"),
         option("--azimuth", type=ANGLE, metavar="DEG", help="camera about +z (default: 30)"),
         option("--elevation", type=ELEVATION, metavar="DEG", help="camera above xy (default: 25)"),

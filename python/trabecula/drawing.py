@@ -44,7 +44,7 @@ def render(args) -> None:
     if line_art:
         # Not a whole number of pixels an inch, so that the width is the one asked for.
         exact = 25.4 * pixels[0] / args.size[0] if args.size[2] == "mm" else dpi
-        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, **shown)
+        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, line_width=args.line_width, **shown)
     else:
         shown |= {"background": args.background or "shaded", "dpi": dpi}
         if args.turn is None:
@@ -80,6 +80,8 @@ def resolution(args) -> tuple[tuple[int, int], float | None]:
 def drawn_in_lines(args) -> bool:
     """Whether a line drawing is asked for; refused with what it cannot show."""
     if kind_of(args.output) != "svg":
+        if args.line_width is not None:
+            raise WrongUsage("--line-width is for an .svg; a .png has no lines of its own")
         return False
     for name in ("turn", "background"):
         if getattr(args, name) is not None:

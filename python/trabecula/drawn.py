@@ -152,17 +152,20 @@ class Drawn(Picture):
         width: float | None = None,
         inside: At | None = None,
         up: Sequence[float] = (0, 0, 1),
+        line_width: float | None = None,
     ) -> str:
         """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
         where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
         without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
         in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
-        scale_bar are a path each, by these names. With ``color``, ``shares`` or ``lines``, as for ``png``, a picture of as many
+        scale_bar are a path each, by these names. Contours are ``line_width`` wide (mm with ``dpi``, pixels else; 1/340 of the
+        width of the drawing unless given), other lines thinner in proportion. With ``color``, ``shares`` or ``lines``, as for ``png``, a picture of as many
         pixels lies behind the lines, and a legend in lines and words below. ValueError for what cannot be drawn.
         """
         seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
-        made, fits_foot = self._core.svg(seen, cut, *_paper(seen[:2], dpi), solid and solid._core, *colours)
+        stroke = None if line_width is None else positive("line_width", line_width)
+        made, fits_foot = self._core.svg(seen, cut, (*_paper(seen[:2], dpi), stroke), solid and solid._core, *colours)
         if not fits_foot:
             _warn_small(seen, "legend, scale bar or axes")
         return made
@@ -174,15 +177,18 @@ class Drawn(Picture):
         azimuth: float = 30,
         elevation: float = 25,
         background: str = "shaded",
+        line_width: float | None = None,
         **look: Unpack[Look],
     ) -> None:
         """Writes a picture to a .png file, see ``png``, whose keywords ``look`` are; or a line drawing to an .svg file, see
-        ``svg``, without a background.
+        ``svg``, without a background, its lines ``line_width`` wide.
 
         Raises ValueError for another suffix, and for what cannot be drawn.
         """
         if extension(path, ("png", "svg")) == "svg":
-            made = self.svg(size, azimuth, elevation, **look).encode()
+            made = self.svg(size, azimuth, elevation, line_width=line_width, **look).encode()
+        elif line_width is not None:
+            raise ValueError("line_width is for an .svg; a .png has no lines of its own")
         else:
             made = self.png(size, azimuth, elevation, background=background, **look)
         write_bytes(path, made)

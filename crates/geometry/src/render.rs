@@ -27,7 +27,7 @@ mod visible_parts;
 
 use camera::Camera;
 pub use camera::{Projection, View};
-pub use line_drawing::{line_drawing, line_drawing_fits};
+pub use line_drawing::{Page, line_drawing, line_drawing_fits};
 pub use lines::Lines;
 use lines::Tubes;
 pub use marks::Marks;

@@ -7,8 +7,8 @@ use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{
-    Amount, Background, Colours, Lines, Look, Marks, PlaneGrid, Projection, Section, SectionColours, Shares, Tint,
-    View, line_drawing, line_drawing_fits, png, render,
+    Amount, Background, Colours, Lines, Look, Marks, Page, PlaneGrid, Projection, Section, SectionColours, Shares,
+    Tint, View, line_drawing, line_drawing_fits, png, render,
 };
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
@@ -429,16 +429,16 @@ impl Mesh {
         Ok((PyBytes::new(py, &bytes), look.fits(&view)))
     }
 
-    /// A line drawing as the text of an SVG file, `size` large in `unit`, of the aspect of the view; colours and lines as for `png`.
-    #[pyo3(signature = (seen, cut, size, unit, solid=None, tint=None, shares=None, lines=None, inside=None))]
+    /// A line drawing as the text of an SVG file, on a page (size, unit, width of lines) of the aspect of the view; colours and lines as for
+    /// `png`.
+    #[pyo3(signature = (seen, cut, page, solid=None, tint=None, shares=None, lines=None, inside=None))]
     #[allow(clippy::too_many_arguments)] // The keyword arguments of Python.
     fn svg(
         &self,
         py: Python<'_>,
         seen: Seen,
         cut: Cut,
-        size: [f64; 2],
-        unit: &str,
+        page: ([f64; 2], String, Option<f64>),
         solid: Option<Py<Solid>>,
         tint: Option<Scale>,
         shares: Option<NamedShares>,
@@ -448,7 +448,7 @@ impl Mesh {
         let (view, mut look) = (view(seen), look(cut, tint, shares, lines, inside));
         let text = run(py, None, None, |_| {
             look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
-            line_drawing(&self.surface, &view, &look, size, unit)
+            line_drawing(&self.surface, &view, &look, &Page { size: page.0, unit: &page.1, line_width: page.2 })
         })?;
         Ok((text, line_drawing_fits(&look, &view)))
     }

@@ -24,11 +24,23 @@ const CRUMB: f64 = 0.012;
 /// Pixels of a picture behind lines.
 const LARGEST_BEHIND: f64 = 2.5e7;
 
+/// The page of a line drawing.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// Width and height in the unit.
+    pub size: [f64; 2],
+    /// `mm` or `px`.
+    pub unit: &'a str,
+    /// Width of contours in the unit, to which all other lines are in proportion; 1/340 of the page's width if not given.
+    pub line_width: Option<f64>,
+}
+
 /// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
 /// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Colours and lines of a look are
-/// seen in a picture behind that, as large as the view says in pixels, with their legend; the background is not drawn. `size` is width and
-/// height in `unit` (`mm` or `px`), of the same aspect as that of the view. Empty for views that are no picture (see `render`).
-pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, size: [f64; 2], unit: &str) -> String {
+/// seen in a picture behind that, as large as the view says in pixels, with their legend; the background is not drawn. Empty for views that
+/// are no picture (see `render`), of which the page has the aspect.
+pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, page: &Page) -> String {
+    let size = page.size;
     let [w, h] = view.size.map(|n| n as f64);
     let bounds = surface.mesh.bounds();
     if !(w > 0.0 && h > 0.0 && view.azimuth.is_finite() && view.elevation.is_finite()) {
@@ -69,7 +81,7 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, size: [f64;
     let hatched = hatched.iter().map(|line| line.map(|p| p.map(|c| c * part)).to_vec()).collect();
     let behind =
         if coloured { behind(surface, view, look, foot as f64 / samples[1] as f64, size) } else { String::new() };
-    text(&drawn, &hatched, &behind, &svg_legend::text(&legend, &paper, part, per_mm), size, unit)
+    text(&drawn, &hatched, &behind, &svg_legend::text(&legend, &paper, part, per_mm), page)
 }
 
 /// The paper that lines are judged on, as fine as that takes.
@@ -124,18 +136,13 @@ fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<Point>> {
 }
 
 /// The file.
-fn text(
-    groups: &[Vec<Vec<Point>>; 3],
-    hatched: &Vec<Vec<Point>>,
-    behind: &str,
-    foot: &str,
-    [w, h]: [f64; 2],
-    unit: &str,
-) -> String {
+fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, behind: &str, foot: &str, page: &Page) -> String {
     let [contours, edges, section] = groups;
-    let [strong, thin, fine] = STROKES.map(|share| share * w);
+    let Page { size: [w, h], unit, line_width } = *page;
+    let widest = line_width.unwrap_or(STROKES[0] * w);
+    let [strong, thin, fine] = STROKES.map(|share| share / STROKES[0] * widest);
     // A hundredth of a stroke.
-    let digits = (4.0 - w.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let digits = (1.5 - widest.log10()).ceil().clamp(0.0, 9.0) as usize;
     let link = if behind.is_empty() { "" } else { " xmlns:xlink=\"http://www.w3.org/1999/xlink\"" };
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\"{link} width=\"{w}{unit}\" height=\"{h}{unit}\" viewBox=\"0 0 {w} {h}\">\n\
@@ -180,6 +187,10 @@ mod tests {
 
     const VIEW: View = View { size: [400, 300], azimuth: 35.0, elevation: 25.0, projection: Projection::Perspective };
 
+    fn page(size: [f64; 2], unit: &str) -> Page<'_> {
+        Page { size, unit, line_width: None }
+    }
+
     /// The points of a path by its name.
     fn lines(svg: &str, name: &str) -> Vec<Vec<Point>> {
         let Some(at) = svg.find(&format!("id=\"{name}\"")) else {
@@ -206,7 +217,7 @@ mod tests {
     fn a_cube_is_nine_edges() {
         let mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
-        let svg = line_drawing(&surface, &VIEW, &Look::default(), [85.0, 63.75], "mm");
+        let svg = line_drawing(&surface, &VIEW, &Look::default(), &page([85.0, 63.75], "mm"));
         assert!(svg.contains("width=\"85mm\" height=\"63.75mm\" viewBox=\"0 0 85 63.75\""));
         let found = lines(&svg, "edges");
         let bounds = surface.mesh.bounds();
@@ -232,7 +243,7 @@ mod tests {
     #[test]
     fn a_ball_is_one_circle() {
         let surface = sphere(40);
-        let svg = line_drawing(&surface, &VIEW, &Look::default(), [400.0, 300.0], "px");
+        let svg = line_drawing(&surface, &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
         let found = lines(&svg, "contours");
         assert_eq!(found.len(), 1, "{svg:.300}");
         let span = |k: usize| found[0].iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p[k]), h.max(p[k])));
@@ -270,7 +281,7 @@ mod tests {
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
         let view = View { azimuth: -90.0, elevation: 20.0, ..VIEW };
         let along = |normals: Option<Vec<[f32; 3]>>, name: &str| {
-            let svg = line_drawing(&surface, &view, &Look { normals, ..Look::default() }, [400.0, 300.0], "px");
+            let svg = line_drawing(&surface, &view, &Look { normals, ..Look::default() }, &page([400.0, 300.0], "px"));
             let long = |line: &Vec<Point>| (line[0][0] - line[line.len() - 1][0]).abs() > 200.0;
             lines(&svg, name).iter().filter(|line| long(line)).count()
         };
@@ -286,7 +297,7 @@ mod tests {
         let eye = View { azimuth: 0.0, elevation: 0.0, ..VIEW };
         let section = Some(Section { normal: [1.0, 0.0, 0.0], offset: 0.5 });
         let look = Look { section, ..Look::default() };
-        let svg = line_drawing(&surface, &eye, &look, [400.0, 300.0], "px");
+        let svg = line_drawing(&surface, &eye, &look, &page([400.0, 300.0], "px"));
         let outline = lines(&svg, "section");
         assert_eq!(outline.len(), 1);
         let corners = &outline[0];
@@ -295,7 +306,7 @@ mod tests {
         let total: f64 = hatch.iter().map(|line| super::super::visible_parts::length(line)).sum();
         assert!((total * 400.0 * HATCH / area - 1.0).abs() < 0.02, "{total} {area}");
         // From behind, the section is not seen.
-        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, &look, [400.0, 300.0], "px");
+        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, &look, &page([400.0, 300.0], "px"));
         assert!(lines(&behind, "hatching").is_empty());
         assert_eq!(lines(&behind, "contours").len() + lines(&behind, "section").len(), 1);
     }
@@ -307,7 +318,7 @@ mod tests {
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
         let view = View { azimuth: -90.0, elevation: 0.0, projection: Projection::Orthographic, size: [800, 600] };
         let look = Look { marks: Marks { scale_bar: true, axes: true }, ..Look::default() };
-        let svg = line_drawing(&surface, &view, &look, [80.0, 60.0], "mm");
+        let svg = line_drawing(&surface, &view, &look, &page([80.0, 60.0], "mm"));
         let span_in = |svg: &str, name: &str, k: usize| {
             let all = lines(svg, name).concat();
             all.iter().fold(0.0f64, |m, p| m.max(p[k])) - all.iter().fold(f64::INFINITY, |m, p| m.min(p[k]))
@@ -321,7 +332,7 @@ mod tests {
         let said: f64 = svg[svg[..at].rfind('>').expect("start") + 1..at].parse().expect("a number");
         assert!((span("scale_bar", 0) - said * scale).abs() < 2.0 * step, "{said}");
         assert_eq!(svg.matches("class=\"axis\"").count(), 3);
-        let plain = line_drawing(&surface, &view, &Look::default(), [80.0, 60.0], "mm");
+        let plain = line_drawing(&surface, &view, &Look::default(), &page([80.0, 60.0], "mm"));
         assert!(!plain.contains("<text") && !plain.contains("scale_bar"));
         // With no marks below, it fills the width but for the margins.
         assert!((span_in(&plain, "edges", 0) - 0.92 * 80.0).abs() < 2.0 * step);
@@ -331,11 +342,14 @@ mod tests {
     #[test]
     fn the_same_for_any_number_of_threads_and_nothing_of_nothing() {
         let surface = contour(16, |p| (0..3).map(|k| (2.0 * core::f64::consts::TAU * p[k]).cos()).sum::<f64>());
-        let drawn = || line_drawing(&surface, &VIEW, &Look::default(), [400.0, 300.0], "px");
+        let drawn = || line_drawing(&surface, &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool").install(drawn);
         assert_eq!(one, drawn());
-        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, &Look::default(), [400.0, 300.0], "px");
+        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
         assert!(!nothing.contains("<path"));
-        assert!(line_drawing(&surface, &View { size: [0, 3], ..VIEW }, &Look::default(), [1.0, 1.0], "px").is_empty());
+        assert!(
+            line_drawing(&surface, &View { size: [0, 3], ..VIEW }, &Look::default(), &page([1.0, 1.0], "px"))
+                .is_empty()
+        );
     }
 }

@@ -159,7 +159,7 @@ fn sampled(region: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, De
     }
     points.extend(sample::nodes(region));
     let largest = size.into_iter().fold(0.0, f64::max);
-    if !(0.1..=2000.0).contains(&largest) && !warnings.iter().any(|w| w.message.contains("unit")) {
+    if !(0.1..=2000.0).contains(&largest) {
         let message = format!("the region is {} mm across; is its unit right?", number(largest));
         warnings.push(Warning { path: "region".into(), message });
     }
