@@ -313,7 +313,7 @@ def _cell(key: str, value: Any, absent: str) -> str:
 
 
 #: Voids that are listed one by one.
-LISTED = 20
+LISTED = 5
 
 
 def voids(found: list) -> str:
