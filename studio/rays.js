@@ -68,6 +68,8 @@ float fraction() {
   int i = min(int(t), 31);
   return mix(fractions[i], fractions[i + 1], t - float(i));
 }
+// What colours say of a point where the core was asked last.
+float amountAt(vec3 p) { return colours == 4 ? max(-distanceTo(p), 0.0) : fraction(); }
 // Along a ray, between two distances of which one is in the region: where it begins or ends, on the inside.
 float boundary(vec3 d, float inner, float outer) {
   for (int k = 0; k < 8; k++) {
@@ -88,14 +90,14 @@ float lattice(vec3 d, float lo, float hi) {
 vec4 met(vec3 p, bool cut) {
   vec3 n = cut ? regionNormal(p) : normalAt(p);
   core(p);
-  return lit(n, cut ? 1.0 : 0.0, fraction());
+  return lit(n, cut ? 1.0 : 0.0, amountAt(p));
 }
 void main() {
   if (onPlane ? distanceTo(place) > 0.0 : dot(plane.xyz, place) > plane.w) discard;
   colour = vec4(0);
   if (depthOnly) return;
   float f = field(place);
-  if (f < 0.0) { colour = onPlane ? hatched() : lit(normalize(facing), 1.0, fraction()); return; }
+  if (f < 0.0) { colour = onPlane ? hatched() : lit(normalize(facing), 1.0, amountAt(place)); return; }
   // Towards the eye is the third row of the camera.
   vec3 d = -vec3(turn[0].z, turn[1].z, turn[2].z);
   vec3 ends = (mix(low, high, greaterThan(d, vec3(0))) - place) / mix(d, vec3(1e-9), lessThan(abs(d), vec3(1e-9)));
@@ -145,7 +147,7 @@ function marcher(gl) {
   const uniform = (name) => gl.getUniformLocation(shader, name);
   const textures = {}, surface = gl.createVertexArray(), quad = gl.createVertexArray();
   const buffers = ["position", "normal", "index", "quad"].reduce((of, name) => ({ ...of, [name]: gl.createBuffer() }), {});
-  let of = {}, count = 0;
+  let of = {}, count = 0, deepest = 0;
   const attribute = (name, width, type) => {
     const at = gl.getAttribLocation(shader, name);
     if (at < 0) return;
@@ -187,7 +189,9 @@ function marcher(gl) {
     texture("voxels", 1, [4 * nx, ny, nz], voxels, [gl.RGBA32F, gl.RGBA], gl.NEAREST, gl.CLAMP_TO_EDGE);
     if (head.region) {
       const shape = head.region.shape;
-      texture("region", 2, shape, next(Float32Array, volume(shape)), [gl.R16F, gl.RED], gl.LINEAR, gl.CLAMP_TO_EDGE);
+      const distances = next(Float32Array, volume(shape));
+      texture("region", 2, shape, distances, [gl.R16F, gl.RED], gl.LINEAR, gl.CLAMP_TO_EDGE);
+      deepest = -distances.reduce((least, d) => Math.min(least, d), 0);
       for (const [name, type, n] of [["position", Float32Array, 3 * head.vertices], ["normal", Int16Array, 4 * head.vertices]]) {
         gl.bindBuffer(gl.ARRAY_BUFFER, buffers[name]);
         gl.bufferData(gl.ARRAY_BUFFER, next(type, n), gl.STATIC_DRAW);
@@ -336,5 +340,5 @@ function marcher(gl) {
   }
   painter.share = wanted > 28 ? 0.2 : 1;
   painter.stop = painter.finish = () => {};
-  return { take, painter };
+  return { take, painter, deepest: () => deepest };
 }

@@ -154,11 +154,11 @@ async function marched(data) {
   if (head.error || head.none) return false;
   rays.take(head, body);
   Object.assign(state, { cell, region, shown: null });
-  const [min, max] = head.bounds, span = head.fractions && [0, 32].map((i) => head.fractions.values[i]).sort((a, b) => a - b);
-  if (screen_.seen().color === "values" || !span) screen_.look({ color: screen_.seen().color === "overhang" ? "overhang" : "faces" });
-  [thickOption.disabled, fractionOption.disabled] = [true, !span];
-  if (span) legend(span, "");
-  screen_.paint({ min, max, span }, rays.painter);
+  const [min, max] = head.bounds, fraction = head.fractions && [0, 32].map((i) => head.fractions.values[i]).sort((a, b) => a - b);
+  state.spans = { fraction, depth: [0, rays.deepest()] };
+  colourable({ fraction: !!fraction, depth: true });
+  scaled();
+  screen_.paint({ min, max, span: null, spans: state.spans }, rays.painter);
   drawn(`picture by rays, ${Math.round(ms + rays.painter.ms)} ms`);
   return true;
 }
@@ -183,12 +183,25 @@ function draw({ vertices, triangles }, body, [min, max], thick = false) {
   if (!screen_ || !body.byteLength) return;
   const position = new Float32Array(body, 0, 3 * vertices), normal = new Int16Array(body, 12 * vertices, 4 * vertices);
   state.shown = [{ min, max, span: null }, { position, normal, index: new Uint32Array(body, 20 * vertices, 3 * triangles) }];
-  if (screen_.seen().color !== "overhang") screen_.look({ color: "faces" });
-  [thickOption.disabled, fractionOption.disabled] = [!thick, true];
+  state.spans = {};
+  colourable({ values: thick });
+  if (screen_.seen().color === "values") screen_.look({ color: "faces" });
   screen_.show(...state.shown);
 }
 
-const [thickOption, fractionOption] = [2, 3].map((n) => document.querySelector(`figure.viewer [name=colours] [value='${n}']`));
+// The colours that what is shown can have; one that it cannot have is left.
+function colourable(has) {
+  ["values", "fraction", "depth"].forEach((name, i) => {
+    document.querySelector(`figure.viewer [name=colours] [value='${i + 2}']`).disabled = !has[name];
+    if (screen_.seen().color === name && !has[name]) screen_.look({ color: "faces" });
+  });
+}
+
+// The legend of the colours that are chosen of a picture by rays.
+function scaled() {
+  const color = screen_.seen().color, span = state.spans?.[color];
+  if (span) legend(span, color === "depth" ? " mm" : "");
+}
 
 function legend([low, high], unit) {
   document.querySelector("[data-part=legend]").replaceChildren(low.toPrecision(3), document.createElement("i"), `${high.toPrecision(3)}${unit}`);
@@ -437,7 +450,7 @@ async function begin() {
   text.addEventListener("input", () => { lines(); changed(); });
   text.addEventListener("scroll", lines);
   $("mesh").addEventListener("click", () => mesh().catch(broken));
-  document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); });
+  document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); else scaled(); });
   // Without a graphics card meshes are drawn faster. The card makes its program while the core is unpacked.
   $("by").value = screen_ && !drawnBySoftware() ? "rays" : "mesh";
   byRays();

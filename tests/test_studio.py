@@ -395,6 +395,19 @@ def test_a_graded_lattice_is_coloured_by_its_fraction(browser, tmp_path):
         assert page.input_value("[name=colours]") == "0" and page.is_disabled("[name=colours] [value='3']")
 
 
+def test_a_part_is_coloured_by_its_depth(browser):
+    with served() as url, opened(browser, url) as page:
+        by_rays(page)
+        write(page, BOX)
+        half = 0.5 * min(ask(page, do_="rays", cell=True, region=True)["bounds"][1])
+        picture = page.locator("canvas").screenshot()
+        page.select_option("[name=colours]", "4")
+        low, high, unit = page.inner_text("[data-part=legend]").split()
+        # The distance is sampled: the deepest sample is at most half a step off the middle.
+        assert float(low) == 0 and 0.9 * half < float(high) <= half and unit == "mm"
+        assert page.locator("canvas").screenshot() != picture
+
+
 #: What is changed, and what the text then is; "+" and "-" are lines that come and go.
 EDITS = {
     "a number with its comment": (

@@ -156,12 +156,13 @@ function drawnBySoftware() {
 }
 
 // Colours by number, as Python names them.
-const COLOURS = ["faces", "overhang", "values", "fraction"];
+const COLOURS = ["faces", "overhang", "values", "fraction", "depth"];
 
 // A viewer in a figure; null where the browser cannot draw. `show(head, of)` shows a mesh by its bounds, span of values and arrays: of each
 // corner, or of vertices with an `index`. The camera and the section stay where they are. `seen()` is what the user sees, by names and
 // units of Python's View; `look(wanted)` changes some of it; the figure has an event "look" when the user has. `paint(head, painter)`
-// leaves the drawing to a function of the camera, which draws what lies in the bounds of `head` on `gl` until its `stop()`.
+// leaves the drawing to a function of the camera, which draws what lies in the bounds of `head` on `gl` until its `stop()`; its `spans` are those
+// of colours by their names.
 function viewer(figure) {
   const canvas = figure.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: !drawnBySoftware(), alpha: true, preserveDrawingBuffer: true });
@@ -241,7 +242,7 @@ function viewer(figure) {
     }
     const camera = {
       rows, middle, plane, shift: state.shift, zoom: [side / width / reach(), side / height / reach()], depth: 1 / size,
-      colours: state.colours, steep: Math.cos((state.steep * Math.PI) / 180), span: head.span || [0, 1], axis: a,
+      colours: state.colours, steep: Math.cos((state.steep * Math.PI) / 180), span: head.spans?.[COLOURS[state.colours]] || head.span || [0, 1], axis: a,
     };
     if (painter) {
       painter(camera);
