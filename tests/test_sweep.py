@@ -185,7 +185,7 @@ def test_rows_are_what_the_commands_say_of_each_design(tmp_path: Path):
         design["lattice"]["a"]["level"]["fraction"] = columns["lattice.a.level.fraction"][i]
         solid = lt.Design(**design).build()
         measured = solid.measure(per_cell=16)
-        found = {name: columns[name][i] for name in ("fraction", "volume_mm3", "area_mm2", "pieces")}
+        found = {name: columns[name][i] for name in ("solid_fraction", "volume_mm3", "area_mm2", "pieces")}
         assert list(found.values()) == [measured.solid_fraction, measured.volume, measured.area, measured.pieces]
         assert columns["wall_mm"][i] == solid.report().lattices["a"].thickness
 
@@ -605,14 +605,14 @@ def test_a_cluster_whose_processes_are_killed_while_they_start_is_started_again(
 
 def test_the_table_is_drawn_with_its_pareto_front(tmp_path: Path):
     study = written(tmp_path, '"lattice.a.level.fraction" = [0.2, 0.3, 0.4]')
-    plot = ("--plot", "fraction", "area_mm2", "wall_mm", "--front", "min,max")
+    plot = ("--plot", "solid_fraction", "area_mm2", "wall_mm", "--front", "min,max")
     done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8, *plot)
     assert done.returncode == 0, done.stderr
     drawing = (tmp_path / "out.svg").read_text()
     assert drawing.count("<circle") == 3 and "Pareto front: fraction min, area_mm2 max" in drawing
     again = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "again.svg", *plot)
     assert again.returncode == 0 and (tmp_path / "again.svg").read_text() == drawing
-    wrong = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "no.svg", "--plot", "fraction", "colour")
+    wrong = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "no.svg", "--plot", "solid_fraction", "colour")
     assert wrong.returncode == 1 and 'there is no column "colour"; with numbers there are design, ' in wrong.stderr
 
 
@@ -664,16 +664,16 @@ def test_an_objective_is_a_plain_function():
         "lattice": {"a": lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.3))},
     }
     path = "lattice.a.level.fraction"
-    of = lt.objective(design, [path], ["fraction", "volume_mm3"], per_cell=16)
+    of = lt.objective(design, [path], ["solid_fraction", "volume_mm3"], per_cell=16)
     made = of({path: 0.25})
-    assert made["volume_mm3"] == 64 * made["fraction"] and list(made) == ["fraction", "volume_mm3"]
+    assert made["volume_mm3"] == 64 * made["solid_fraction"] and list(made) == ["solid_fraction", "volume_mm3"]
     with pytest.raises(ValueError, match=r"fraction is 1\.5"):
         of({path: 1.5})
     other = "lattice.c.level.fraction"
     with pytest.raises(ValueError, match=r"^lattice\.c\.level\.fraction: there is no lattice\.c; did you mean lattice\.a\?"):
-        lt.objective(design, [other], ["fraction"])
+        lt.objective(design, [other], ["solid_fraction"])
     with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
-        lt.objective(design, ["beams.b.radius"], ["fraction"])
+        lt.objective(design, ["beams.b.radius"], ["solid_fraction"])
     with pytest.raises(ValueError, match=r'unknown output "volume"; did you mean "volume_mm3"\?'):
         lt.objective(design, [path], ["volume"])
     with pytest.raises(ValueError, match=r'unknown property "stifness"; did you mean "stiffness"\?'):
@@ -717,8 +717,8 @@ def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: st
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["lattice.a.level.fraction > 1"]', (), "no design keeps the conditions"),
         ('"lattice.a.level.fraction" = [0.2]\nwhere = ["fraction > 1"]', (), "names fraction, which is no key"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 1000001 }', (), "made with --yes only"),
-        (TWO, ("--plot", "fraction", "area"), '--plot: there is no column "area"; did you mean "area_mm2"?'),
-        (TWO, ("--plot", "fraction", "error"), '--plot: the column "error" holds no numbers'),
+        (TWO, ("--plot", "solid_fraction", "area"), '--plot: there is no column "area"; did you mean "area_mm2"?'),
+        (TWO, ("--plot", "solid_fraction", "error"), '--plot: the column "error" holds no numbers'),
     ],
 )
 def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple, said: str):
@@ -736,7 +736,7 @@ def test_what_cannot_be_swept_is_refused(tmp_path: Path, sweep: str, more: tuple
         (("--cluster", "nonsense"), "expected local:N, slurm:N or an address such as tcp://head:8786, found nonsense"),
         (("--cluster", "local:0"), "expected local:N with N from 1 to 4096, found local:0"),
         (("--front", "min,max"), "--front is of --plot"),
-        (("--plot", "fraction"), "--plot takes two columns, or three"),
+        (("--plot", "solid_fraction"), "--plot takes two columns, or three"),
     ],
 )
 def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture, more: tuple, said: str):

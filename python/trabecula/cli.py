@@ -526,7 +526,7 @@ COMMANDS = {
         "A design that cannot be made is a row with its error.\n\n"
         "examples:\n  trabecula sweep study.toml -o study.csv --jobs 4 --per-cell 24\n"
         "  trabecula sweep study.toml -o study.parquet --meshes parts/{design}.3mf\n"
-        "  trabecula sweep study.csv --plot fraction area_mm2 wall_mm -o study.svg --front min,max",
+        "  trabecula sweep study.csv --plot solid_fraction area_mm2 wall_mm -o study.svg --front min,max",
         file(
             "study",
             (*DESIGNS, *SWEEP_WRITES),

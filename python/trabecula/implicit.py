@@ -165,9 +165,11 @@ def save_implicit(solid: Solid, path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def lattice_value(write: Expressions, solid: Solid, name: str, lattice: dict) -> str:
     """The lattice's own field: negative in it."""
+    (kind,) = lattice["map"]
+    if kind == "tets":
+        raise Unsupported(f"lattice.{name}: a lattice over tetrahedra (map.tets)")
     terms = _core.lattice_terms(solid._core, name)
     if terms.affine is None:
-        (kind,) = lattice["map"]
         raise Unsupported(f"lattice.{name}: map.{kind}, which is not affine")
     if terms.distance:
         raise Unsupported(f"lattice.{name}: a thickness, for which the field is a tabulated distance; give its iso or fraction")

@@ -13,7 +13,7 @@ from .given import shard_bytes
 from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
 from .mesh import Mesh
 from .parts import part_files, write_parts
-from .solid import Solid
+from .solid import OPEN_IN_RANGES, Solid
 from .terminal import Progress, figure, put_json, say, settle, warn, warned
 from .texts import counted, voids
 
@@ -206,8 +206,9 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     apart = apart_of(args)
     if apart is not None:
         if whole:
-            out = given_of(args) or "them: the design's ends are open"
-            raise WrongUsage(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
+            if out := given_of(args):
+                raise WrongUsage(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
+            raise Refused(OPEN_IN_RANGES)
         if kind_of(args.output) != "stl":
             raise WrongUsage(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
     streams = kind_of(args.output) == "stl" if asked else apart is not None or not closes(solid, resolution(args))

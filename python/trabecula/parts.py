@@ -27,7 +27,7 @@ def check_parts(names: Sequence[str]) -> list[str]:
     """The names of parts as a list; unknown ones, repeated ones and none at all are refused."""
     found = [names] if isinstance(names, str) else list(names)
     if not found or len(set(found)) < len(found) or any(name not in PARTS for name in found):
-        raise ValueError(f"parts are {found}; name one or more of {', '.join(PARTS)}, each once")
+        raise ValueError(f"parts are {', '.join(map(repr, found))}; name one or more of {', '.join(PARTS)}, each once")
     return found
 
 

@@ -40,7 +40,7 @@ UNITS = {"wall_mm": "mm", "pore_mm": "mm", "volume_mm3": "mm³", "area_mm2": "mm
     "hydraulic_diameter_mm": "mm",
 }
 #: Columns of each lattice, and those that are measured.
-ASKED, MEASURED = ("fraction_asked", "wall_mm", "pore_mm"), ("fraction", "volume_mm3", "area_mm2", "pieces")
+ASKED, MEASURED = ("fraction_asked", "wall_mm", "pore_mm"), ("solid_fraction", "volume_mm3", "area_mm2", "pieces")
 #: Columns that come last, in this order.
 LAST = ("warnings", "error", "seconds", "sha256", "version")
 #: What a design or a property of it may end in: its row has the message.

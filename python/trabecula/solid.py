@@ -53,7 +53,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Solid"]
 
-#: Why beams alone are not made in ranges.
+#: Why a surface with open ends, and why beams alone are not made in ranges.
+OPEN_IN_RANGES = (
+    "the design's ends are open (surface = \"open\" of map.tets), and a surface is made in ranges of tiles with its caps; "
+    "leave resume, cluster and shards out"
+)
 OF_BEAMS = (
     "beams alone are meshed by their own patches, not on a grid whose tiles can be made apart; leave resume and cluster out, "
     "or give an edge"
@@ -220,7 +224,7 @@ class Solid(Seen, Simulated, Resolution):
     def open_ends(self) -> bool:
         """Whether files of its mesh have no caps on the region's boundary (``surface = "open"`` of a map over tetrahedra).
 
-        ``mesh`` has them all the same, and ``Mesh.uncapped`` takes them off."""
+        ``save`` and the command leave them out; ``mesh`` has them all the same, and ``Mesh.uncapped`` takes them off."""
         return self._core.open_ends
 
     @property
@@ -439,7 +443,8 @@ class Solid(Seen, Simulated, Resolution):
     ) -> SurfaceReport:
         """Streams the surface to a mesh file (.stl, .3mf, .ply or .obj) without holding it in memory, and gives its figures.
 
-        The bytes are those of ``mesh(…).write(path)``. ``islands`` and ``chord`` are as for ``mesh``; with ``chord`` the mesh
+        The bytes are those of ``mesh(…).write(path)``; of ``mesh(…).uncapped().write(path)`` where the design has ``open_ends``,
+        with the figures of the closed surface. ``islands`` and ``chord`` are as for ``mesh``; with ``chord`` the mesh
         is held in memory unless the file is an STL.
 
         An .stl is written at once; for the others vertices and triangles go to temporary files beside it, which are gone at
@@ -486,7 +491,8 @@ class Solid(Seen, Simulated, Resolution):
         within = None if tolerance is None else positive("tolerance", tolerance)
         with whole_file(path) as temporary:
             made = self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
-            if made.angle is not None and made.solids > 1:  # of lattices; beams that stand apart are meant
+            meant = sum(of.pieces or 1 for of in self.report().beams.values())  # of beams, those that do not touch by design
+            if made.solids > max(meant, 1):
                 warnings.warn(
                     f"the file has {made.solids} solids that do not touch: a STEP file keeps all components, of which meshes "
                     "drop the small ones",
@@ -544,6 +550,12 @@ class Solid(Seen, Simulated, Resolution):
         check_place(path)
         if apart is not None:
             return self._save_in_ranges(path, edge, per_cell, threads, progress, islands, chord, accept, apart)
+        if self.open_ends:
+            made = self.mesh(edge, per_cell, threads, progress, islands, chord=chord)
+            summary = made.summary()
+            accept(summary)
+            made.uncapped().write(path)
+            return summary
         chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None and kind != "stl":
             made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
@@ -591,6 +603,8 @@ class Solid(Seen, Simulated, Resolution):
         name = os.fsdecode(path)
         if extension(path, MESH_WRITES) != "stl" or special(name):
             raise ValueError(f"{name}: a surface is made in ranges as .stl only, to a file; leave resume and cluster out")
+        if self.open_ends:
+            raise ValueError(OPEN_IN_RANGES)
         if self._chord_of(chord, edge, per_cell, islands) is not None:
             raise ValueError(OF_BEAMS)
         name = _shards_in(name) if apart.get("shards") else name

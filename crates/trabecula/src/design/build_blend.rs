@@ -149,8 +149,9 @@ pub(super) fn blend(
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
     unused(&blend, &names, members, environment, warnings);
     cancelling(&blend, &names, &equal, environment, warnings);
-    // But for rounding: exactly two cells are wide enough.
-    if let Some(Transition { width, between: [a, b], cell }) = narrow.filter(|t| t.cells() < 2.0 * (1.0 - 1e-9)) {
+    // The width is that at samples: exactly two cells are wide enough.
+    if let Some(Transition { width, between: [a, b], cell }) = narrow.filter(|t| t.cells() < 2.0 * (1.0 - WIDTH_ERROR))
+    {
         let lost = if by == By::Fraction { ", and the fraction is not held" } else { "" };
         let message = format!(
             "the transition between \"{}\" and \"{}\" is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet \
@@ -166,6 +167,9 @@ pub(super) fn blend(
     let width = narrow.map(|t| t.width);
     Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
+
+/// Relative error of the width of a transition, from differences at samples.
+const WIDTH_ERROR: f64 = 1e-3;
 
 /// How far a weight may leave 0 to 1 unwarned: functions through control points overshoot between them.
 const BEYOND: f64 = 0.1;

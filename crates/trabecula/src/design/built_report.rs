@@ -19,7 +19,7 @@ use geometry::math::Mat3;
 
 /// How many times as many points a zone's fraction is sampled at as others.
 const ZONES: usize = 10;
-/// Fractions that differ by less are one.
+/// Fractions that differ by less are one; all else by this share.
 const SAME: f64 = 1e-6;
 
 /// The least and the greatest of a number over a region.
@@ -67,7 +67,11 @@ impl Varied {
     }
 
     fn varying(self) -> Varying {
-        if self.min == self.max { Varying::Number(self.min) } else { Varying::Range([self.min, self.max]) }
+        if self.max - self.min <= SAME * self.max.abs() {
+            Varying::Number(self.min)
+        } else {
+            Varying::Range([self.min, self.max])
+        }
     }
 }
 
@@ -178,7 +182,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         truncation: lattice.cell.truncation(),
         distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
         singular: lattice.map.solved().map(singular),
-        periods: lattice.map.solved().map(|map| periods(map.periods())).filter(|p| !p.is_empty()),
+        periods: lattice.map.solved().map(|map| periods(map.periods())),
         fit: None,
         tets: None,
     }

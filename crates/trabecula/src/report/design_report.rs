@@ -70,7 +70,7 @@ pub struct LatticeReport {
     /// longest first. None without a solved map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub singular: Option<Vec<SingularLineReport>>,
-    /// Cells round the holes of the region; None where the phases of a solved map have one value.
+    /// Cells round the holes of the region, empty where the phases of a solved map have one value. None without a solved map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub periods: Option<Vec<PeriodReport>>,
     /// How the tetrahedra of a lattice fit the region.
