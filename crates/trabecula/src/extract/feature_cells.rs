@@ -41,6 +41,8 @@ pub(super) struct FeatureMesh {
     pub keys: Vec<VertexId>,
     /// Triangles, and what lies on their sides.
     pub triangles: Vec<([u32; 3], Sides)>,
+    /// The middle of a cell of the tile that self-intersects in single precision whatever is tried.
+    pub muddled: Option<Vec3>,
 }
 
 impl FeatureMesh {
@@ -48,6 +50,7 @@ impl FeatureMesh {
         self.names.clear();
         self.keys.clear();
         self.triangles.clear();
+        self.muddled = None;
     }
 }
 
@@ -62,12 +65,15 @@ pub(super) struct FeatureCells<'a> {
     pub positions: &'a mut Vec<Vec3>,
     pub extra: &'a mut FeatureMesh,
     pub edges: &'a EdgeStore,
-    /// Nodes at which the surfaces are perturbed.
-    pub perturbed_nodes: FxHashSet<usize>,
+    /// Nodes at which the surfaces are perturbed, and in which attempt.
+    pub perturbed_nodes: FxHashMap<usize, usize>,
     pub divided_faces: DividedFaces,
     /// Buffers for the simplex that is being cut.
     pub fragments: Cell<Fragments>,
 }
+
+/// Most attempts to perturb the surfaces at a node.
+const ATTEMPTS: usize = 8;
 
 /// The six paths from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron on each is
 /// right-handed.
@@ -302,7 +308,7 @@ impl FeatureCells<'_> {
     ///
     /// In exact arithmetic the fragments meet only where they should. Planes may, however, pass so near to each other's common
     /// points that single precision mixes them up. Where that happens in a cell, the surfaces are perturbed at its nodes by far
-    /// less than a grid step, and the cells there are cut again.
+    /// less than a grid step, and the cells there are cut again; more than once at nodes that no adjacent tile has.
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
         let fitted = |c: &[usize; 3]| self.edges.claims.is_fitted(self.nodes, *c);
         let cells = self.signs.feature_cells().filter(|c| !fitted(c));
@@ -326,24 +332,41 @@ impl FeatureCells<'_> {
         if perturbed_nodes.is_empty() {
             return;
         }
-        self.perturbed_nodes = perturbed_nodes;
+        self.perturbed_nodes = perturbed_nodes.into_iter().map(|n| (n, 0)).collect();
         let plain = self.positions.len() - self.extra.keys.len();
         let positions = self.positions.split_off(plain);
         let before = std::mem::take(&mut *self.extra);
-        let mut first = 0;
-        for (c, end) in cells.iter().zip(ends).filter(|(c, _)| mine(c)) {
-            if self.corners_of(*c).iter().any(|n| self.perturbed_nodes.contains(n)) {
-                self.cell(*c);
-            } else {
-                for (t, sides) in &before.triangles[first..end] {
-                    let again = t.map(|v| match (v as usize).checked_sub(plain) {
-                        Some(v) => self.vertex_at(before.keys[v], positions[v]),
-                        None => v,
-                    });
-                    self.extra.triangles.push((again, *sides));
+        let inside = |at: [usize; 3]| (0..3).all(|a| own[a].start < at[a] && at[a] < own[a].end);
+        for attempt in 1..=ATTEMPTS {
+            let mut muddled = Vec::new();
+            let mut first = 0;
+            for (c, end) in cells.iter().zip(&ends).filter(|(c, _)| mine(c)) {
+                if self.corners_of(*c).iter().any(|n| self.perturbed_nodes.contains_key(n)) {
+                    let from = self.extra.triangles.len();
+                    self.cell(*c);
+                    if self.self_intersects_rounded(from) {
+                        muddled.push(*c);
+                    }
+                } else {
+                    for (t, sides) in &before.triangles[first..*end] {
+                        let again = t.map(|v| match (v as usize).checked_sub(plain) {
+                            Some(v) => self.vertex_at(before.keys[v], positions[v]),
+                            None => v,
+                        });
+                        self.extra.triangles.push((again, *sides));
+                    }
                 }
+                first = *end;
             }
-            first = end;
+            let movable = muddled.iter().flat_map(|c| self.corners_of(*c)).filter(|n| inside(self.nodes.at(*n)));
+            let movable: Vec<usize> = movable.collect();
+            if attempt == ATTEMPTS || movable.is_empty() {
+                self.extra.muddled = muddled.first().map(|c| self.center_of(*c));
+                return;
+            }
+            self.perturbed_nodes.extend(movable.into_iter().map(|n| (n, attempt)));
+            self.positions.truncate(plain);
+            self.extra.clear();
         }
     }
 

@@ -8,7 +8,7 @@ use crate::field::Block;
 use crate::implicit::Surface;
 use crate::solid::{Solid, Spaces};
 use geometry::fault::{Fault, number};
-use geometry::math::Aabb;
+use geometry::math::{Aabb, Vec3};
 
 use super::feature_edges;
 
@@ -114,6 +114,21 @@ impl Grid {
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
         grid.fitted = creased.next().filter(|_| fits);
         grid.few_enough().map(|()| grid)
+    }
+
+    /// What is said of a surface that crosses itself at a position when it is rounded to single precision.
+    pub(super) fn muddled(&self, at: Vec3) -> Fault {
+        let finest = at.iter().fold(0.0f64, |m, x| m.max(x.abs())) * f64::from(f32::EPSILON);
+        Fault::new(
+            "edge",
+            format!(
+                "near ({}) mm a surface made in steps of {} mm crosses itself in the files' single precision, {} mm there; move the \
+                 part nearer to the origin, or use another edge",
+                at.map(number).join(", "),
+                number(self.step),
+                format_args!("{finest:.1e}"),
+            ),
+        )
     }
 
     /// Refuses a solid with more surfaces in some tile than a word has bits.

@@ -27,10 +27,11 @@ use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 
-use rustc_hash::FxHashSet;
+use rustc_hash::FxHashMap;
 
 use crate::field::Block;
 use crate::implicit::{Pair, Surface};
+use geometry::fault::Fault;
 use geometry::math::Vec3;
 
 use super::feature_cells::{FeatureCells, FeatureMesh};
@@ -248,10 +249,15 @@ pub(super) struct View<'a> {
 }
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
-pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) -> Option<View<'a>> {
+///
+/// # Errors
+/// A surface that crosses itself when it is rounded to single precision, far from the origin.
+pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) -> Result<Option<View<'a>>, Fault> {
     let block = grid.block(tile);
     let range = grid.nodes(tile);
-    let local = grid.local(&range, &block.bounds())?;
+    let Some(local) = grid.local(&range, &block.bounds()) else {
+        return Ok(None);
+    };
     let nodes = Nodes::new(&block);
     let from = range.map(|r| r.start);
     let own = grid.own(tile);
@@ -260,7 +266,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     let hole = grid.faces.and_then(|faces| hole(s, &local, &nodes, faces));
     let crossed = s.signs.sort(&local);
     if !crossed && local.grid_planes.is_empty() {
-        return None;
+        return Ok(None);
     }
     claim_cells(s, grid, &local, &nodes);
     list_vertices(s, &nodes);
@@ -294,8 +300,11 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes, &own);
     finish(s, grid, &local, &nodes, &own);
+    if let Some(at) = s.extra.muddled {
+        return Err(grid.muddled(at));
+    }
     let own_triangles = s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
-    (own_triangles || hole.is_some()).then_some(View { s, nodes, grid, local, from, own, hole })
+    Ok((own_triangles || hole.is_some()).then_some(View { s, nodes, grid, local, from, own, hole }))
 }
 
 /// Fills the samples and signs of the live surfaces. Those of the lattice are expensive, so they are evaluated only where the
@@ -405,7 +414,7 @@ fn features<'a>(
         positions: &mut s.positions,
         extra: &mut s.extra,
         edges: &s.edges,
-        perturbed_nodes: FxHashSet::default(),
+        perturbed_nodes: FxHashMap::default(),
         divided_faces,
         fragments: Cell::default(),
     };

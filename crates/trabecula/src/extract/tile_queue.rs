@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use geometry::fault::Fault;
 use geometry::progress::{Progress, Stopped};
 use rayon::Scope;
 
@@ -31,7 +32,7 @@ struct Queue<T> {
     /// The next tile to consume.
     turn: usize,
     /// Tiles that wait for their turn; `None` for those without surface.
-    ready: HashMap<usize, Option<T>>,
+    ready: HashMap<usize, Result<Option<T>, Fault>>,
     /// Whether a thread is consuming tiles.
     consuming: bool,
     /// Number of threads that have ended because too many tiles wait.
@@ -102,7 +103,7 @@ where
     fn run<'s>(&'s self, scope: &Scope<'s>) {
         let mut scratch = borrow(self.spare);
         while let Some(i) = self.claim() {
-            let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(&self.map);
+            let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(|view| view.map(&self.map));
             self.queue().ready.insert(i, found);
             self.take_ready(scope);
         }
@@ -137,7 +138,8 @@ where
             };
             drop(q);
             let taken = match (found, self.take.lock()) {
-                (Some(found), Ok(mut take)) => take(found),
+                (Ok(Some(found)), Ok(mut take)) => take(found),
+                (Err(fault), _) => Err(Stopped::Refused(fault)),
                 _ => Ok(()),
             };
             let go_on = self.progress.step((turn - self.tiles.start) as u64 + 1, self.tiles.len() as u64);

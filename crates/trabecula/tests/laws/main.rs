@@ -8,6 +8,7 @@ mod cores;
 mod crease;
 mod damage;
 mod disclinations;
+mod far;
 mod fields;
 mod fixed_faces;
 mod flush;

@@ -22,8 +22,10 @@ pub(in crate::extract) struct CutVertex {
     pub surfaces: u64,
 }
 
-/// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps.
-const SHIFT: f64 = 1.0 / 512.0;
+/// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps: so many of the
+/// least distances that rounding requires (1/512 near the origin), and at most.
+const SHIFT: f64 = 8.0;
+const MOST_SHIFT: f64 = 1.0 / 8.0;
 
 impl Simplex {
     /// The corners of a tetrahedron's facets, each opposite a corner, counter-clockwise seen from outside. `right` is whether
@@ -58,7 +60,12 @@ impl FeatureCells<'_> {
         let scale = self.grid.surfaces[id].lipschitz * self.grid.step;
         let (sample, least) = (self.samples[surface][node], self.grid.margin * scale);
         let v = f64::from(sample);
-        let v = if self.perturbed_nodes.contains(&node) { v + SHIFT * scale * self.noise(id, node) } else { v };
+        let v = match self.perturbed_nodes.get(&node) {
+            Some(attempt) => {
+                v + (SHIFT * self.grid.margin).min(MOST_SHIFT) * scale * self.noise(id + 64 * attempt, node)
+            }
+            None => v,
+        };
         if self.is_sample_negative(surface, sample) { v.min(-least) } else { v.max(least) }
     }
 

@@ -36,6 +36,7 @@ impl FeatureCells<'_> {
                 return;
             }
         }
+        self.extra.muddled = Some(self.center_of(cell));
     }
 
     pub(super) fn center_of(&self, cell: [usize; 3]) -> Vec3 {
