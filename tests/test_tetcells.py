@@ -253,6 +253,13 @@ def test_open_ends_are_open_in_files(tmp_path):
     run = [sys.executable, "-m", "trabecula", "mesh", tmp_path / "a.toml", "-o", tmp_path / "a.stl", "--edge", "0.4", "--json"]
     reported = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     assert reported["open"] and not lt.Mesh.read(tmp_path / "a.stl").closed
+    made = solid.save(tmp_path / "b.stl", edge=0.4)
+    assert (tmp_path / "b.stl").read_bytes() == (tmp_path / "a.stl").read_bytes() and made.volume == reported["volume"]
+    with pytest.raises(ValueError, match="ends are open"):
+        solid.save(tmp_path / "c.stl", edge=0.4, resume=True)
+    with pytest.raises(ValueError, match="a lattice over tetrahedra"):
+        solid.save_implicit(tmp_path / "c.3mf")
+    assert not (tmp_path / "c.3mf").exists()
 
 
 def test_a_region_cuts_a_mesh_that_is_not_one_of_it(tmp_path):
