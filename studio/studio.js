@@ -450,7 +450,10 @@ async function begin() {
   text.addEventListener("input", () => { lines(); changed(); });
   text.addEventListener("scroll", lines);
   $("mesh").addEventListener("click", () => mesh().catch(broken));
-  document.querySelector("[name=colours]").addEventListener("input", (e) => { if (e.target.value === "2") thickness().catch(broken); else scaled(); });
+  // After the viewer, which listens to the figure too.
+  document.querySelector("figure.viewer").addEventListener("input", (e) => {
+    if (e.target.name === "colours") screen_.seen().color === "values" ? thickness().catch(broken) : scaled();
+  });
   // Without a graphics card meshes are drawn faster. The card makes its program while the core is unpacked.
   $("by").value = screen_ && !drawnBySoftware() ? "rays" : "mesh";
   byRays();

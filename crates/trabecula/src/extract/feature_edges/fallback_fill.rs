@@ -39,7 +39,7 @@ impl FeatureCells<'_> {
         self.extra.muddled = Some(self.center_of(cell));
     }
 
-    pub(super) fn center_of(&self, cell: [usize; 3]) -> Vec3 {
+    pub(in crate::extract) fn center_of(&self, cell: [usize; 3]) -> Vec3 {
         let node = self.nodes.index(cell);
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
         scale(add(ends[0], ends[1]), 0.5)
