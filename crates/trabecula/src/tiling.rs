@@ -23,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::cell::tet::{Bary, FractionTable, TetCell};
 use crate::cell::{Cut, Part};
-use crate::field::Field;
+use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
 use crate::map::Tets;
 use crate::map::curved_tets::within;
@@ -392,6 +392,10 @@ impl Field for Tiling {
                 *v *= 1.0 + k.eased;
             }
         }
+    }
+
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        fill_points(self, block, Some(wanted), out);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
