@@ -47,22 +47,7 @@ pub trait Field: Send + Sync {
     ///
     /// The default goes through points; structured fields override it, and there most of the speed is won.
     fn fill(&self, block: &Block, out: &mut [f32]) {
-        let [xs, ys, zs] = block.axes;
-        let mut points = Vec::with_capacity(xs.len());
-        let mut values = vec![0.0; xs.len()];
-        let mut rows = out.chunks_exact_mut(xs.len());
-        for &z in zs {
-            for &y in ys {
-                points.clear();
-                points.extend(xs.iter().map(|&x| [x, y, z]));
-                self.values(&points, &mut values);
-                if let Some(row) = rows.next() {
-                    for (o, v) in row.iter_mut().zip(&values) {
-                        *o = *v as f32;
-                    }
-                }
-            }
-        }
+        fill_points(self, block, None, out);
     }
 
     /// As `fill`, for a block at most 64 nodes wide, where only nodes whose bit is set in `wanted` (one word for each
@@ -89,5 +74,24 @@ pub trait Field: Send + Sync {
         let mut v = [0.0];
         self.values(&[p], &mut v);
         v[0]
+    }
+}
+
+/// Fills `out` (x fastest) with the values at a block's nodes, or at those whose bit is set in `wanted`, by way of points.
+pub(crate) fn fill_points(of: &(impl Field + ?Sized), block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
+    let [xs, ys, zs] = block.axes;
+    let (mut points, mut values) = (Vec::with_capacity(xs.len()), vec![0.0; xs.len()]);
+    for (row, out) in out.chunks_exact_mut(xs.len()).enumerate() {
+        let (y, z) = (ys[row % ys.len()], zs[row / ys.len()]);
+        let here = |i: &usize| wanted.is_none_or(|wanted| wanted[row] >> i & 1 == 1);
+        points.clear();
+        points.extend((0..xs.len()).filter(here).map(|i| [xs[i], y, z]));
+        let values = &mut values[..points.len()];
+        of.values(&points, values);
+        // What is not wanted is void, whatever was there before.
+        out.fill(1.0);
+        for (i, v) in (0..xs.len()).filter(here).zip(values) {
+            out[i] = *v as f32;
+        }
     }
 }

@@ -23,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::cell::tet::{Bary, FractionTable, TetCell};
 use crate::cell::{Cut, Part};
-use crate::field::Field;
+use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
 use crate::map::Tets;
 use crate::map::curved_tets::within;
@@ -186,12 +186,13 @@ impl Tiling {
         (0..4).map(|i| l[i] * of[n[i] as usize]).sum()
     }
 
-    /// f and t, and their gradients, at points in tetrahedra.
-    fn known_in(&self, at: &[(usize, Bary)]) -> Vec<Known> {
+    /// f and t at points in tetrahedra, and their gradients if they are `sloped`.
+    fn known_in(&self, at: &[(usize, Bary)], sloped: bool) -> Vec<Known> {
         let mut out = vec![Known::default(); at.len()];
         let far = self.map.overlap().max(BEYOND);
         let barys: Vec<Bary> = at.iter().map(|a| within(a.1, far)).collect();
-        let slopes: Vec<Mat3> = at.iter().map(|(t, l)| self.map.slopes_at(*t, *l)).collect();
+        let slope = |(t, l): &(usize, Bary)| if sloped { self.map.slopes_at(*t, *l) } else { Mat3::default() };
+        let slopes: Vec<Mat3> = at.iter().map(slope).collect();
         let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
         for c in &self.cells {
             c.cell.gradients(&barys, &mut v, &mut g);
@@ -226,17 +227,21 @@ impl Tiling {
     }
 
     fn known(&self, points: &[Vec3]) -> Vec<Known> {
+        self.found(points, true)
+    }
+
+    fn found(&self, points: &[Vec3], sloped: bool) -> Vec<Known> {
         let overlap = self.map.overlap();
         if overlap <= 0.0 {
             let at: Vec<(usize, Bary)> = points.iter().map(|p| self.map.locate(*p)).collect();
-            return self.known_in(&at);
+            return self.known_in(&at, sloped);
         }
         let (mut at, mut ends) = (Vec::new(), Vec::with_capacity(points.len()));
         for p in points {
             self.map.each_near(*p, |t, l| at.push((t, l)));
             ends.push(at.len());
         }
-        let each = self.known_in(&at);
+        let each = self.known_in(&at, sloped);
         let mut first = 0;
         let mean = |end: &usize| {
             let here = first..*end;
@@ -297,7 +302,7 @@ impl Tiling {
 
     /// Fills f and t at points (mm).
     pub fn cores(&self, points: &[Vec3], f: &mut [f64], t: &mut [f64]) {
-        for ((f, t), k) in f.iter_mut().zip(t).zip(self.known(points)) {
+        for ((f, t), k) in f.iter_mut().zip(t).zip(self.found(points, false)) {
             (*f, *t) = (k.f, k.t);
         }
     }
@@ -378,7 +383,7 @@ fn linear_slope(m: &Mat3, of: &[f64], nodes: [u32; 4]) -> Vec3 {
 
 impl Field for Tiling {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        for (o, k) in out.iter_mut().zip(self.known(points)) {
+        for (o, k) in out.iter_mut().zip(self.found(points, false)) {
             *o = self.cut.value(k.f, k.t) * (1.0 + k.eased);
         }
     }
@@ -392,6 +397,10 @@ impl Field for Tiling {
                 *v *= 1.0 + k.eased;
             }
         }
+    }
+
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        fill_points(self, block, Some(wanted), out);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
@@ -413,7 +422,7 @@ impl Field for Tiling {
             near.sort_unstable();
             near.dedup();
             let at: Vec<(usize, Bary)> = near.iter().map(|t| (*t, self.map.bary(*t, middle))).collect();
-            let here = if weighted { Vec::new() } else { self.known_in(&at) };
+            let here = if weighted { Vec::new() } else { self.known_in(&at, false) };
             for (i, n) in near.iter().enumerate() {
                 f = f.union(match here.get(i) {
                     None => all,

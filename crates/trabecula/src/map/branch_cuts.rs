@@ -5,6 +5,8 @@
 //! (Nieser, Reitebuch, Polthier, CubeCover, Comput. Graph. Forum 30, 2011.) Which cuts lie between two nodes follows from the angles
 //! about the lines, which jump by a turn there.
 
+use rayon::prelude::*;
+
 use super::phase_grid::Grid;
 use super::winding::{Filament, to_segment};
 use geometry::math::{
@@ -77,8 +79,8 @@ impl BranchCuts {
             jump(1.0) + jump(-1.0)
         };
         let filaments: Vec<Filament> = lines.iter().map(filament).collect();
-        let cut =
-            |f: &Filament| Cut { angle: (0..grid.len()).map(|n| f.angle(grid.node(n))).collect(), step: Move::NONE };
+        let angles = |f: &Filament| (0..grid.len()).into_par_iter().map(|n| f.angle(grid.node(n))).collect();
+        let cut = |f: &Filament| Cut { angle: angles(f), step: Move::NONE };
         BranchCuts { sense: filaments.first().map_or(1.0, sense), cuts: filaments.iter().map(cut).collect() }
     }
 

@@ -43,13 +43,12 @@ impl<'a> Branched<'a> {
         let mut inner = edges.clone();
         let mut crossings = Vec::new();
         for (axis, stride) in strides.into_iter().enumerate() {
-            for node in (0..grid.len()).filter(|n| grid.index(*n)[axis] + 1 < grid.shape[axis]) {
-                if cuts.any([node, node + stride]) {
-                    inner[axis][node] = 0.0;
-                    crossings.push(Crossing { node, axis, to: cuts.between([node, node + stride]) });
-                }
-            }
+            let crossed = |n: &usize| grid.index(*n)[axis] + 1 < grid.shape[axis] && cuts.any([*n, n + stride]);
+            let crossing = |node| Crossing { node, axis, to: cuts.between([node, node + stride]) };
+            let found = (0..grid.len()).into_par_iter().filter(crossed).map(crossing);
+            crossings.par_extend(found);
         }
+        crossings.iter().for_each(|c: &Crossing| inner[c.axis][c.node] = 0.0);
         let multigrid = Multigrid::new(grid.shape, grid.step, inner, Vec::new());
         Branched { grid, k, edges, crossings, multigrid }
     }

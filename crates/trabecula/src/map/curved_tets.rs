@@ -133,7 +133,8 @@ impl Bent {
         Bent { moved, shift, contraction, reach, sway }
     }
 
-    /// The iteration at coordinates `l`, for the flat coordinates `flat`.
+    /// The iteration at coordinates `l`, for the flat coordinates `flat`. Its result is large, so a call would cost as much as it does.
+    #[inline(always)]
     fn iterate(&self, flat: &[f64; 4], l: [f64; 4]) -> Iterate {
         let nearest = within(l, 0.0);
         let mut columns = [[0.0; 4]; 4];

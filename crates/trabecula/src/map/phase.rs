@@ -197,14 +197,8 @@ impl Phase {
         checkpoint();
         pace::check_pace(&laid.grid, &wanted.wavelength, &laid.given, &laid.inside)?;
         chosen.refuse()?;
-        let roots = target.roots(&laid, wanted)?;
         let ratio = wanted.ratio()?;
         checkpoint();
-        let problem = Problem::new(laid.grid, &target.k, roots, ratio);
-        let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
-        checkpoint();
-        let solution =
-            Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
         if let Some(core) = wanted.core {
             let lines = lines(&laid, wanted, &target);
             let step = laid.grid.step.into_iter().fold(f64::INFINITY, f64::min);
@@ -218,6 +212,11 @@ impl Phase {
                 return Ok(Phase { cores: Some(cores), ..made });
             }
         }
+        let problem = Problem::new(laid.grid, &target.k, target.roots(&laid, wanted)?, ratio);
+        let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
+        checkpoint();
+        let solution =
+            Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
         let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
         let mut found = Found { target, weights, solution, periods: Vec::new(), mean, steps, judged };
         let mut tried = String::new();

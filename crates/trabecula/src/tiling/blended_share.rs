@@ -61,7 +61,7 @@ impl Tiling {
         let each = POINTS / count;
         let tet = |i: usize| {
             let t = i * self.map.len() / count;
-            let values = self.known(&self.points_in(t, each)).iter().map(|k| of(k.f, k.t)).collect();
+            let values = self.found(&self.points_in(t, each), false).iter().map(|k| of(k.f, k.t)).collect();
             (self.map.volume(t), values)
         };
         let sample: Vec<(f64, Vec<f64>)> = (0..count).into_par_iter().map(tet).collect();
@@ -72,7 +72,7 @@ impl Tiling {
     pub(super) fn sampled_shares(&self) -> Vec<f64> {
         let each = (POINTS / self.map.len()).max(LEAST);
         let solid = |t: usize| {
-            let known = self.known(&self.points_in(t, each));
+            let known = self.found(&self.points_in(t, each), false);
             known.iter().filter(|k| self.cut.value(k.f, k.t) <= 0.0).count() as f64 / each as f64
         };
         (0..self.map.len()).into_par_iter().map(solid).collect()

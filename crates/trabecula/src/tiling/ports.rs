@@ -137,7 +137,7 @@ impl Tiling {
     /// Whether points of a tetrahedron are solid, by its own coordinates.
     pub fn solid_in(&self, t: usize, at: &[Bary]) -> Vec<bool> {
         let at: Vec<(usize, Bary)> = at.iter().map(|l| (t, *l)).collect();
-        self.known_in(&at).into_iter().map(|k| self.cut.value(k.f, k.t) <= 0.0).collect()
+        self.known_in(&at, false).into_iter().map(|k| self.cut.value(k.f, k.t) <= 0.0).collect()
     }
 
     /// The tiling with its surface moved: solid where its field was at most `by`. The half-level of a sheet stays positive.

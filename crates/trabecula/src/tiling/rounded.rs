@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use super::{Level, Share, Tiling};
 use crate::cell::Part;
-use crate::field::Field;
+use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
 use crate::map::Tets;
 use crate::map::curved_tets::within;
@@ -210,6 +210,10 @@ impl Field for Rounded {
             values[i] = v;
             gradients[i] = add(scale(gradients[i], da / steep), scale(g[i], db));
         }
+    }
+
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        fill_points(self, block, Some(wanted), out);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {

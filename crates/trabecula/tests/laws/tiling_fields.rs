@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use super::common::{Random, check};
+use super::common::{Random, ball, check};
 use super::tiling::{cell, made, map, shaken};
 use geometry::math::{Aabb, dot, norm, sub};
 use trabecula::cell::tet::{Nodes, Subdivision, tet_catalogue};
-use trabecula::field::Field;
+use trabecula::field::{Block, Field};
 use trabecula::implicit::Implicit;
 use trabecula::map::Tets;
-use trabecula::tiling::{Level, Tiling};
+use trabecula::region::Region;
+use trabecula::tiling::{Level, Rounded, Tiling};
 
 #[test]
 fn fields_are_continuous_for_any_numbering() {
@@ -86,6 +87,42 @@ fn bounds_hold_and_gradients_are_those_of_the_values() {
         }
         // A difference may straddle a crease: a face, or the fold of |f|.
         assert!(wrong <= 2, "{name}: {wrong}");
+    }
+}
+
+/// Whatever a block held before, its nodes have their values where they are wanted, as they have with gradients, and are void elsewhere.
+#[test]
+fn a_block_is_evaluated_where_it_is_wanted() {
+    let mut some = Random(9);
+    let region: Region = ball([4.0; 3], 3.5);
+    let mesh = shaken(2, 0.15, 4.0, &mut some);
+    let flat = |overlap: f64| Tets::new(&mesh, overlap).expect("mesh");
+    let bent = Tets::of_region(&mesh, 0.0, &region).expect("mesh");
+    for (map, name) in [(flat(0.0), "diamond_sheet"), (flat(0.1), "iwp"), (bent, "primitive_sheet")] {
+        let (s, part, t) = cell(name);
+        let tiling = Arc::new(Tiling::new(Arc::new(map), s, part, Level::Same(t)));
+        let mut fields: Vec<Arc<dyn Implicit>> = tiling.parts();
+        fields.extend([tiling.clone() as Arc<dyn Implicit>, Arc::new(tiling.eased())]);
+        fields.push(Arc::new(Rounded::new(&tiling, &region)));
+        for f in fields {
+            let axes = [7, 64, 5].map(|n| {
+                let (from, step) = (some.between(-0.5, 4.0), some.between(0.02, 0.2));
+                (0..n).map(|i| from + step * f64::from(i)).collect::<Vec<f64>>()
+            });
+            let axes = [&axes[1][..], &axes[0], &axes[2]];
+            let words: Vec<u64> =
+                (0..35).map(|row| if row % 5 == 0 { 0 } else { some.share().to_bits() << 12 }).collect();
+            let mut out = vec![f32::NAN; 64 * 35];
+            f.fill_where(&Block { axes }, &words, &mut out);
+            for (n, found) in out.into_iter().enumerate() {
+                let (i, row) = (n % 64, n / 64);
+                let p = [axes[0][i], axes[1][row % 7], axes[2][row / 7]];
+                let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+                f.gradients(&[p], &mut v, &mut g);
+                assert_eq!(v[0], f.value(p), "{name} {p:?}");
+                assert_eq!(found, if words[row] >> i & 1 == 1 { v[0] as f32 } else { 1.0 }, "{name} {p:?}");
+            }
+        }
     }
 }
 
