@@ -12,6 +12,7 @@ mod chord_balance;
 mod crease_nodes;
 mod flips;
 mod mending;
+mod near_sheets;
 mod node_surfaces;
 mod partition;
 mod patch_cuts;

@@ -7,12 +7,14 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::near_sheets::NearSheets;
 use super::node_surfaces::{SurfaceSet, balanced, members, only};
 use super::partition::images;
 use super::shaping::{GONE, GOOD, Shaping};
 use super::tet_shape::shape;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, norm, scale, sub};
+use geometry::progress::checkpoint;
 use geometry::tetmesh::FACES;
 
 /// Largest distance of a chord's midpoint from the surface that is believed, as a fraction of the chord: that of half a circle. A value
@@ -20,6 +22,10 @@ use geometry::tetmesh::FACES;
 const DEEPEST: f64 = 0.5;
 /// Shifts of more than this part of the root of the area around a node are refused where they leave the region.
 const FAR: f64 = 0.05;
+/// Passes: each is of higher order than the one before, and in narrow necks the first leaves a part in a thousand.
+const PASSES: usize = 3;
+/// Shifts of less than this part of the longest edge do not make sheets cross.
+const NEAR: f64 = 0.02;
 
 /// Faces of the boundary and between domains, each once: its nodes, four times its tetrahedron (of the first domain) and the opposite
 /// corner, and whether no other tetrahedron has it. Only faces whose nodes all `may` be on one are searched.
@@ -58,9 +64,30 @@ pub(crate) fn distances(surface: &Surface, points: &[Vec3]) -> impl Iterator<Ite
     v.into_iter().zip(g).map(|(v, g)| v / norm(g).max(f64::MIN_POSITIVE))
 }
 
+/// The flat faces of curved surfaces, with their edges.
+struct Chords {
+    /// Each face and its surface.
+    faces: Vec<([u32; 3], usize)>,
+    /// Each surface and edge on it, ascending.
+    edges: Vec<(usize, [u32; 2])>,
+}
+
 impl Shaping<'_> {
-    /// Shifts nodes on curved surfaces so that the volume of each domain is right to higher order than its chords.
+    /// Shifts nodes on curved surfaces so that the volume of each domain is right to higher order than its chords: the distances that are left
+    /// are balanced again, and nothing is shifted to where sheets that nearly touch would cross.
     pub fn balance(&mut self) {
+        let (chords, before) = (self.chords(), self.nodes.clone());
+        for _ in 0..PASSES {
+            let by = self.shifts(&chords, &before);
+            self.shift(by);
+        }
+        self.keep_apart(&before);
+        let nodes = &self.nodes;
+        let shape_of = |t: &[u32; 4]| if *t == GONE { f64::INFINITY } else { shape(t.map(|n| nodes[n as usize])) };
+        self.shapes = self.tets.par_iter().map(shape_of).collect();
+    }
+
+    fn chords(&self) -> Chords {
         let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
         // (surface, edge) of each face on a curved surface.
         let of = |f: &[u32; 3]| {
@@ -75,6 +102,11 @@ impl Shaping<'_> {
             faces.par_iter().flat_map_iter(|([a, b, c], s)| [[*a, *b], [*a, *c], [*b, *c]].map(|e| (*s, e))).collect();
         edges.par_sort_unstable();
         edges.dedup();
+        Chords { faces, edges }
+    }
+
+    /// Displacements of nodes, the first of their images, that balance the distances of chords; `before` is where they were before any.
+    fn shifts(&self, Chords { faces, edges }: &Chords, before: &[Vec3]) -> Vec<(u32, Vec3)> {
         let found: Vec<f64> = edges
             .par_chunks(256)
             .flat_map_iter(|chunk| {
@@ -92,7 +124,7 @@ impl Shaping<'_> {
         let distance = |s: usize, e: [u32; 2]| edges.binary_search(&(s, e)).map_or(0.0, |i| found[i]);
         // (area, area times mean distance) at each node on each surface, added in the order of the faces.
         let mut sums: FxHashMap<(u32, usize), [f64; 2]> = FxHashMap::default();
-        for ([a, b, c], s) in &faces {
+        for ([a, b, c], s) in faces {
             let [p, q, r] = [a, b, c].map(|n| self.nodes[*n as usize]);
             let area = norm(cross(sub(q, p), sub(r, p)));
             let mean = (distance(*s, [*a, *b]) + distance(*s, [*a, *c]) + distance(*s, [*b, *c])) / 3.0;
@@ -105,38 +137,74 @@ impl Shaping<'_> {
         let mut at: Vec<((u32, usize), [f64; 2])> = sums.into_iter().collect();
         at.sort_unstable_by_key(|a| a.0);
         let by_node: Vec<_> = at.chunk_by(|a, b| a.0.0 == b.0.0).collect();
-        let shifts: Vec<(u32, Vec3)> = by_node
+        by_node
             .par_iter()
             .filter_map(|of| {
                 let n = of[0].0.0;
+                let p = self.nodes[n as usize];
                 let wanted: Vec<(usize, f64)> = of.iter().map(|((_, s), [area, sum])| (*s, -sum / area)).collect();
-                let by = balanced(self.surfaces, self.on[n as usize], self.nodes[n as usize], &wanted)?;
+                let by = balanced(self.surfaces, self.on[n as usize], p, &wanted)?;
                 let area: f64 = of.iter().map(|(_, [area, _])| area).sum();
-                let far = norm(by) > FAR * area.sqrt();
-                (!far || !self.leaves_region(n, by)).then_some((n, by))
+                let far = norm(sub(add(p, by), before[n as usize])) > FAR * area.sqrt();
+                (!far || !self.leaves_region(n, before[n as usize], add(p, by))).then_some((n, by))
             })
-            .collect();
+            .collect()
+    }
+
+    /// Displaces nodes with their images where no shape below `GOOD` gets worse.
+    fn shift(&mut self, shifts: Vec<(u32, Vec3)>) {
         for (n, by) in shifts {
             let all: Vec<u32> = images(&self.next, n).collect();
             let shifted = |s: &Self| {
                 let of = all.iter().flat_map(|n| s.around[*n as usize].iter());
                 of.map(|t| shape(s.corners(*t)) / s.shapes[*t as usize].min(GOOD)).fold(f64::INFINITY, f64::min)
             };
+            let old: Vec<Vec3> = all.iter().map(|n| self.nodes[*n as usize]).collect();
             all.iter().for_each(|n| self.nodes[*n as usize] = add(self.nodes[*n as usize], by));
-            // No shape below GOOD gets worse.
             if shifted(self) < 1.0 {
-                all.iter().for_each(|n| self.nodes[*n as usize] = sub(self.nodes[*n as usize], by));
+                all.iter().zip(old).for_each(|(n, p)| self.nodes[*n as usize] = p);
             }
         }
-        let nodes = &self.nodes;
-        let shape_of = |t: &[u32; 4]| if *t == GONE { f64::INFINITY } else { shape(t.map(|n| nodes[n as usize])) };
-        self.shapes = self.tets.par_iter().map(shape_of).collect();
+    }
+
+    /// Puts nodes back where sheets of the boundary cross that were shifted farther than they may nearly touch.
+    fn keep_apart(&mut self, before: &[Vec3]) {
+        let shift = |n: usize| norm(sub(self.nodes[n], before[n]));
+        let most = (0..before.len()).into_par_iter().map(shift).reduce(|| 0.0, f64::max);
+        if most == 0.0 {
+            return;
+        }
+        let sheets = NearSheets::new(self);
+        let mut moved: Vec<u32> =
+            (0..before.len() as u32).filter(|n| shift(*n as usize) > NEAR * sheets.edge).collect();
+        while !moved.is_empty() {
+            checkpoint();
+            let crossing = self.crossing_nodes(&sheets.near_to(&moved, self));
+            moved = self.put_back(crossing, before);
+        }
+    }
+
+    /// Puts nodes back, and those about them where shapes become worse; which there were.
+    fn put_back(&mut self, mut nodes: Vec<u32>, before: &[Vec3]) -> Vec<u32> {
+        let mut back = Vec::new();
+        while let Some(n) = nodes.pop() {
+            for n in images(&self.next, n) {
+                let old = core::mem::replace(&mut self.nodes[n as usize], before[n as usize]);
+                if old != before[n as usize] {
+                    back.push(n);
+                    let worse = |t: &&u32| shape(self.corners(**t)) < self.shapes[**t as usize].min(GOOD);
+                    let worse = self.around[n as usize].iter().filter(worse);
+                    nodes.extend(worse.flat_map(|t| self.tets[*t as usize]));
+                }
+            }
+        }
+        back
     }
 
     /// Whether a displacement takes a node through a surface of the region.
-    fn leaves_region(&self, n: u32, by: Vec3) -> bool {
-        let (p, on) = (self.nodes[n as usize], self.on[n as usize]);
-        let through = |s: &Surface| s.field.value(p) <= 0.0 && s.field.value(add(p, by)) > 0.0;
+    fn leaves_region(&self, n: u32, p: Vec3, to: Vec3) -> bool {
+        let on = self.on[n as usize];
+        let through = |s: &Surface| s.field.value(p) <= 0.0 && s.field.value(to) > 0.0;
         (0..).zip(self.surfaces).any(|(i, s)| s.cut && on & only(i) == 0 && through(s))
     }
 }

@@ -4,26 +4,26 @@
 //! is improved step by step. All is taken back unless everything touched is better than the tetrahedron was, so that the worst shapes never
 //! get worse. Nodes are inserted in this way by B. M. Klingner and J. R. Shewchuk (Aggressive tetrahedral mesh improvement, 2007).
 
-use super::interfaces;
+use super::near_sheets::NearSheets;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use super::tet_shape::shape;
-use geometry::math::{Vec3, add, scale};
-use geometry::measure::self_intersections;
-use geometry::mesh::Mesh;
+use geometry::math::{Aabb, Vec3, add, scale};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{EDGES, FACES};
 
 /// Shapes worse than this are mended: dihedral angles below 15.1 or above 158.8 degrees.
 const MENDED: f64 = 2.0;
+/// So are shapes worse than this where they are few: dihedral angles below 21 or above 149.8 degrees,
+const FAIR: f64 = 3.9;
+/// at most this number.
+const FEW: usize = 60;
 /// Rounds over all of them.
 const ROUNDS: usize = 3;
 /// The least shape that the first change may leave: a tetrahedron with some volume.
 const LEAST: f64 = 0.01;
 /// The most steps after it.
 const STEPS: usize = 40;
-/// The most pairs of triangles that cross that are counted.
-const COUNTED: usize = 1000;
 /// The least relative gain.
 const GAIN: f64 = 1.05;
 
@@ -49,69 +49,56 @@ enum First {
 }
 
 impl Shaping<'_> {
-    /// Mends the neighbourhoods of the worst tetrahedra; whether any was. Where sheets of the boundary nearly touch, they could come to cross:
-    /// if more of it crosses than before, all is taken back.
+    /// Mends the neighbourhoods of the worst tetrahedra, and of those that are a little worse than the best meshes have where they are
+    /// few; whether any was.
     pub fn mend(&mut self) -> bool {
-        if self.bad().is_empty() {
-            return false;
-        }
-        let before = self.crossings();
-        let made = self.mend_all();
-        if self.crossings() > before {
-            self.take_back(made);
-            return false;
-        }
-        !made.is_empty()
-    }
-
-    /// The pairs of triangles of the boundary that cross, up to `COUNTED`.
-    fn crossings(&self) -> usize {
-        let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
-        let triangles = faces.into_iter().map(|(face, _, _)| face).collect();
-        self_intersections(&Mesh { vertices: self.nodes.clone(), triangles }, COUNTED)
-    }
-
-    /// Mends what it can; the changes.
-    fn mend_all(&mut self) -> Vec<Change> {
-        let mut made = Vec::new();
+        let mut mended = false;
+        let mut sheets = None;
         for _ in 0..ROUNDS {
-            let before = made.len();
-            for t in self.bad() {
-                checkpoint();
-                if self.tets[t as usize] != GONE && self.shapes[t as usize] < MENDED {
-                    let _ = self.mend_at(t, &mut made) || self.mend_free(t, &mut made);
-                }
-            }
-            if made.len() == before {
+            let mut bad = self.bad();
+            let below = |bad: &[u32], bar: f64| bad.partition_point(|t| self.shapes[*t as usize] < bar);
+            let (worst, fair) = (below(&bad, MENDED), below(&bad, FAIR));
+            let bar = if fair <= worst + FEW { FAIR } else { MENDED };
+            bad.truncate(if bar == FAIR { fair } else { worst });
+            if bad.is_empty() {
                 break;
             }
+            let sheets = sheets.get_or_insert_with(|| NearSheets::new(self));
+            let mut any = false;
+            for t in bad {
+                checkpoint();
+                if self.tets[t as usize] != GONE && self.shapes[t as usize] < bar {
+                    any |= self.mend_at(t, sheets) || self.mend_free(t, sheets);
+                }
+            }
+            if !any {
+                break;
+            }
+            mended = true;
         }
-        made
+        mended
     }
 
     /// Mends the neighbourhood of a tetrahedron with its nodes on creases set free; whether it is better. If not, they stay.
-    fn mend_free(&mut self, t: u32, made: &mut Vec<Change>) -> bool {
+    fn mend_free(&mut self, t: u32, sheets: &NearSheets) -> bool {
         let held = |on: SurfaceSet| on & HELD != 0 && on != HELD;
         let nodes = self.tets[t as usize];
         let freed: Vec<Change> = nodes.into_iter().map(|n| Change::Freed(n, self.on[n as usize])).collect();
+        let any = nodes.into_iter().any(|n| held(self.on[n as usize]));
         for n in nodes.into_iter().map(|n| n as usize) {
             if held(self.on[n]) {
                 self.on[n] &= !HELD;
             }
         }
-        let any = freed.iter().any(|f| matches!(f, Change::Freed(n, on) if self.on[*n as usize] != *on));
-        let from = made.len();
-        made.extend(freed);
-        if any && self.mend_at(t, made) {
+        if any && self.mend_at(t, sheets) {
             return true;
         }
-        let freed = made.split_off(from);
         self.take_back(freed);
         false
     }
 
     /// Mends the neighbourhood of a tetrahedron; whether it is better.
-    fn mend_at(&mut self, t: u32, made: &mut Vec<Change>) -> bool {
+    fn mend_at(&mut self, t: u32, sheets: &NearSheets) -> bool {
         let (nodes, before) = (self.tets[t as usize], self.shapes[t as usize]);
         let bar = (before * GAIN).max(LEAST);
         let edges = EDGES.map(|e| e.map(|k| nodes[k]));
@@ -119,23 +106,77 @@ impl Shaping<'_> {
         let edge_removals = edges.into_iter().map(First::RemoveEdge);
         let face_removals = FACES.into_iter().map(|f| First::RemoveFace(f.map(|k| nodes[k])));
         let collapses = edges.into_iter().flat_map(|[a, b]| [First::Collapse([a, b]), First::Collapse([b, a])]);
-        for change in bisections.chain(edge_removals).chain(face_removals).chain(collapses) {
-            self.changes = Some(Vec::new());
-            let done = match change {
-                First::Bisect(edge) => self.bisect(edge),
-                First::RemoveEdge(edge) => self.remove_edge(edge, Some(LEAST)),
-                First::RemoveFace(face) => self.remove_face(t, face, Some(LEAST)),
-                First::Collapse(edge) => self.collapse(edge, Some(LEAST)),
-            };
-            let better = done && self.improved_beyond(bar);
-            let changes = self.changes.take().unwrap_or_default();
-            if better {
-                made.extend(changes);
-                return true;
-            }
+        let mut firsts = bisections.chain(edge_removals).chain(face_removals).chain(collapses);
+        firsts.any(|first| self.mend_by(first, t, bar, sheets))
+    }
+
+    /// Mends the neighbourhood of a tetrahedron by this first change; whether it is better. Where sheets of the boundary nearly touch,
+    /// they could come to cross: if more of it crosses than before, it is taken back.
+    fn mend_by(&mut self, first: First, t: u32, bar: f64, sheets: &NearSheets) -> bool {
+        let Some(changes) = self.changed_by(first, t, bar) else { return false };
+        let near = self.near(&changes, sheets);
+        let after = self.crossings(&near);
+        if after == 0 {
+            return true;
+        }
+        self.take_back(changes);
+        if self.crossings(&near) < after {
+            return false;
+        }
+        let Some(changes) = self.changed_by(first, t, bar) else { return false };
+        let good = self.crossings(&near) <= after;
+        if !good {
             self.take_back(changes);
         }
-        false
+        good
+    }
+
+    /// The changes that begin with this one, if all that they touch is better than `bar`; if not, none is left.
+    fn changed_by(&mut self, first: First, t: u32, bar: f64) -> Option<Vec<Change>> {
+        self.changes = Some(Vec::new());
+        let done = match first {
+            First::Bisect(edge) => self.bisect(edge),
+            First::RemoveEdge(edge) => self.remove_edge(edge, Some(LEAST)),
+            First::RemoveFace(face) => self.remove_face(t, face, Some(LEAST)),
+            First::Collapse(edge) => self.collapse(edge, Some(LEAST)),
+        };
+        let better = done && self.improved_beyond(bar);
+        let changes = self.changes.take().unwrap_or_default();
+        if better {
+            return Some(changes);
+        }
+        self.take_back(changes);
+        None
+    }
+
+    /// Nodes of the boundary near to where it was changed.
+    fn near(&self, changes: &[Change], sheets: &NearSheets) -> Vec<u32> {
+        let on = |n: &u32| self.on[*n as usize] != 0;
+        let outer = |t: &[u32; 4]| t.iter().filter(|n| on(n)).count() > 2;
+        let mut nodes: Vec<u32> = Vec::new();
+        let mut within = Aabb::EMPTY;
+        for change in changes {
+            let tets: Vec<[u32; 4]> = match change {
+                Change::Moved(n, old) if on(n) => {
+                    within = within.with(*old);
+                    self.around[*n as usize].iter().map(|t| self.tets[*t as usize]).collect()
+                }
+                Change::Replaced { gone, made, .. } => {
+                    let made = made.iter().map(|t| self.tets[*t as usize]).filter(|t| *t != GONE);
+                    made.chain(gone.iter().map(|g| g.1)).filter(outer).collect()
+                }
+                _ => Vec::new(),
+            };
+            nodes.extend(tets.iter().flatten().filter(|n| on(n)));
+        }
+        if nodes.is_empty() {
+            return nodes;
+        }
+        nodes.iter().for_each(|n| within = within.with(self.nodes[*n as usize]));
+        nodes.extend(sheets.near(&within));
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
     }
 
     /// Improves what was touched, the worst first, until all of it is better than `bar`; whether it is.

@@ -22,7 +22,7 @@ const SHORT: f64 = 0.41189;
 const OTHER: f64 = 0.33;
 /// The least shape (`tet_shape::shape`) that moving a node may leave.
 const LEAST: f64 = 0.4;
-/// Nodes closer to a patch than this fraction of the background's edges are on it.
+/// Nodes closer to a surface than this fraction of the background's edges are on it.
 const ROUNDING: f64 = 1e-7;
 /// Greatest distance of a projected position from its crossing, as a fraction of the edge.
 const REACH: f64 = 0.5;
@@ -176,7 +176,12 @@ impl Partition<'_> {
                 let at = self.place(c);
                 let [p, q] = c.ends.map(|n| self.nodes[n as usize]);
                 let reach = REACH * norm(sub(p, q));
-                let to = if self.on[n] == 0 { at } else { onto(self.surfaces, self.on[n] | bit, at, reach)? };
+                let to = match self.on[n] {
+                    // A node on the surface up to rounding stays: at a corner of the region three other surfaces fix it.
+                    _ if *distance <= ROUNDING * step => self.nodes[n],
+                    0 => at,
+                    on => onto(self.surfaces, on | bit, at, reach)?,
+                };
                 Some((*distance, n as u32, sub(to, self.nodes[n])))
             })
             .collect();

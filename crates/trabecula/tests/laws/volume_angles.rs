@@ -133,3 +133,68 @@ fn creases_between_beams_are_followed() {
     let off = values.iter().filter(|v| v.abs() > 0.05 * edge).count();
     assert!((off as f64) < 0.015 * middles.len() as f64, "{off} of {}", middles.len());
 }
+
+/// A periodic cell of 4 mm with this number of edges of the background along it.
+fn cell(cell: &str, part: &str, fraction: f64, edges: u32, order: u8) -> Made {
+    let text = format!(
+        "schema = 1\nregion.box.size = [4, 4, 4]\n[lattice.a]\ncell = \"{cell}\"\npart = \"{part}\"\n\
+         map.affine.wavelength = 4\nlevel.fraction = {fraction}\n"
+    );
+    let options = Options { edge: 4.0 / f64::from(edges), of: Of::Solid, order, periodic: true, largest: false };
+    built(&text).volume_mesh(&options, &Silent).expect("a mesh")
+}
+
+/// A network of half the cell may pass through corners and edges of it: nodes there are on the surface up to rounding, and cut off as
+/// tetrahedra of no height there were angles of 0 and 176 degrees.
+#[test]
+fn networks_through_corners_of_the_cell_have_angles_of_15_to_150_degrees() {
+    for name in ["gyroid", "diamond", "fischer_koch_s"] {
+        for (part, edges) in [("lower", 16), ("upper", 12)] {
+            let angles = cell(name, part, 0.5, edges, 1).mesh.angles().expect("tetrahedra");
+            assert!(angles.min >= 15.0 && angles.max <= 150.0, "{name} {part}: {angles:?}");
+        }
+    }
+}
+
+/// At 32 edges a cell angles are between 15 and 150 degrees, the volume is right to 2e-4, and what pairs and sets say is so.
+#[test]
+fn named_cells_have_angles_of_15_to_150_degrees_and_their_volume() {
+    let mut some = Random(74);
+    for _ in 0..cases(6) {
+        let (name, part) = (CELLS[some.below(CELLS.len())], ["sheet", "lower", "upper"][some.below(3)]);
+        let fraction = some.between(0.25, 0.6);
+        let mesh = cell(name, part, fraction, 32, 1).mesh;
+        let what = format!("{name} {part} {fraction}");
+        let angles = mesh.angles().expect("tetrahedra");
+        assert!(angles.min >= 15.0 && angles.max <= 150.0, "{what}: {angles:?}");
+        let corners = mesh.corners();
+        let whole: f64 = (0..corners.tets.len()).map(|t| volume(corners.corners(t))).sum();
+        // Balanced chords are off by the fourth power of edge over radius of curvature; the first pass alone left 7e-4.
+        assert!((whole / (64.0 * fraction) - 1.0).abs() < 2e-4, "{what}: {whole}");
+        for pair in &mesh.pairs {
+            let [p, q] = [pair.node, pair.image].map(|n| mesh.nodes[n as usize]);
+            for k in 0..3 {
+                let there = if pair.along[k] { (2.0, -2.0) } else { (p[k], p[k]) };
+                assert!((p[k], q[k]) == there, "{what}: {p:?} {q:?}");
+            }
+        }
+        let faces = |name: &str| mesh.sets.iter().find(|s| s.name == name).map_or(0, |s| s.faces.len());
+        assert_eq!(faces("CUT") + faces("LATTICE"), corners.boundary_faces().len(), "{what}");
+    }
+}
+
+/// Nodes are shifted so that chords cut off no volume, but not to where sheets of the boundary that nearly touch would cross: no more of it
+/// crosses than of the mesh of quadratic elements, whose corners are not shifted.
+#[test]
+fn balanced_boundaries_cross_no_more_than_others() {
+    let mut some = Random(75);
+    for _ in 0..cases(6) {
+        let text = random(&mut some);
+        let design = built(&text);
+        let edge = 4.0 / some.between(6.0, 10.0);
+        let crossings =
+            |order| geometry::measure::self_intersections(&made(&design, edge, order).mesh.corners().boundary(), 1000);
+        let [linear, quadratic] = [1, 2].map(crossings);
+        assert!(linear <= quadratic, "{linear} {quadratic}\n{text}");
+    }
+}
