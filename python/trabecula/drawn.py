@@ -159,8 +159,9 @@ class Drawn(Picture):
         without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
         in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
         scale_bar are a path each, by these names. Contours are ``line_width`` wide (mm with ``dpi``, pixels else; 1/340 of the
-        width of the drawing unless given), other lines thinner in proportion. With ``color``, ``shares`` or ``lines``, as for ``png``, a picture of as many
-        pixels lies behind the lines, and a legend in lines and words below. ValueError for what cannot be drawn.
+        width of the drawing unless given), other lines thinner in proportion. With ``color``, ``shares`` or ``lines``, as for
+        ``png``, a picture of as many pixels lies behind the lines, and a legend in lines and words below. ValueError for what
+        cannot be drawn.
         """
         seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)

@@ -207,7 +207,8 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     if apart is not None:
         if whole:
             if out := given_of(args):
-                raise WrongUsage(f"--resume, --cluster and --shards make a surface in ranges of tiles, as it is: leave out {out}")
+                made = "--resume, --cluster and --shards make a surface in ranges of tiles, as it is"
+                raise WrongUsage(f"{made}: leave out {out}")
             raise Refused(OPEN_IN_RANGES)
         if kind_of(args.output) != "stl":
             raise WrongUsage(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")

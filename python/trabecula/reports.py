@@ -575,7 +575,7 @@ class LatticeReport(Report):
     part: str
     """sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)."""
     periods: list[PeriodReport] | None
-    """Cells round the holes of the region; None where the phases of a solved map have one value."""
+    """Cells round the holes of the region, empty where the phases of a solved map have one value. None without a solved map."""
     pore: float | list[float] | None
     """Diameter of the largest ball that passes through the void from cell to cell, mm; of a sheet the lesser of its two
     sides. Zero where the void is closed."""

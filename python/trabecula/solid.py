@@ -55,7 +55,7 @@ __all__ = ["Solid"]
 
 #: Why a surface with open ends, and why beams alone are not made in ranges.
 OPEN_IN_RANGES = (
-    "the design's ends are open (surface = \"open\" of map.tets), and a surface is made in ranges of tiles with its caps; "
+    'the design\'s ends are open (surface = "open" of map.tets), and a surface is made in ranges of tiles with its caps; '
     "leave resume, cluster and shards out"
 )
 OF_BEAMS = (
@@ -443,9 +443,9 @@ class Solid(Seen, Simulated, Resolution):
     ) -> SurfaceReport:
         """Streams the surface to a mesh file (.stl, .3mf, .ply or .obj) without holding it in memory, and gives its figures.
 
-        The bytes are those of ``mesh(…).write(path)``; of ``mesh(…).uncapped().write(path)`` where the design has ``open_ends``,
-        with the figures of the closed surface. ``islands`` and ``chord`` are as for ``mesh``; with ``chord`` the mesh
-        is held in memory unless the file is an STL.
+        The bytes are those of ``mesh(…).write(path)``, or, where the design has ``open_ends``, of
+        ``mesh(…).uncapped().write(path)``, with the figures of the closed surface. ``islands`` and
+        ``chord`` are as for ``mesh``; with ``chord`` the mesh is held in memory unless the file is an STL.
 
         An .stl is written at once; for the others vertices and triangles go to temporary files beside it, which are gone at
         the end, whatever that is.
