@@ -260,6 +260,7 @@ impl Phase {
             tried += &distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
+        let hasty = hasty.or_else(|| pace::thin(&laid.grid, found.judged.deepest));
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
         let stress_range = target.range;
         let shift = wanted.shift(&mean);
@@ -446,16 +447,17 @@ fn lines(laid: &Laid, wanted: &Wanted, target: &Target) -> Vec<SingularLine> {
     singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
 }
 
-/// The mean of lengths at the nodes in a region; those of the first node if none is.
+/// The mean of lengths at the nodes in a region; of all nodes if none is.
 fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
     let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
-    if count == 0 { of[0] } else { scale(sum, 1.0 / f64::from(count)) }
+    if count == 0 { mean_within(&vec![true; of.len()], of) } else { scale(sum, 1.0 / f64::from(count)) }
 }
 
-/// The least and the greatest of the smallest lengths at the nodes in a region.
+/// The least and the greatest of the smallest lengths at the nodes in a region; at all nodes if none is in it.
 fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
-    let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
+    let none = !inside.contains(&true);
+    let within = inside.iter().zip(of).filter(|(inside, _)| **inside || none);
     let smallest = within.map(|(_, w)| w.iter().copied().fold(f64::INFINITY, f64::min));
     smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
 }

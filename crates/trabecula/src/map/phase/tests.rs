@@ -3,7 +3,7 @@ use super::super::phase_grid::Grid;
 use super::*;
 use crate::grade::{Formula, Linear};
 use crate::map::Affine;
-use geometry::math::sub;
+use geometry::math::{cross, sub};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -337,7 +337,7 @@ fn misfits_are_those_of_the_report() {
     for wanted in [turned.clone(), laid(stress), laid(bar)] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.solution.grid();
-        let (nodes, between) = compared(&grid, &vec![true; grid.len()], None);
+        let (nodes, between) = compared(&grid, &vec![f64::NEG_INFINITY; grid.len()], &vec![true; grid.len()], None);
         // Every node of a grid as small as this, and a point in every cell.
         assert_eq!(nodes.len(), grid.len());
         assert_eq!(between.len(), grid.shape.map(|n| n - 1).iter().product::<usize>());
@@ -419,4 +419,46 @@ fn a_short_ramp_turns_as_steeply_as_half_a_cell_sees() {
     // 40 degrees within 2 mm of a 4 mm cell; the angle between frames is good to √ε.
     assert!((turn(vec![[11.0, 0.0], [13.0, 40.0]]) - 80.0).abs() < 1e-4);
     assert!((turn(vec![[0.0, 0.0], [24.0, 60.0]]) - 10.0).abs() < 1e-4);
+}
+
+/// A slab between two planes across a ball, of any thickness and slope: what is reported of the map is what it is at points of the slab,
+/// also where no node of the grid is in it, which is said.
+#[test]
+fn a_region_thinner_than_the_grid_is_judged_inside_it() {
+    use crate::region::{HalfSpace, Intersection, Region, Sphere};
+    let mut state = 7;
+    let mut random = || geometry::random::random(&mut state);
+    for (i, thick) in [0.3 / 3f64.sqrt(), 0.02, 0.1, 3.0].into_iter().enumerate() {
+        let normal = if i == 0 { [1.0; 3] } else { [random(), random(), 1.0 + random().abs()] };
+        let unit = scale(normal, 1.0 / norm(normal));
+        let parts: Vec<Region> = vec![
+            Arc::new(HalfSpace::new([0.0; 3], scale(unit, -1.0)).expect("lower")),
+            Arc::new(HalfSpace::new(scale(unit, thick), unit).expect("upper")),
+            Arc::new(Sphere::new([0.0; 3], 10.0).expect("ball")),
+        ];
+        let slab = Intersection::new(parts).expect("slab");
+        let b = bounds([-10.0; 3], [10.0; 3]);
+        let settings = Settings { region: Some(&slab), folds: true, step: None };
+        let map = Phase::solve(&b, &about_z("12*x", Grade::Constant(3.0)), &settings).expect("solved");
+        let across = cross(unit, [1.0, 0.0, 0.0]);
+        let (e, f) = (scale(across, 1.0 / norm(across)), cross(unit, scale(across, 1.0 / norm(across))));
+        let (mut spacing, mut density, mut count) = ([0.0; 3], [f64::INFINITY, 0.0f64], 0.0);
+        for _ in 0..20_000 {
+            let p = add(scale(e, 10.0 * random()), add(scale(f, 10.0 * random()), scale(unit, thick * random().abs())));
+            if slab.value(p) <= 0.0 {
+                let misfit = map.misfits(&[p]).expect("misfit")[0];
+                spacing = add(spacing, misfit.spacing);
+                density = [density[0].min(misfit.density), density[1].max(misfit.density)];
+                count += 1.0;
+            }
+        }
+        let d = map.distortion();
+        for axis in 0..3 {
+            // Of a hundred points at least, whose spread is below a tenth.
+            assert!((d.spacing[axis].mean - spacing[axis] / count).abs() < 0.05, "{thick} {:?} {spacing:?}", d.spacing);
+        }
+        let close = |a: f64, b: f64| (a - b).abs() < 0.1 * b.abs().max(1.0);
+        assert!(close(d.density[0], density[0]) && close(d.density[1], density[1]), "{:?} {density:?}", d.density);
+        assert_eq!(map.hasty().is_some_and(|w| w.contains("thicker than about")), thick < 0.5, "{:?}", map.hasty());
+    }
 }
