@@ -462,3 +462,26 @@ fn a_region_thinner_than_the_grid_is_judged_inside_it() {
         assert_eq!(map.hasty().is_some_and(|w| w.contains("thicker than about")), thick < 0.5, "{:?}", map.hasty());
     }
 }
+
+/// At faces of a box an axis of the cells that are asked for is along the normal, however far what is asked for within is turned from
+/// it; and the report is that of the map against it.
+#[test]
+fn aligned_cells_are_asked_for_along_the_normal_at_the_surface() {
+    let b = bounds([0.0; 3], [24.0; 3]);
+    let cube = crate::region::Cuboid::new([0.0; 3], [24.0; 3]).expect("box");
+    for angle in [5.0, 20.0, -30.0] {
+        let wanted = Wanted {
+            align: Some(Aligned::new(6.0).expect("depth")),
+            ..about_z(&format!("{angle}"), Grade::Constant(3.0))
+        };
+        let settings = Settings { region: Some(&cube), folds: true, step: None };
+        let map = Phase::solve(&b, &wanted, &settings).expect("solved");
+        let asked = |x: f64| {
+            let k = map.asked(&[[x, 12.0, 12.0]]).expect("asked")[0];
+            (0..3).map(|i| (k[i][0].abs() / norm(k[i])).min(1.0).acos().to_degrees()).fold(90.0, f64::min)
+        };
+        // Half a step of the grid from the surface the normal's share is within 2 % of one.
+        assert!(asked(0.0) < 1e-6 && asked(0.05) < 0.02 * f64::abs(angle), "{angle} {} {}", asked(0.0), asked(0.05));
+        assert!((asked(12.0) - f64::abs(angle)).abs() < 2.0, "{angle} {}", asked(12.0));
+    }
+}
