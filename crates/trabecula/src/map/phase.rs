@@ -22,7 +22,7 @@ use super::remedy::{folded, remedy};
 use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
-use super::stretch::{Stretch, bounded};
+use super::stretch::{MARGINS, Stretch, bounded};
 use super::surface_frames::Aligned;
 use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
@@ -504,9 +504,23 @@ impl Found {
         // The cells of the grid that the region reaches into.
         let reach = norm(laid.grid.step);
         let counts: Vec<bool> = laid.depth.iter().map(|d| *d <= reach).collect();
-        let held = bounded(&problem, &counts, range, &solution);
+        let hold = |margin: f64| -> Result<(Solution, Judged), Fault> {
+            let held = bounded(&problem, &counts, (range, margin), &solution);
+            let judged = Judged::of(laid, wanted, region, &target, &held)?;
+            Ok((held, judged))
+        };
+        let excess = |of: &Judged| if of.fold.is_some() { f64::INFINITY } else { range.excess(of.distortion.stretch) };
+        let (mut held, mut judged) = hold(MARGINS[0])?;
+        for margin in &MARGINS[1..] {
+            if excess(&judged) <= 1.0 {
+                break;
+            }
+            let next = hold(*margin)?;
+            if excess(&next.1) < excess(&judged) {
+                (held, judged) = next;
+            }
+        }
         let weights = problem.weights;
-        let judged = Judged::of(laid, wanted, region, &target, &held)?;
         // What keeps to no range is no worse than what folds.
         let (solution, judged) = match (before.fold, judged.fold) {
             (None, Some(_)) => (solution, before),

@@ -463,6 +463,44 @@ fn a_region_thinner_than_the_grid_is_judged_inside_it() {
     }
 }
 
+/// A range in which cells of the map for a narrower one lie is met.
+#[test]
+fn a_wider_range_is_met_where_a_narrower_one_gives_such_a_map() {
+    let b = bounds([-8.0; 3], [8.0; 3]);
+    let ball = crate::region::Sphere::new([0.0; 3], 8.0).expect("ball");
+    let turned = [
+        [
+            "39.109*sin(0.104*x+0.303*y+0.328*z+5.144)",
+            "28.094*sin(0.252*x+0.282*y+0.236*z+0.202)",
+            "21.229*sin(0.334*x+0.304*y+0.101*z+4.378)",
+        ],
+        [
+            "35.355*sin(0.337*x+0.178*y+0.206*z+1.978)",
+            "48.514*sin(0.307*x+0.202*y+0.237*z+4.731)",
+            "24.325*sin(0.107*x+0.288*y+0.235*z+1.819)",
+        ],
+    ];
+    let mut met = 0;
+    for angles in turned {
+        let made = |range: [f64; 2]| {
+            let wanted = Wanted {
+                stretch: Some(Stretch::new(range).expect("range")),
+                ..Wanted::new([3.0; 3].map(Grade::Constant), Orientation::Angles(angles.map(formula)))
+            };
+            let settings = Settings { region: Some(&ball), folds: true, step: None };
+            Phase::solve(&b, &wanted, &settings).expect("solved")
+        };
+        let wide = Stretch::new([0.67, 1.5]).expect("range");
+        let narrow = made([0.8, 1.25]).distortion().clone();
+        if narrow.density[0] > 0.0 && wide.excess(narrow.stretch) <= 1.0 {
+            met += 1;
+            let found = made([0.67, 1.5]);
+            assert!(found.overstretched().is_none(), "{:?} {:?}", found.distortion().stretch, narrow.stretch);
+        }
+    }
+    assert!(met > 0);
+}
+
 /// At faces of a box an axis of the cells that are asked for is along the normal, however far what is asked for within is turned from
 /// it; and the report is that of the map against it.
 #[test]
