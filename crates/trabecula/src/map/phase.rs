@@ -36,8 +36,9 @@ use geometry::progress::checkpoint;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
 /// The error |∇Φ − K|² of phases of one value, relative to |K|², above which cells round holes are considered though none fold, and the
-/// share of it that is left where they are taken.
-const MISSED: [f64; 2] = [0.25, 0.5];
+/// share of it that is left where they are taken. A grating of three that cannot close misses less than a third: it may follow its target
+/// nearly all the way round, and be torn in one place.
+const MISSED: [f64; 2] = [0.02, 0.5];
 /// The distance over which roots of weights of nodes fall off by e where phases grow round holes, in steps: there edges count by what the
 /// region has of them.
 const SHARP: f64 = 0.5;

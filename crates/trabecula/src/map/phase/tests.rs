@@ -523,3 +523,31 @@ fn aligned_cells_are_asked_for_along_the_normal_at_the_surface() {
         assert!((asked(12.0) - f64::abs(angle)).abs() < 2.0, "{angle} {}", asked(12.0));
     }
 }
+
+/// Hoop and radial directions of a tube under pressure: whole cells go round, as many as fit its mean radius, whatever the cells' size.
+#[test]
+fn whole_cells_go_round_a_tube_of_any_size() {
+    use crate::region::{Cylinder, Difference, Region};
+    let stress = [
+        "((1-146.41/max(x^2+y^2,1))*x^2+(1+146.41/max(x^2+y^2,1))*y^2)/max(x^2+y^2,1)",
+        "((1-146.41/max(x^2+y^2,1))*y^2+(1+146.41/max(x^2+y^2,1))*x^2)/max(x^2+y^2,1)",
+        "0",
+        "0",
+        "0",
+        "-292.82*x*y/max(x^2+y^2,1)^2",
+    ];
+    let tube = Difference::new(vec![
+        Arc::new(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 12.1, 6.5).expect("outer")) as Region,
+        Arc::new(Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], 8.6, 8.5).expect("inner")),
+    ]);
+    let tube = tube.expect("tube");
+    let b = bounds([-12.1, -12.1, 0.0], [12.1, 12.1, 6.5]);
+    for length in [2.6, 2.8, 3.0] {
+        let wanted = Wanted::new([length; 3].map(Grade::Constant), Orientation::Stress(stress.map(formula).into()));
+        let map = Phase::solve(&b, &wanted, &Settings { region: Some(&tube), ..Settings::default() }).expect("solved");
+        let [period] = map.periods() else { panic!("{length}: {:?}", map.distortion()) };
+        let round = period.cells.iter().map(|n| n.abs()).max().expect("three");
+        assert!((round as f64 - TAU * 10.35 / length).abs() < 1.0, "{length}: {period:?}");
+        assert!(map.distortion().angle.iter().all(|a| a.mean < 1.0), "{length}: {:?}", map.distortion().angle);
+    }
+}
