@@ -130,7 +130,12 @@ impl Orientation {
                     None => own,
                 }
             });
-            return Ok(averaged(grid, frames, &averages, range, outside));
+            let mut found = averaged(grid, frames, &averages, range, outside);
+            if let Some(surface) = surface {
+                let pin = |(n, f): (usize, &mut Mat3)| *f = surface.pinned(n, f);
+                found.at_nodes.par_iter_mut().enumerate().for_each(pin);
+            }
+            return Ok(found);
         }
         let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
         match self {

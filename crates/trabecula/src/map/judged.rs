@@ -9,9 +9,10 @@ use super::phase::Wanted;
 use super::phase_grid::Grid;
 use super::phase_target::{Laid, Target, wavelengths};
 use super::solution::Solution;
+use super::surface_feet::feet;
 use crate::field::Field;
 use geometry::fault::Fault;
-use geometry::math::{Mat3, Vec3, add, determinant, scale, sub, transpose};
+use geometry::math::{Mat3, Vec3, add, determinant, norm, scale, sub, transpose};
 use geometry::progress::checkpoint;
 use geometry::random::low_discrepancy;
 
@@ -19,6 +20,8 @@ use geometry::random::low_discrepancy;
 const COMPARED: usize = 60_000;
 /// And most points between nodes.
 const BETWEEN: usize = 30_000;
+/// Points in a region that is thin or small for the grid, of which more are looked for where fewer are found.
+const FEW: usize = 100;
 /// How a solution compares with its target.
 pub(super) struct Judged {
     pub distortion: Distortion,
@@ -28,6 +31,8 @@ pub(super) struct Judged {
     pub missed: f64,
     /// Where det J is not positive.
     pub fold: Option<Vec3>,
+    /// How deep below the surface of the region nodes and points are, mm, at most; infinite without a region.
+    pub deepest: f64,
 }
 
 impl Judged {
@@ -38,7 +43,7 @@ impl Judged {
         target: &Target,
         solution: &Solution,
     ) -> Result<Judged, Fault> {
-        let (Laid { grid, nodes, inside, .. }, wavelength) = (laid, target.wavelength(laid));
+        let (Laid { grid, nodes, inside, depth, .. }, wavelength) = (laid, target.wavelength(laid));
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // The density at every node; the other measures, which cost more, at some tens of thousands.
         let density: Vec<f64> = within
@@ -49,7 +54,7 @@ impl Judged {
             })
             .collect();
         checkpoint();
-        let (compared, between) = compared(grid, inside, region);
+        let (compared, between) = compared(grid, depth, inside, region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
         let mut jacobians: Vec<Mat3> = positions.par_iter().map(|p| solution.jacobian(*p)).collect();
         let cuts = solution.branches.as_ref();
@@ -70,7 +75,8 @@ impl Judged {
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);
         let mut distortion = Distortion {
-            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
+            // Without a node in the region that of the points alone.
+            density: [least.map_or(f64::INFINITY, |n| density[n]), most.map_or(0.0, |n| density[n])],
             least_at: least.map_or(laid.bounds.center(), |n| nodes[within[n]]),
             ..Distortion::of(&found, compared.len(), &curl, turn)
         };
@@ -81,7 +87,9 @@ impl Judged {
         let missed = off / even().map(|(_, k)| squares(k)).sum::<f64>().max(f64::MIN_POSITIVE);
         let worst = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
         let fold = worst.or_else(|| fold_between(solution, inside));
-        Ok(Judged { distortion, jacobians, missed, fold })
+        let at_nodes = depth.iter().fold(0.0, |m: f64, d| m.max(-d));
+        let deepest = values(region, &between).into_iter().fold(at_nodes, |m, d| m.max(-d));
+        Ok(Judged { distortion, jacobians, missed, fold, deepest })
     }
 }
 
@@ -104,26 +112,64 @@ pub(super) fn fold_between(solution: &Solution, inside: &[bool]) -> Option<Vec3>
 }
 
 /// Where a solution is compared with its target: nodes in the region, and points in the region, one in a cell of the grid.
-pub(super) fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<usize>, Vec<Vec3>) {
+pub(super) fn compared(
+    grid: &Grid,
+    depth: &[f64],
+    inside: &[bool],
+    region: Option<&dyn Field>,
+) -> (Vec<usize>, Vec<Vec3>) {
     let within = inside.iter().filter(|i| **i).count().max(1) as f64;
     let some = |most: usize| {
         let keep = most as f64 / within;
         (0..grid.len()).filter(move |n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
     };
-    let far: usize = grid.strides().iter().sum();
-    let cell = |n: &usize| (0..3).all(|a| grid.index(*n)[a] + 1 < grid.shape[a]) && (inside[*n] || inside[n + far]);
+    // The region may reach into a cell though none of its nodes is in it.
+    let reach = norm(grid.step);
+    let cell = |n: &usize| (0..3).all(|a| grid.index(*n)[a] + 1 < grid.shape[a]) && depth[*n] <= reach;
     let off = |n: usize| -> Vec3 {
         let s = low_discrepancy(n + 1);
         core::array::from_fn(|a| grid.node(n)[a] + s[a] * grid.step[a])
     };
     let mut between: Vec<Vec3> = some(BETWEEN).filter(cell).map(off).collect();
     if let Some(region) = region {
-        let mut depth = vec![0.0; between.len()];
-        region.values(&between, &mut depth);
-        let mut depth = depth.into_iter();
-        between.retain(|_| depth.next().is_some_and(|d| d <= 0.0));
+        between = those_in(region, between);
+        if between.len() < FEW {
+            between.extend(scattered(grid, region));
+        }
     }
     (some(COMPARED).filter(|n| inside[*n]).collect(), between)
+}
+
+/// The signed distances of points from a region, if there is one.
+fn values(region: Option<&dyn Field>, points: &[Vec3]) -> Vec<f64> {
+    let mut depth = vec![f64::NEG_INFINITY; points.len()];
+    if let Some(region) = region {
+        region.values(points, &mut depth);
+    }
+    depth
+}
+
+/// Those of the points that are in a region.
+fn those_in(region: &dyn Field, points: Vec<Vec3>) -> Vec<Vec3> {
+    let depth = values(Some(region), &points);
+    points.into_iter().zip(depth).filter(|(_, d)| *d <= 0.0).map(|(p, _)| p).collect()
+}
+
+/// Points throughout a region that is small or thin for a grid; of one that hardly any point hits, those of its surface.
+fn scattered(grid: &Grid, region: &dyn Field) -> Vec<Vec3> {
+    let size = |a: usize| grid.step[a] * (grid.shape[a] - 1) as f64;
+    let at = |i: usize| core::array::from_fn(|a| grid.origin[a] + low_discrepancy(i + 1)[a] * size(a));
+    let tried: Vec<Vec3> = (0..BETWEEN).map(at).collect();
+    let found = those_in(region, tried.clone());
+    if found.len() >= FEW {
+        return found;
+    }
+    let near = |(p, d): (Vec3, f64)| (d <= norm(grid.step)).then_some(p);
+    let depth = values(Some(region), &tried);
+    let on = feet(region, &tried.into_iter().zip(depth).filter_map(near).collect::<Vec<Vec3>>());
+    let off = values(Some(region), &on);
+    let reached = on.into_iter().zip(off).filter(|(_, d)| d.abs() <= 1e-6 * norm(grid.step)).map(|(p, _)| p);
+    found.into_iter().chain(reached).collect()
 }
 
 /// The target gradients at points; `lengths` are the wavelengths at the nodes, where they are not those that are given; `frames` are

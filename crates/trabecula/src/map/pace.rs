@@ -306,6 +306,26 @@ impl<'a> Probe<'a> {
     }
 }
 
+/// A region that is thinner than the grid resolves, `deepest` (mm) below its surface at most, in words.
+pub(super) fn thin(grid: &Grid, deepest: f64) -> Option<String> {
+    let (thick, step) = (2.0 * deepest, grid.step.into_iter().fold(f64::INFINITY, f64::min));
+    if thick >= step {
+        return None;
+    }
+    let size: Vec3 = core::array::from_fn(|a| grid.step[a] * (grid.shape[a] - 1) as f64);
+    let remedy = match rounded_down(0.5 * thick) {
+        finer if thick > 0.0 && count(size.map(|s| nodes_along(s, finer))) <= NODES[1] => {
+            format!("give step = {}, or a thicker region", number(finer))
+        }
+        _ => "use a thicker region".to_string(),
+    };
+    let [thick, step] = [thick, step].map(|v| number((v * 1000.0).round() / 1000.0));
+    Some(format!(
+        "the region is nowhere thicker than about {thick} mm, and nodes of the phase grid are {step} mm apart: the map follows its target \
+         roughly, and its figures are those of few points; {remedy}"
+    ))
+}
+
 /// Whether a wavelength that changes abruptly between two points still does within a four-thousandth of the way: no step carries that.
 fn jumps(of: &Grade, [mut a, mut b]: [Vec3; 2]) -> bool {
     const BISECTIONS: usize = 12;

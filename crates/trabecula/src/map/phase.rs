@@ -22,7 +22,7 @@ use super::remedy::{folded, remedy};
 use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
-use super::stretch::{Stretch, bounded};
+use super::stretch::{MARGINS, Stretch, bounded};
 use super::surface_frames::Aligned;
 use super::winding::Winding;
 use super::{Mapping, Rows, inverse};
@@ -36,8 +36,9 @@ use geometry::progress::checkpoint;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
 /// The error |∇Φ − K|² of phases of one value, relative to |K|², above which cells round holes are considered though none fold, and the
-/// share of it that is left where they are taken.
-const MISSED: [f64; 2] = [0.25, 0.5];
+/// share of it that is left where they are taken. A grating of three that cannot close misses less than a third: it may follow its target
+/// nearly all the way round, and be torn in one place.
+const MISSED: [f64; 2] = [0.02, 0.5];
 /// The distance over which roots of weights of nodes fall off by e where phases grow round holes, in steps: there edges count by what the
 /// region has of them.
 const SHARP: f64 = 0.5;
@@ -259,6 +260,7 @@ impl Phase {
             tried += &distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
+        let hasty = hasty.or_else(|| pace::thin(&laid.grid, found.judged.deepest));
         let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
         let stress_range = target.range;
         let shift = wanted.shift(&mean);
@@ -445,16 +447,17 @@ fn lines(laid: &Laid, wanted: &Wanted, target: &Target) -> Vec<SingularLine> {
     singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
 }
 
-/// The mean of lengths at the nodes in a region; those of the first node if none is.
+/// The mean of lengths at the nodes in a region; of all nodes if none is.
 fn mean_within(inside: &[bool], of: &[Vec3]) -> Vec3 {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
     let (count, sum) = within.fold((0, [0.0; 3]), |(n, s), (_, w)| (n + 1, add(s, *w)));
-    if count == 0 { of[0] } else { scale(sum, 1.0 / f64::from(count)) }
+    if count == 0 { mean_within(&vec![true; of.len()], of) } else { scale(sum, 1.0 / f64::from(count)) }
 }
 
-/// The least and the greatest of the smallest lengths at the nodes in a region.
+/// The least and the greatest of the smallest lengths at the nodes in a region; at all nodes if none is in it.
 fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
-    let within = inside.iter().zip(of).filter(|(inside, _)| **inside);
+    let none = !inside.contains(&true);
+    let within = inside.iter().zip(of).filter(|(inside, _)| **inside || none);
     let smallest = within.map(|(_, w)| w.iter().copied().fold(f64::INFINITY, f64::min));
     smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
 }
@@ -501,9 +504,23 @@ impl Found {
         // The cells of the grid that the region reaches into.
         let reach = norm(laid.grid.step);
         let counts: Vec<bool> = laid.depth.iter().map(|d| *d <= reach).collect();
-        let held = bounded(&problem, &counts, range, &solution);
+        let hold = |margin: f64| -> Result<(Solution, Judged), Fault> {
+            let held = bounded(&problem, &counts, (range, margin), &solution);
+            let judged = Judged::of(laid, wanted, region, &target, &held)?;
+            Ok((held, judged))
+        };
+        let excess = |of: &Judged| if of.fold.is_some() { f64::INFINITY } else { range.excess(of.distortion.stretch) };
+        let (mut held, mut judged) = hold(MARGINS[0])?;
+        for margin in &MARGINS[1..] {
+            if excess(&judged) <= 1.0 {
+                break;
+            }
+            let next = hold(*margin)?;
+            if excess(&next.1) < excess(&judged) {
+                (held, judged) = next;
+            }
+        }
         let weights = problem.weights;
-        let judged = Judged::of(laid, wanted, region, &target, &held)?;
         // What keeps to no range is no worse than what folds.
         let (solution, judged) = match (before.fold, judged.fold) {
             (None, Some(_)) => (solution, before),

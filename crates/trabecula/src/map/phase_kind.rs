@@ -34,8 +34,9 @@ pub struct PhaseKind {
     /// their directions, below 1 to their sizes.
     #[kind(default = 1.0, min = 0.001, max = 1000.0)]
     angle_weight: f64,
-    /// Length over which a direction, a frame or a stress is smoothed, without regard to signs and order, before cells follow it;
-    /// parts of a stress count by how much they differ between directions. None unless given.
+    /// Length over which a direction, a frame or a stress is smoothed before cells follow it. Signs of a direction, of a frame
+    /// from a result and of a stress do not matter, nor does the order of a stress's; a frame of numbers or formulas keeps the
+    /// signs given, which must not flip. Parts of a stress count by how much they differ between directions. None unless given.
     #[kind(unit = "mm", above = 0.0)]
     smooth: Option<f64>,
     /// "surface": an axis of the cell, whichever is nearest, along the normal of the region's surface, and farther in what is asked for

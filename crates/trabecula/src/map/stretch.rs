@@ -30,8 +30,10 @@ const DOUBLED: usize = 10;
 const DEAREST: f64 = 1000.0;
 /// What multipliers keep from step to step: all of it, as for a convex set, makes rotations swing.
 const KEPT: f64 = 0.9;
-/// What the range is narrowed by in the middles of the grid's cells, of its logarithm, so that points off them keep to it.
-const MARGIN: f64 = 0.15;
+/// What the range is narrowed by in the middles of the grid's cells, of its logarithm, so that points off them keep to it: the first, and
+/// more where points do not. What is short of it by less than `SLACK` is enough.
+pub(super) const MARGINS: [f64; 3] = [0.15, 0.35, 0.55];
+const SLACK: f64 = 0.075;
 
 /// The least and the greatest principal stretch of cells: the ratio of a length to the one asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +103,7 @@ impl Stretch {
         let [least, most] = self.range().map(number);
         Some(format!(
             "cells are {found:.2} times as long as asked for at {}, and stretch = [{least}, {most}]: no map that keeps to that range \
-             without folding was found. Give a wider range, or let orientation and wavelength vary more slowly",
+             without folding was found. Let orientation and wavelength vary more slowly, or give a wider range",
             position(at)
         ))
     }
@@ -133,8 +135,13 @@ fn any_normal(v: Vec3) -> Vec3 {
     scale(n, 1.0 / norm(n))
 }
 
-/// The map near to `solution` whose stretches are in a range in the cells of the grid of which a node `counts`.
-pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, solution: &Solution) -> Solution {
+/// The map near to `solution` whose stretches are in a range, narrowed by a `margin`, in the cells of the grid of which a node `counts`.
+pub(super) fn bounded(
+    problem: &Problem,
+    counts: &[bool],
+    (range, margin): (Stretch, f64),
+    solution: &Solution,
+) -> Solution {
     let grid = *solution.grid();
     let mut values = solution.spline.at_nodes();
     let cells = GridCells::new(grid);
@@ -144,7 +151,7 @@ pub(super) fn bounded(problem: &Problem, counts: &[bool], range: Stretch, soluti
     let k: Vec<Mat3> = (0..cells.len()).into_par_iter().map(|c| cells.mean(c, |n| problem.target(n))).collect();
     let counts: Vec<bool> =
         (0..cells.len()).into_par_iter().map(|c| cells.corners(c).iter().any(|n| counts[*n])).collect();
-    let [inner, enough] = [MARGIN, 0.5 * MARGIN].map(|by| range.narrowed(by));
+    let [inner, enough] = [margin, margin - SLACK].map(|by| range.narrowed(by));
     let mut dual = vec![[[0.0; 3]; 3]; cells.len()];
     let mut penalty = 1.0;
     for round in 0..ROUNDS {

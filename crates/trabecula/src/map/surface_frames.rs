@@ -9,10 +9,13 @@ use rayon::prelude::*;
 use super::smooth_frames::Octahedral;
 use crate::field::Field;
 use geometry::fault::{Fault, number};
-use geometry::math::{Mat3, Vec3, cross, norm, scale, transpose};
+use geometry::math::{Mat3, Vec3, add, cross, dot, norm, scale, transpose};
 
 /// The part of the depth over which frames are averaged.
 const AVERAGED: f64 = 0.5;
+/// The angle (degrees) between a normal and the nearest axis up to which that is turned to it, and from which it is not turned at all: as
+/// far from two axes neighbours would turn different ones.
+const CLEAR: [f64; 2] = [25.0, 40.0];
 
 /// Alignment with the surface, within a depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +44,7 @@ impl Aligned {
     /// How much the normal counts at a signed distance from the surface, mm: all of it on the surface and outside, nothing deeper than
     /// the depth.
     fn share(self, distance: f64) -> f64 {
-        let t = (1.0 + distance / self.depth).clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+        smooth_step(1.0 + distance / self.depth)
     }
 }
 
@@ -73,6 +75,44 @@ impl Surface {
             None => asked,
         }
     }
+
+    /// An averaged frame at a node with an axis along the normal at the surface: the average there is between that and what is asked
+    /// for farther in.
+    pub fn pinned(&self, node: usize, frame: &Mat3) -> Mat3 {
+        let (normal, share) = (self.normals[node], self.within.share(self.distance[node]));
+        let size = norm(normal);
+        if size.is_nan() || size < 1e-6 {
+            return *frame;
+        }
+        turned_to(frame, scale(normal, 1.0 / size), share)
+    }
+}
+
+/// The steps from 0 to 1 as a smooth function.
+fn smooth_step(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// A frame whose axis nearest to a unit normal is turned towards it by a `share` of the angle between them, by the least turn.
+fn turned_to(frame: &Mat3, normal: Vec3, share: f64) -> Mat3 {
+    let axes = transpose(frame);
+    let k = (0..3).fold(0, |m, i| if dot(axes[i], normal).abs() > dot(axes[m], normal).abs() { i } else { m });
+    let to = if dot(axes[k], normal) < 0.0 { scale(normal, -1.0) } else { normal };
+    let about = cross(axes[k], to);
+    let (sine, cosine) = (norm(about), dot(axes[k], to));
+    if sine < 1e-12 {
+        return *frame;
+    }
+    let (about, angle) = (scale(about, 1.0 / sine), sine.atan2(cosine));
+    let clear = smooth_step((CLEAR[1] - angle.to_degrees()) / (CLEAR[1] - CLEAR[0]));
+    let (s, c) = (share * clear * angle).sin_cos();
+    // Rodrigues' formula.
+    let turned = axes.map(|v| {
+        let along = scale(about, (1.0 - c) * dot(about, v));
+        add(add(scale(v, c), scale(cross(about, v), s)), along)
+    });
+    transpose(&turned)
 }
 
 /// A frame whose third axis is along a normal.

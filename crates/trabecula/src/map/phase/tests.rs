@@ -3,7 +3,7 @@ use super::super::phase_grid::Grid;
 use super::*;
 use crate::grade::{Formula, Linear};
 use crate::map::Affine;
-use geometry::math::sub;
+use geometry::math::{cross, sub};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -337,7 +337,7 @@ fn misfits_are_those_of_the_report() {
     for wanted in [turned.clone(), laid(stress), laid(bar)] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.solution.grid();
-        let (nodes, between) = compared(&grid, &vec![true; grid.len()], None);
+        let (nodes, between) = compared(&grid, &vec![f64::NEG_INFINITY; grid.len()], &vec![true; grid.len()], None);
         // Every node of a grid as small as this, and a point in every cell.
         assert_eq!(nodes.len(), grid.len());
         assert_eq!(between.len(), grid.shape.map(|n| n - 1).iter().product::<usize>());
@@ -419,4 +419,135 @@ fn a_short_ramp_turns_as_steeply_as_half_a_cell_sees() {
     // 40 degrees within 2 mm of a 4 mm cell; the angle between frames is good to √ε.
     assert!((turn(vec![[11.0, 0.0], [13.0, 40.0]]) - 80.0).abs() < 1e-4);
     assert!((turn(vec![[0.0, 0.0], [24.0, 60.0]]) - 10.0).abs() < 1e-4);
+}
+
+/// A slab between two planes across a ball, of any thickness and slope: what is reported of the map is what it is at points of the slab,
+/// also where no node of the grid is in it, which is said.
+#[test]
+fn a_region_thinner_than_the_grid_is_judged_inside_it() {
+    use crate::region::{HalfSpace, Intersection, Region, Sphere};
+    let mut state = 7;
+    let mut random = || geometry::random::random(&mut state);
+    for (i, thick) in [0.3 / 3f64.sqrt(), 0.02, 0.1, 3.0].into_iter().enumerate() {
+        let normal = if i == 0 { [1.0; 3] } else { [random(), random(), 1.0 + random().abs()] };
+        let unit = scale(normal, 1.0 / norm(normal));
+        let parts: Vec<Region> = vec![
+            Arc::new(HalfSpace::new([0.0; 3], scale(unit, -1.0)).expect("lower")),
+            Arc::new(HalfSpace::new(scale(unit, thick), unit).expect("upper")),
+            Arc::new(Sphere::new([0.0; 3], 10.0).expect("ball")),
+        ];
+        let slab = Intersection::new(parts).expect("slab");
+        let b = bounds([-10.0; 3], [10.0; 3]);
+        let settings = Settings { region: Some(&slab), folds: true, step: None };
+        let map = Phase::solve(&b, &about_z("12*x", Grade::Constant(3.0)), &settings).expect("solved");
+        let across = cross(unit, [1.0, 0.0, 0.0]);
+        let (e, f) = (scale(across, 1.0 / norm(across)), cross(unit, scale(across, 1.0 / norm(across))));
+        let (mut spacing, mut density, mut count) = ([0.0; 3], [f64::INFINITY, 0.0f64], 0.0);
+        for _ in 0..20_000 {
+            let p = add(scale(e, 10.0 * random()), add(scale(f, 10.0 * random()), scale(unit, thick * random().abs())));
+            if slab.value(p) <= 0.0 {
+                let misfit = map.misfits(&[p]).expect("misfit")[0];
+                spacing = add(spacing, misfit.spacing);
+                density = [density[0].min(misfit.density), density[1].max(misfit.density)];
+                count += 1.0;
+            }
+        }
+        let d = map.distortion();
+        for axis in 0..3 {
+            // Of a hundred points at least, whose spread is below a tenth.
+            assert!((d.spacing[axis].mean - spacing[axis] / count).abs() < 0.05, "{thick} {:?} {spacing:?}", d.spacing);
+        }
+        let close = |a: f64, b: f64| (a - b).abs() < 0.1 * b.abs().max(1.0);
+        assert!(close(d.density[0], density[0]) && close(d.density[1], density[1]), "{:?} {density:?}", d.density);
+        assert_eq!(map.hasty().is_some_and(|w| w.contains("thicker than about")), thick < 0.5, "{:?}", map.hasty());
+    }
+}
+
+/// A range in which cells of the map for a narrower one lie is met.
+#[test]
+fn a_wider_range_is_met_where_a_narrower_one_gives_such_a_map() {
+    let b = bounds([-8.0; 3], [8.0; 3]);
+    let ball = crate::region::Sphere::new([0.0; 3], 8.0).expect("ball");
+    let turned = [
+        [
+            "39.109*sin(0.104*x+0.303*y+0.328*z+5.144)",
+            "28.094*sin(0.252*x+0.282*y+0.236*z+0.202)",
+            "21.229*sin(0.334*x+0.304*y+0.101*z+4.378)",
+        ],
+        [
+            "35.355*sin(0.337*x+0.178*y+0.206*z+1.978)",
+            "48.514*sin(0.307*x+0.202*y+0.237*z+4.731)",
+            "24.325*sin(0.107*x+0.288*y+0.235*z+1.819)",
+        ],
+    ];
+    let mut met = 0;
+    for angles in turned {
+        let made = |range: [f64; 2]| {
+            let wanted = Wanted {
+                stretch: Some(Stretch::new(range).expect("range")),
+                ..Wanted::new([3.0; 3].map(Grade::Constant), Orientation::Angles(angles.map(formula)))
+            };
+            let settings = Settings { region: Some(&ball), folds: true, step: None };
+            Phase::solve(&b, &wanted, &settings).expect("solved")
+        };
+        let wide = Stretch::new([0.67, 1.5]).expect("range");
+        let narrow = made([0.8, 1.25]).distortion().clone();
+        if narrow.density[0] > 0.0 && wide.excess(narrow.stretch) <= 1.0 {
+            met += 1;
+            let found = made([0.67, 1.5]);
+            assert!(found.overstretched().is_none(), "{:?} {:?}", found.distortion().stretch, narrow.stretch);
+        }
+    }
+    assert!(met > 0);
+}
+
+/// At faces of a box an axis of the cells that are asked for is along the normal, however far what is asked for within is turned from
+/// it; and the report is that of the map against it.
+#[test]
+fn aligned_cells_are_asked_for_along_the_normal_at_the_surface() {
+    let b = bounds([0.0; 3], [24.0; 3]);
+    let cube = crate::region::Cuboid::new([0.0; 3], [24.0; 3]).expect("box");
+    for angle in [5.0, 20.0, -30.0] {
+        let wanted = Wanted {
+            align: Some(Aligned::new(6.0).expect("depth")),
+            ..about_z(&format!("{angle}"), Grade::Constant(3.0))
+        };
+        let settings = Settings { region: Some(&cube), folds: true, step: None };
+        let map = Phase::solve(&b, &wanted, &settings).expect("solved");
+        let asked = |x: f64| {
+            let k = map.asked(&[[x, 12.0, 12.0]]).expect("asked")[0];
+            (0..3).map(|i| (k[i][0].abs() / norm(k[i])).min(1.0).acos().to_degrees()).fold(90.0, f64::min)
+        };
+        // Half a step of the grid from the surface the normal's share is within 2 % of one.
+        assert!(asked(0.0) < 1e-6 && asked(0.05) < 0.02 * f64::abs(angle), "{angle} {} {}", asked(0.0), asked(0.05));
+        assert!((asked(12.0) - f64::abs(angle)).abs() < 2.0, "{angle} {}", asked(12.0));
+    }
+}
+
+/// Hoop and radial directions of a tube under pressure: whole cells go round, as many as fit its mean radius, whatever the cells' size.
+#[test]
+fn whole_cells_go_round_a_tube_of_any_size() {
+    use crate::region::{Cylinder, Difference, Region};
+    let stress = [
+        "((1-146.41/max(x^2+y^2,1))*x^2+(1+146.41/max(x^2+y^2,1))*y^2)/max(x^2+y^2,1)",
+        "((1-146.41/max(x^2+y^2,1))*y^2+(1+146.41/max(x^2+y^2,1))*x^2)/max(x^2+y^2,1)",
+        "0",
+        "0",
+        "0",
+        "-292.82*x*y/max(x^2+y^2,1)^2",
+    ];
+    let tube = Difference::new(vec![
+        Arc::new(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 12.1, 6.5).expect("outer")) as Region,
+        Arc::new(Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], 8.6, 8.5).expect("inner")),
+    ]);
+    let tube = tube.expect("tube");
+    let b = bounds([-12.1, -12.1, 0.0], [12.1, 12.1, 6.5]);
+    for length in [2.6, 2.8, 3.0] {
+        let wanted = Wanted::new([length; 3].map(Grade::Constant), Orientation::Stress(stress.map(formula).into()));
+        let map = Phase::solve(&b, &wanted, &Settings { region: Some(&tube), ..Settings::default() }).expect("solved");
+        let [period] = map.periods() else { panic!("{length}: {:?}", map.distortion()) };
+        let round = period.cells.iter().map(|n| n.abs()).max().expect("three");
+        assert!((round as f64 - TAU * 10.35 / length).abs() < 1.0, "{length}: {period:?}");
+        assert!(map.distortion().angle.iter().all(|a| a.mean < 1.0), "{length}: {:?}", map.distortion().angle);
+    }
 }
