@@ -44,24 +44,32 @@ impl Built {
         // The error of the volume falls with the square of the step. More than chords cost is nothing that finer steps mend.
         let for_volume = (steps * (off.abs() / most).sqrt()).ceil();
         let for_volume = if only.explicit { for_volume.min((CHORDS / most).sqrt().ceil()) } else { for_volume };
-        let for_pieces = match (broken, only.explicit) {
-            (None, _) => 0,
-            (Some(_), true) => steps_enough(tiling, steps as usize + 1).unwrap_or(0),
-            (Some(_), false) => 2 * steps as usize,
-        };
+        // On a grid, how many pieces finer steps leave cannot be told without making them.
+        let unknown = broken.is_some() && !only.explicit;
+        let for_pieces =
+            broken.filter(|_| !unknown).and_then(|_| steps_enough(tiling, steps as usize + 1)).unwrap_or(0);
         let enough = for_volume.max(for_pieces as f64);
-        if enough <= steps {
+        if enough <= steps && !unknown {
             return None;
         }
         let apart = broken.map_or(String::new(), |p| {
             format!(" and is in {}, the lattice in {}", counted(pieces, "piece"), counted(p, "piece"))
         });
+        let edge_enough = number((1e3 * mean / enough).floor() / 1e3);
+        let advice = match (enough > steps, unknown) {
+            (true, false) => {
+                format!("use an edge of {edge_enough} mm or less, {enough} steps along that of a tetrahedron")
+            }
+            (true, true) => {
+                format!("an edge of {edge_enough} mm or less mends the fraction; still finer ones may join the pieces")
+            }
+            (false, _) => "finer ones may join the pieces, and islands = \"drop\" leaves out the loose ones".into(),
+        };
         Some(format!(
             "steps of {} mm are too coarse: the result has a solid fraction of {found:.4}, the lattice {share:.4} ({:+.1} %){apart}; \
-             use an edge of {} mm or less, {enough} steps along that of a tetrahedron",
+             {advice}",
             number(edge),
             100.0 * off,
-            number((1e3 * mean / enough).floor() / 1e3),
         ))
     }
 }

@@ -61,9 +61,9 @@ fn a_surface_on_a_grid_has_the_volume_asked_for() {
             assert!(case % 3 == 0 && tiled.explicit, "{region}");
             continue;
         };
-        let found = [6.0, 12.0].map(|steps| off(&built, asked, steps));
+        let found = [6.0, 12.0, 13.0, 16.0, 24.0].map(|steps| off(&built, asked, steps));
         println!("{region} {cell} {asked:.3} {map}: {found:.6?}, {why}");
-        // Without the move of the level these are several per cent and about one.
-        assert!(found[0].abs() < 5e-3 && found[1].abs() < 1e-3, "{region} {cell}: {found:?}");
+        // Without the move of the level these are up to thirty per cent and six, and fall with the second to the fourth power of the step.
+        assert!(found[0].abs() < 5e-3 && found[1..].iter().all(|off| off.abs() < 1e-3), "{region} {cell}: {found:?}");
     }
 }
