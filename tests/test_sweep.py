@@ -609,7 +609,7 @@ def test_the_table_is_drawn_with_its_pareto_front(tmp_path: Path):
     done = command("sweep", study, "-o", tmp_path / "out.csv", "--per-cell", 8, *plot)
     assert done.returncode == 0, done.stderr
     drawing = (tmp_path / "out.svg").read_text()
-    assert drawing.count("<circle") == 3 and "Pareto front: fraction min, area_mm2 max" in drawing
+    assert drawing.count("<circle") == 3 and "Pareto front: solid_fraction min, area_mm2 max" in drawing
     again = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "again.svg", *plot)
     assert again.returncode == 0 and (tmp_path / "again.svg").read_text() == drawing
     wrong = command("sweep", tmp_path / "out.csv", "-o", tmp_path / "no.svg", "--plot", "solid_fraction", "colour")

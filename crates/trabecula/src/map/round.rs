@@ -172,9 +172,7 @@ impl Round {
 impl Mapping for Round {
     fn wavelengths(&self) -> [f64; 2] {
         let [a, b] = self.wavelength;
-        // At the line itself cells have no width: the innermost one counts in its middle.
-        let least = self.radii[0].max(0.5 * a);
-        [a.min(b).min(self.arc(least)), a.max(b).max(self.arc(self.radii[2]))]
+        [a.min(b).min(self.arc(self.radii[1])), a.max(b).max(self.arc(self.radii[2]))]
     }
 
     fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
