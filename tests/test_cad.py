@@ -277,8 +277,8 @@ def test_a_bracket_with_open_and_solid_faces(tmp_path):
         tets = solid.volume_mesh(edge=2.0)
     bore = tets.nodes[tets.sets["BORE"].nodes]
     off = np.hypot(bore[:, 1] - 20, bore[:, 2] - 30) - 10
-    # The triangles are 0.017 mm off the bore at most; nodes are off these by the mean distance of chords of 2 mm, two thirds of the
-    # sagitta, which balances the volume.
+    # The triangles are 0.017 mm off the bore at most; nodes are off these by the mean distance of chords of 2 mm, two thirds
+    # of the sagitta, which balances the volume.
     off_most = 0.017 + 2 / 3 * 2**2 / (8 * 10)
     assert len(bore) > 200 and np.abs(off).max() < off_most and np.ptp(bore[:, 0]) == pytest.approx(8.0)
 
