@@ -44,7 +44,7 @@ impl Built {
         // The error of the volume falls with the square of the step. More than chords cost is nothing that finer steps mend.
         let for_volume = (steps * (off.abs() / most).sqrt()).ceil();
         let for_volume = if only.explicit { for_volume.min((CHORDS / most).sqrt().ceil()) } else { for_volume };
-        // On a grid, how many pieces finer steps leave cannot be told without making them.
+        // On a grid, how many pieces finer steps leave is not known without making them.
         let unknown = broken.is_some() && !only.explicit;
         let for_pieces =
             broken.filter(|_| !unknown).and_then(|_| steps_enough(tiling, steps as usize + 1)).unwrap_or(0);

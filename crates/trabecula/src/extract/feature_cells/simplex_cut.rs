@@ -22,9 +22,10 @@ pub(in crate::extract) struct CutVertex {
     pub surfaces: u64,
 }
 
-/// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps: so many of the
-/// least distances that rounding requires (1/512 near the origin), and at most.
+/// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, as a multiple of the least distance
+/// that rounding requires (1/4096 of a grid step near the origin).
 const SHIFT: f64 = 8.0;
+/// The greatest amplitude, in grid steps.
 const MOST_SHIFT: f64 = 1.0 / 8.0;
 
 impl Simplex {
