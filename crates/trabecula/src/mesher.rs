@@ -8,10 +8,10 @@ use crate::grade::Grade;
 use crate::implicit::Surface;
 use crate::region::Region;
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Vec3, add, scale};
+use geometry::math::{Aabb, Vec3};
 use geometry::progress::checkpoint;
+use geometry::tetmesh::TetMesh;
 use geometry::tetmesh::tet_locator::TetLocator;
-use geometry::tetmesh::{TetMesh, volume};
 use rayon::prelude::*;
 
 mod bcc_grid;
@@ -163,17 +163,12 @@ impl Cuts {
             partition.cut(s, cube);
         }
         let (shaping, dropped) = prepared(partition, true);
-        shaped(shaping, cube, &dropped, layers)
+        shaped(shaping, cube, dropped, layers)
     }
 }
 
 /// The mesh with its shapes improved and its layers made.
-fn shaped(
-    mut shaping: Shaping,
-    cube: f64,
-    dropped: &[[Vec3; 4]],
-    layers: Option<&PrismLayers>,
-) -> Result<Background, Fault> {
+fn shaped(mut shaping: Shaping, cube: f64, dropped: f64, layers: Option<&PrismLayers>) -> Result<Background, Fault> {
     let goes_on = || {
         checkpoint();
         true
@@ -188,19 +183,7 @@ fn shaped(
     let made = layers.map(|layers| shaping.layered(layers, MOST)).transpose()?;
     let tets = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
     let mesh = TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact();
-    let left_out = still_missing(&mesh, dropped) + shelled;
-    Ok(Background { mesh, left_out, layers: made })
-}
-
-/// The volume of those of the tetrahedra that were left out whose middles no others cover: nodes that have moved to the edges of the region
-/// since may have filled their place.
-fn still_missing(mesh: &TetMesh, dropped: &[[Vec3; 4]]) -> f64 {
-    if dropped.is_empty() {
-        return 0.0;
-    }
-    let locator = TetLocator::new(mesh);
-    let middle = |t: &[Vec3; 4]| scale(t.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
-    dropped.iter().filter(|t| !locator.covers(middle(t))).map(|t| volume(*t)).sum()
+    Ok(Background { mesh, left_out: dropped + shelled, layers: made })
 }
 
 /// The edges of the lattice's cubes, near the requested one, for which the region's bounding planes are planes of the lattice: of corners

@@ -118,8 +118,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     // Of a periodic cell components hold together by images.
     let one = options.of != Of::All && !options.periodic;
-    let (mut shaping, left_out) = prepared(partition, one);
-    let mut dropped: f64 = left_out.iter().map(|t| tetmesh::volume(*t)).sum();
+    let (mut shaping, mut dropped) = prepared(partition, one);
     if shaping.tets.is_empty() {
         let m = format!(
             "nothing to mesh: no tetrahedron of edge {} mm lies in it; use a smaller edge",

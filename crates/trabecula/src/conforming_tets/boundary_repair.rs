@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use geometry::math::Vec3;
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{FACES, TetMesh, volume};
 
@@ -12,9 +11,9 @@ const FRAGMENT_FRACTION: f64 = 0.01;
 const FRAGMENT_TETS: usize = 100;
 
 /// Removes tetrahedra until no two boundary sheets share a node, and fragments that this or thin walls leave; returns
-/// the corners of the removed ones.
-pub(crate) fn repair(mesh: &mut TetMesh) -> Vec<[Vec3; 4]> {
-    let mut lost = Vec::new();
+/// the removed volume (mm³).
+pub(crate) fn repair(mesh: &mut TetMesh) -> f64 {
+    let mut lost = 0.0;
     loop {
         checkpoint();
         let mut removed = non_manifold(mesh);
@@ -27,7 +26,7 @@ pub(crate) fn repair(mesh: &mut TetMesh) -> Vec<[Vec3; 4]> {
         let mut kept = Vec::with_capacity(mesh.tets.len());
         for (i, t) in (0..).zip(&mesh.tets) {
             if removed.contains(&i) {
-                lost.push(t.map(|n| mesh.nodes[n as usize]));
+                lost += volume(t.map(|n| mesh.nodes[n as usize]));
             } else {
                 kept.push(*t);
             }

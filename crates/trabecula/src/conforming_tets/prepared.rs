@@ -5,19 +5,18 @@ use super::chord_balance::interfaces;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::partition::Partition;
 use super::shaping::Shaping;
-use geometry::math::Vec3;
 use geometry::tetmesh::TetMesh;
 use geometry::union_find::unite;
 use rayon::prelude::*;
 
 /// The cut mesh, ready to be improved: manifold, without fragments, nodes held by the surfaces of their boundary faces alone; and
-/// the corners of the tetrahedra that were left out.
+/// the volume that was left out.
 ///
 /// `one` says that it is one domain whose components do not hold together by images: fragments are left out then.
-pub(crate) fn prepared<'a>(partition: Partition<'a>, one: bool) -> (Shaping<'a>, Vec<[Vec3; 4]>) {
+pub(crate) fn prepared<'a>(partition: Partition<'a>, one: bool) -> (Shaping<'a>, f64) {
     let mut domain = partition.domains();
     let mut tets: Vec<[u32; 4]> = partition.tets.iter().map(|t| t.nodes).collect();
-    let mut dropped = Vec::new();
+    let mut dropped = 0.0;
     let mut faces = interfaces(&tets, &domain, &|n| partition.on[n as usize] != 0);
     if one && (components(&tets, partition.nodes.len()) > 1 || pinched(&faces)) {
         let mut mesh = TetMesh { nodes: partition.nodes.clone(), tets, zones: Vec::new() };
