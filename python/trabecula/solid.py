@@ -550,29 +550,24 @@ class Solid(Seen, Simulated, Resolution):
         check_place(path)
         if apart is not None:
             return self._save_in_ranges(path, edge, per_cell, threads, progress, islands, chord, accept, apart)
-        if self.open_ends:
-            made = self.mesh(edge, per_cell, threads, progress, islands, chord=chord)
+
+        def written(made: Mesh) -> SurfaceReport:
             summary = made.summary()
             accept(summary)
-            made.uncapped().write(path)
+            (made.uncapped() if self.open_ends else made).write(path)
             return summary
+
+        if self.open_ends:
+            return written(self.mesh(edge, per_cell, threads, progress, islands, chord=chord))
         chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None and kind != "stl":
-            made = self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress)
-            summary = made.summary()
-            accept(summary)
-            made.write(path)
-            return summary
+            return written(self.mesh(chord=self._chord(chord, edge, per_cell, islands), threads=threads, progress=progress))
         if chord is not None:
             return self._stream_beams(path, self._chord(chord, edge, per_cell, islands), threads)
         spacing = self.spacing(edge, per_cell)
         self._warn_coarser(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
-            made = self.mesh(spacing, None, threads, progress, islands)
-            summary = made.summary()
-            accept(summary)
-            made.write(path)
-            return summary
+            return written(self.mesh(spacing, None, threads, progress, islands))
         self.check_room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:

@@ -60,7 +60,7 @@ pub(super) fn aimed(built: &Built) -> Option<(&Tiled, [f64; 2])> {
 
 /// By how much the level is moved for steps of `edge` (mm): as was found in these steps, or in longer ones where little was missing.
 pub(super) fn move_at(built: &Built, edge: f64, progress: &dyn Progress) -> Result<f64, Stopped> {
-    let Some((tiled, _)) = aimed(built) else { return Ok(0.0) };
+    let Some((tiled, aim)) = aimed(built) else { return Ok(0.0) };
     let or_edge = |step: f64| if edge > step / NEARLY { edge } else { step };
     let mut step = or_edge(tiled.tiling.wavelength() / STEPS);
     let (mut guess, mut done) = (0.0, 0.0);
@@ -71,7 +71,7 @@ pub(super) fn move_at(built: &Built, edge: f64, progress: &dyn Progress) -> Resu
         let found = match known {
             Some(found) => found,
             None => {
-                let found = found(built, step, guess, &Stage { whole: progress, from: done, to })?;
+                let found = found(built, (tiled, aim), (step, guess), &Stage { whole: progress, from: done, to })?;
                 if let Ok(mut moves) = built.moves.lock() {
                     moves.insert(step.to_bits(), found);
                 }
@@ -106,8 +106,12 @@ fn at(built: &Built, tiled: &Tiled, by: f64) -> Solid {
 }
 
 /// By how much the level is to be moved in steps of this length (mm), from a guess on; not at all where nothing can be measured.
-fn found(built: &Built, step: f64, guess: f64, progress: &dyn Progress) -> Result<Move, Stopped> {
-    let Some((tiled, [aim, off])) = aimed(built) else { return Ok(Move { by: 0.0, share: 0.0 }) };
+fn found(
+    built: &Built,
+    (tiled, [aim, off]): (&Tiled, [f64; 2]),
+    (step, guess): (f64, f64),
+    progress: &dyn Progress,
+) -> Result<Move, Stopped> {
     let share = |k: usize| k as f64 / (ROUNDS + 1) as f64;
     let stage = |k: usize| Stage { whole: progress, from: share(k), to: share(k + 1) };
     let all = region_volume(&built.solid.region, 0.0, &stage(0))?;

@@ -41,8 +41,8 @@ pub(super) struct FeatureMesh {
     pub keys: Vec<VertexId>,
     /// Triangles, and what lies on their sides.
     pub triangles: Vec<([u32; 3], Sides)>,
-    /// The middle of a cell of the tile that self-intersects in single precision whatever is tried.
-    pub muddled: Option<Vec3>,
+    /// The middle of a cell of the tile that self-intersects in single precision in every attempt.
+    pub self_intersection: Option<Vec3>,
 }
 
 impl FeatureMesh {
@@ -50,7 +50,7 @@ impl FeatureMesh {
         self.names.clear();
         self.keys.clear();
         self.triangles.clear();
-        self.muddled = None;
+        self.self_intersection = None;
     }
 }
 
@@ -338,14 +338,14 @@ impl FeatureCells<'_> {
         let before = std::mem::take(&mut *self.extra);
         let inside = |at: [usize; 3]| (0..3).all(|a| own[a].start < at[a] && at[a] < own[a].end);
         for attempt in 1..=ATTEMPTS {
-            let mut muddled = Vec::new();
+            let mut failed = Vec::new();
             let mut first = 0;
             for (c, end) in cells.iter().zip(&ends).filter(|(c, _)| mine(c)) {
                 if self.corners_of(*c).iter().any(|n| self.perturbed_nodes.contains_key(n)) {
                     let from = self.extra.triangles.len();
                     self.cell(*c);
                     if self.self_intersects_rounded(from) {
-                        muddled.push(*c);
+                        failed.push(*c);
                     }
                 } else {
                     for (t, sides) in &before.triangles[first..*end] {
@@ -358,10 +358,10 @@ impl FeatureCells<'_> {
                 }
                 first = *end;
             }
-            let movable = muddled.iter().flat_map(|c| self.corners_of(*c)).filter(|n| inside(self.nodes.at(*n)));
+            let movable = failed.iter().flat_map(|c| self.corners_of(*c)).filter(|n| inside(self.nodes.at(*n)));
             let movable: Vec<usize> = movable.collect();
             if attempt == ATTEMPTS || movable.is_empty() {
-                self.extra.muddled = muddled.first().map(|c| self.center_of(*c));
+                self.extra.self_intersection = failed.first().map(|c| self.center_of(*c));
                 return;
             }
             self.perturbed_nodes.extend(movable.into_iter().map(|n| (n, attempt)));

@@ -117,7 +117,7 @@ impl Grid {
     }
 
     /// What is said of a surface that crosses itself at a position when it is rounded to single precision.
-    pub(super) fn muddled(&self, at: Vec3) -> Fault {
+    pub(super) fn too_far(&self, at: Vec3) -> Fault {
         let finest = at.iter().fold(0.0f64, |m, x| m.max(x.abs())) * f64::from(f32::EPSILON);
         Fault::new(
             "edge",

@@ -300,8 +300,8 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes, &own);
     finish(s, grid, &local, &nodes, &own);
-    if let Some(at) = s.extra.muddled {
-        return Err(grid.muddled(at));
+    if let Some(at) = s.extra.self_intersection {
+        return Err(grid.too_far(at));
     }
     let own_triangles = s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
     Ok((own_triangles || hole.is_some()).then_some(View { s, nodes, grid, local, from, own, hole }))

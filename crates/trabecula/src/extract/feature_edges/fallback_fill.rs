@@ -36,7 +36,7 @@ impl FeatureCells<'_> {
                 return;
             }
         }
-        self.extra.muddled = Some(self.center_of(cell));
+        self.extra.self_intersection = Some(self.center_of(cell));
     }
 
     pub(in crate::extract) fn center_of(&self, cell: [usize; 3]) -> Vec3 {

@@ -139,11 +139,11 @@ impl FeatureCells<'_> {
     fn is_filled(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) -> bool {
         let first = self.extra.triangles.len();
         self.fill(cell, surface, bases, tets);
-        let is_muddled = self.self_intersects_rounded(first);
-        if is_muddled {
+        let failed = self.self_intersects_rounded(first);
+        if failed {
             self.extra.triangles.truncate(first);
         }
-        !is_muddled
+        !failed
     }
 
     /// The boundary loop of a patch without the points where other surfaces cross it, and the numbers of its points.
