@@ -52,9 +52,11 @@ impl Built {
         if enough <= steps && !unknown {
             return None;
         }
-        let apart = broken.map_or(String::new(), |p| {
-            format!(" and is in {}, the lattice in {}", counted(pieces, "piece"), counted(p, "piece"))
-        });
+        let of_volume = (off.abs() > most)
+            .then(|| format!("has a solid fraction of {found:.4}, the lattice {share:.4} ({:+.1} %)", 100.0 * off));
+        let apart =
+            broken.map(|p| format!("is in {}, the lattice in {}", counted(pieces, "piece"), counted(p, "piece")));
+        let wrong: Vec<String> = of_volume.into_iter().chain(apart).collect();
         let edge_enough = number((1e3 * mean / enough).floor() / 1e3);
         let advice = match (enough > steps, unknown) {
             (true, false) => {
@@ -65,11 +67,6 @@ impl Built {
             }
             (false, _) => "finer ones may join the pieces, and islands = \"drop\" leaves out the loose ones".into(),
         };
-        Some(format!(
-            "steps of {} mm are too coarse: the result has a solid fraction of {found:.4}, the lattice {share:.4} ({:+.1} %){apart}; \
-             {advice}",
-            number(edge),
-            100.0 * off,
-        ))
+        Some(format!("steps of {} mm are too coarse: the result {}; {advice}", number(edge), wrong.join(" and ")))
     }
 }
