@@ -1,13 +1,20 @@
 //! Self-intersection of a mesh, decided exactly for its f64 coordinates.
 
 use core::sync::atomic::{AtomicUsize, Ordering};
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use super::exact::{drop_axis, orient2d, orient3d, plane_axis};
 use crate::bvh::{Bvh, Split};
-use crate::math::{Aabb, Vec3};
+use crate::math::{Aabb, Vec3, cross, dot, norm, sub, unit};
 use crate::mesh::{Mesh, degenerate};
+use crate::progress::{Cancellation, checkpoint};
+
+/// The number of triangles at a vertex above which those of it are compared by their directions from it: their boxes all touch there.
+const FAN: usize = 64;
+/// More than the rounding of unit vectors.
+const ROUNDING: f64 = 1e-14;
 
 /// The number of pairs of triangles that meet elsewhere than in their common vertices or edge, or `limit` if there
 /// are at least this many.
@@ -16,56 +23,138 @@ use crate::mesh::{Mesh, degenerate};
 /// other, a triangle given twice. Triangles without area are left out (`defects` counts them). Vertices are common
 /// when they have the same index.
 pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
-    let (boxes, tree) = tree(mesh, 0.0);
     let found = AtomicUsize::new(0);
-    tree.order().par_chunks(256).for_each(|part| {
-        for &i in part {
-            if found.load(Ordering::Relaxed) >= limit {
-                return;
+    let near = Near::new(mesh, 0.0);
+    near.pairs(
+        |i, j| {
+            if meet(mesh, i, j) {
+                found.fetch_add(1, Ordering::Relaxed);
             }
-            let b = &boxes[i as usize];
-            tree.overlapping(b, |near| {
-                for &j in near {
-                    if j > i && b.touches(&boxes[j as usize]) && meet(mesh, i as usize, j as usize) {
-                        found.fetch_add(1, Ordering::Relaxed);
-                    }
-                }
-            });
-        }
-    });
+            None::<()>
+        },
+        || found.load(Ordering::Relaxed) >= limit,
+    );
     found.into_inner().min(limit)
 }
 
 /// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
-/// same for any number of threads. Triangles without area are left out.
+/// same for any number of threads. Triangles without area are left out, and pairs of a vertex of many triangles that lie in directions from
+/// it that are farther apart than the margin is anywhere on them.
 pub fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) -> Option<T> + Sync) -> Vec<T> {
-    let (boxes, tree) = tree(mesh, margin);
-    let found: Vec<Vec<T>> = tree
-        .order()
-        .par_chunks(256)
-        .map(|part| {
+    Near::new(mesh, margin).pairs(f, || false)
+}
+
+/// Boxes of triangles, and the vertices of many.
+struct Near<'a> {
+    mesh: &'a Mesh,
+    margin: f64,
+    boxes: Vec<Aabb>,
+    /// Triangles with area.
+    tree: Bvh,
+    /// Vertices of many triangles, and these triangles; by vertex.
+    fans: Vec<(u32, Vec<u32>)>,
+    /// Whether a vertex is one of those.
+    is_fan: Vec<bool>,
+}
+
+impl<'a> Near<'a> {
+    fn new(mesh: &'a Mesh, margin: f64) -> Near<'a> {
+        let all = (0..mesh.triangles.len()).into_par_iter();
+        let boxes: Vec<Aabb> = all.clone().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
+        let items: Vec<u32> = all.filter(|&i| !degenerate(mesh, i)).map(|i| i as u32).collect();
+        let mut count = vec![0usize; mesh.vertices.len()];
+        let at = |i: &u32| mesh.triangles[*i as usize];
+        items.iter().flat_map(at).for_each(|v| count[v as usize] += 1);
+        let is_fan: Vec<bool> = count.iter().map(|n| *n > FAN).collect();
+        let mut fans: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for i in &items {
+            at(i).into_iter().filter(|v| is_fan[*v as usize]).for_each(|v| fans.entry(v).or_default().push(*i));
+        }
+        let tree = Bvh::new(&boxes, items, Split::Median);
+        Near { mesh, margin, boxes, tree, fans: fans.into_iter().collect(), is_fan }
+    }
+
+    /// What `f` makes of each pair, in an order that is the same for any number of threads, until there is `enough`.
+    fn pairs<T: Send>(&self, f: impl Fn(usize, usize) -> Option<T> + Sync, enough: impl Fn() -> bool + Sync) -> Vec<T> {
+        let cancellation = Cancellation::current();
+        let found = (self.tree.order().par_chunks(256)).map(|part| {
             let mut found = Vec::new();
             for &i in part {
-                let b = &boxes[i as usize];
-                tree.overlapping(b, |near| {
-                    let near = near.iter().filter(|j| **j > i);
-                    let touching = near.filter(|j| b.touches(&boxes[**j as usize]));
-                    found.extend(touching.filter_map(|j| f(i as usize, *j as usize)));
+                if enough() {
+                    break;
+                }
+                cancellation.enter(checkpoint);
+                let b = &self.boxes[i as usize];
+                self.tree.overlapping(b, |near| {
+                    let near = near.iter().filter(|j| **j > i && b.touches(&self.boxes[**j as usize]));
+                    let apart = near.filter(|j| self.common_fan(i, **j).is_none());
+                    found.extend(apart.filter_map(|j| f(i as usize, *j as usize)));
                 });
             }
             found
-        })
-        .collect();
-    found.into_iter().flatten().collect()
-}
+        });
+        let mut found: Vec<Vec<T>> = found.collect();
+        for (vertex, triangles) in &self.fans {
+            found.extend(self.fan_pairs(*vertex, triangles, &f, &enough, &cancellation));
+        }
+        found.into_iter().flatten().collect()
+    }
 
-/// The boxes of all triangles, grown by `margin` (mm), and the tree over those of triangles with area.
-fn tree(mesh: &Mesh, margin: f64) -> (Vec<Aabb>, Bvh) {
-    let all = (0..mesh.triangles.len()).into_par_iter();
-    let boxes: Vec<Aabb> = all.clone().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
-    let items = all.filter(|&i| !degenerate(mesh, i)).map(|i| i as u32).collect();
-    let tree = Bvh::new(&boxes, items, Split::Median);
-    (boxes, tree)
+    /// The first of the vertices of many triangles that two triangles share.
+    fn common_fan(&self, i: u32, j: u32) -> Option<u32> {
+        let (s, t) = (self.mesh.triangles[i as usize], self.mesh.triangles[j as usize]);
+        s.into_iter().filter(|v| self.is_fan[*v as usize] && t.contains(v)).min()
+    }
+
+    /// The pairs of the triangles at a vertex: they meet elsewhere only if there is a direction from it that is in both, so that the arcs of
+    /// their far edges on the unit sphere meet.
+    fn fan_pairs<T: Send>(
+        &self,
+        vertex: u32,
+        triangles: &[u32],
+        f: &(impl Fn(usize, usize) -> Option<T> + Sync),
+        enough: &(impl Fn() -> bool + Sync),
+        cancellation: &Cancellation,
+    ) -> Vec<Vec<T>> {
+        let arcs: Vec<Aabb> = triangles.par_iter().map(|i| self.arc(vertex, *i)).collect();
+        let tree = Bvh::new(&arcs, (0..triangles.len() as u32).collect(), Split::Median);
+        let pairs = |part: &[u32]| {
+            let mut found = Vec::new();
+            for &a in part {
+                if enough() {
+                    break;
+                }
+                cancellation.enter(checkpoint);
+                let i = triangles[a as usize];
+                let b = &arcs[a as usize];
+                tree.overlapping(b, |near| {
+                    let near = near.iter().filter(|c| triangles[**c as usize] > i && b.touches(&arcs[**c as usize]));
+                    let here = near.map(|c| triangles[*c as usize]).filter(|j| self.common_fan(i, *j) == Some(vertex));
+                    found.extend(here.filter_map(|j| f(i as usize, j as usize)));
+                });
+            }
+            found
+        };
+        tree.order().par_chunks(256).map(pairs).collect()
+    }
+
+    /// The box of the directions from a vertex of a triangle into it: of an arc, which rises above its chord c by 1 − √(1 − c²/4) ≤ c²/4,
+    /// grown by the angle at which the margin is seen from the vertex at the far edge.
+    fn arc(&self, vertex: u32, triangle: u32) -> Aabb {
+        let t = self.mesh.triangles[triangle as usize];
+        let k = (0..3).find(|k| t[*k] == vertex).unwrap_or(0);
+        let [o, a, b] = [0, 1, 2].map(|l| self.mesh.vertices[t[(k + l) % 3] as usize]);
+        let (a, b) = (sub(a, o), sub(b, o));
+        let far = norm(cross(a, b)) / norm(sub(b, a));
+        let (a, b) = (unit(a), unit(b));
+        let chord = sub(b, a);
+        let grown = 0.25 * dot(chord, chord) + 2.0 * self.margin / far + ROUNDING;
+        if grown.is_finite() {
+            Aabb::EMPTY.with(a).with(b).grown(grown)
+        } else {
+            Aabb { min: [-2.0; 3], max: [2.0; 3] }
+        }
+    }
 }
 
 pub(super) fn bounds(corners: [Vec3; 3]) -> Aabb {
@@ -80,6 +169,7 @@ pub fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
     let common = |k: &usize| t.contains(&s[*k]);
     let alone = |k: &usize| !s.contains(&t[*k]);
     match (0..3).filter(common).count() {
+        0 if apart(p, q) => false,
         0 => (0..3).any(|k| crosses(p[k], p[(k + 1) % 3], q) || crosses(q[k], q[(k + 1) % 3], p)),
         1 => {
             // The common part is convex and holds the common vertex; if it is more, a ray from that vertex leaves one
@@ -104,6 +194,25 @@ pub fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
         }
         _ => true,
     }
+}
+
+/// Whether two triangles are surely apart: on different sides of a plane along a face, or along an edge of each, by more than rounding.
+fn apart(p: [Vec3; 3], q: [Vec3; 3]) -> bool {
+    let edges = |t: [Vec3; 3]| [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])];
+    let (e, g) = (edges(p), edges(q));
+    let own = p.map(|v| sub(v, p[0]));
+    let other = q.map(|v| sub(v, p[0]));
+    let size = own.iter().chain(&other).flatten().fold(0.0f64, |m, c| m.max(c.abs()));
+    // Any direction will do, so that only differences of positions and products with it are rounded: 7 roundings of at most three terms.
+    let splits = |n: Vec3| {
+        let slack = 16.0 * f64::EPSILON * size * (n[0].abs() + n[1].abs() + n[2].abs());
+        let range = |t: &[Vec3; 3]| {
+            t.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(dot(n, *v)), hi.max(dot(n, *v))])
+        };
+        let ([low, high], [from, to]) = (range(&own), range(&other));
+        from > high + slack || low > to + slack
+    };
+    splits(cross(e[0], e[1])) || splits(cross(g[0], g[1])) || e.iter().any(|a| g.iter().any(|b| splits(cross(*a, *b))))
 }
 
 /// Whether the segment a b meets the triangle t (with area), ends and edges included.
@@ -245,6 +354,40 @@ mod tests {
         assert_eq!(self_intersections(&crossing, 3), 3);
         let touching = join(&[cube([0.0; 3], 1.0), cube([1.0, 0.0, 0.0], 1.0)]);
         assert!(self_intersections(&touching, 1000) > 0);
+    }
+
+    /// A cone over a polygon of many sides, in a random place; a fold or a fin at its apex or its rim is found as for few sides.
+    #[test]
+    fn fans_are_judged_as_other_triangles() {
+        let n = 4 * FAN as u32;
+        let mut state = 3u64;
+        let mut next = || crate::random::random(&mut state);
+        let (apex, base) = ([next(), next(), 3.0 + next()], [next(), next(), next()]);
+        let mut cone = Mesh { vertices: vec![apex, base], triangles: Vec::new() };
+        for k in 0..n {
+            let (sine, cosine) = (f64::from(k) / f64::from(n) * core::f64::consts::TAU).sin_cos();
+            cone.vertices.push([base[0] + 2.0 * cosine, base[1] + 2.0 * sine, base[2]]);
+            let (a, b) = (2 + k, 2 + (k + 1) % n);
+            cone.triangles.extend([[0, a, b], [1, b, a]]);
+        }
+        let all_pairs = |mesh: &Mesh| {
+            let all = 0..mesh.triangles.len();
+            all.clone()
+                .flat_map(|i| all.clone().map(move |j| (i, j)))
+                .filter(|(i, j)| i < j && meet(mesh, *i, *j))
+                .count()
+        };
+        assert_eq!(self_intersections(&cone, usize::MAX), 0);
+        assert_eq!(all_pairs(&cone), 0);
+        for (move_vertex, by) in [(2, [0.0, 0.3, 0.0]), (40, [-0.2, 0.1, 0.4]), (1, [0.0, 0.0, 4.0])] {
+            let mut bent = cone.clone();
+            let v = &mut bent.vertices[move_vertex];
+            *v = crate::math::add(*v, by);
+            let found = self_intersections(&bent, usize::MAX);
+            assert_eq!(found, all_pairs(&bent), "{move_vertex}");
+            assert_eq!(near_pairs(&bent, 0.0, |i, j| meet(&bent, i, j).then_some(())).len(), found);
+            assert!(found > 0, "{move_vertex}");
+        }
     }
 
     #[test]
