@@ -379,9 +379,10 @@ impl Interval {
 }
 
 impl Interval {
-    /// The range of a product.
+    /// The range of a product. The factors themselves are finite, so nothing times an infinite end is nothing.
     pub fn times(self, o: Self) -> Self {
-        let ends = [self.lo * o.lo, self.lo * o.hi, self.hi * o.lo, self.hi * o.hi];
+        let times = |p: f64, q: f64| if p == 0.0 || q == 0.0 { 0.0 } else { p * q };
+        let ends = [times(self.lo, o.lo), times(self.lo, o.hi), times(self.hi, o.lo), times(self.hi, o.hi)];
         Interval::new(
             ends.into_iter().fold(f64::INFINITY, f64::min),
             ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
@@ -437,6 +438,27 @@ pub fn root([mut a, mut b]: [f64; 2], mut x: f64, rising: bool, near: [f64; 2], 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_product_of_ranges_holds_the_products() {
+        let ends = [f64::NEG_INFINITY, -2.0, 0.0, 0.5, f64::INFINITY];
+        let all = || {
+            ends.into_iter()
+                .flat_map(|lo| ends.into_iter().map(move |hi| Interval::new(lo, hi)))
+                .filter(|i| i.lo <= i.hi)
+        };
+        for a in all() {
+            for b in all() {
+                let product = a.times(b);
+                assert!(product.lo <= product.hi, "{a:?} {b:?}");
+                for p in [-2.0, 0.0, 0.5, 1e9].into_iter().filter(|p| a.lo <= *p && *p <= a.hi) {
+                    for q in [-2.0, 0.0, 0.5, 1e9].into_iter().filter(|q| b.lo <= *q && *q <= b.hi) {
+                        assert!(product.lo <= p * q && p * q <= product.hi, "{a:?} {b:?}");
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn exponentials() {

@@ -64,6 +64,9 @@ pub enum RegionKind {
     Offset(offset::OffsetKind),
 }
 
+/// How far from the origin a region may reach, mm: a thousand kilometres.
+pub(crate) const FARTHEST: f64 = 1e9;
+
 /// A kind of region, as it is declared.
 pub(crate) trait BuildRegion {
     /// The region. Errors name the key; ranges are checked here.

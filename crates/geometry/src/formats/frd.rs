@@ -11,6 +11,9 @@ use super::text::{Lines, shown};
 use super::vtk::{Array, Data, Shape, fault};
 use crate::fault::{Fault, counted};
 
+/// Most components of a result.
+const COMPONENTS: usize = 64;
+
 /// Reads the mesh of a file and, of its results, the numbers of the array `name`: "STRESS" is that of the last step, "STRESS@2"
 /// that of the second. All arrays are listed, the others without numbers.
 ///
@@ -148,7 +151,15 @@ impl File<'_> {
             match field(line, 0, 3) {
                 b"-4" => array.name = String::from_utf8_lossy(field(line, 5, 8)).into_owned(),
                 // What is computed from others, such as the length of a vector, does not stand in the file.
-                b"-5" => array.components += usize::from(field(line, 33, 5) != b"1"),
+                b"-5" => {
+                    array.components += usize::from(field(line, 33, 5) != b"1");
+                    if array.components > COMPONENTS || !array.values.is_empty() {
+                        let message = format!(
+                            "line {at}: a result has at most {COMPONENTS} components, listed before its values"
+                        );
+                        return Err(fault(message));
+                    }
+                }
                 head => {
                     if !self.wants(&array.name, step) {
                         continue;

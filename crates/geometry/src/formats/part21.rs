@@ -281,11 +281,11 @@ pub fn string(text: &str) -> String {
             '\'' => out.push_str("''"),
             '\\' => out.push_str("\\\\"),
             ' '..='~' => out.push(c),
-            _ => {
-                out.push_str("\\X2\\");
-                c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| out.push_str(&format!("{unit:04X}")));
-                out.push_str("\\X0\\");
-            }
+            // Two bytes a character, or four: surrogates are none.
+            _ => out.push_str(&match u32::from(c) {
+                code @ ..0x10000 => format!("\\X2\\{code:04X}\\X0\\"),
+                code => format!("\\X4\\{code:08X}\\X0\\"),
+            }),
         }
     }
     out.push('\'');
@@ -327,5 +327,6 @@ mod tests {
     fn strings_are_printable_ascii() {
         assert_eq!(string("a 'b' \\"), "'a ''b'' \\\\'");
         assert_eq!(string("Ø"), "'\\X2\\00D8\\X0\\'");
+        assert_eq!(string("𝜆"), "'\\X4\\0001D706\\X0\\'");
     }
 }

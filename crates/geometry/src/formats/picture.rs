@@ -9,8 +9,9 @@ use tiff::tags::Tag;
 
 use crate::fault::Fault;
 
-/// Most pixels of a picture.
+/// Most pixels of a picture, and of all pictures of a file.
 const MOST: usize = 1 << 28;
+const MOST_IN_ALL: usize = 1 << 30;
 
 /// A grey picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +79,7 @@ fn png_fault(e: DecodingError) -> Fault {
 }
 
 fn read_png(bytes: &[u8]) -> Result<Picture, Fault> {
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: MOST });
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: 8 * MOST });
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let mut reader = decoder.read_info().map_err(png_fault)?;
@@ -160,9 +161,14 @@ fn check_ends(file: &mut Tiff, most: usize) -> Result<(), Fault> {
 fn read_tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
     let bytes = as_black_is_zero(bytes)?;
     let mut file = open_tiff(&bytes)?;
-    let mut pictures = Vec::new();
+    let (mut pictures, mut pixels) = (Vec::new(), 0);
     loop {
         check_ends(&mut file, bytes.len())?;
+        let (width, height) = file.dimensions().map_err(tiff_fault)?;
+        pixels += check_size([width as usize, height as usize])?;
+        if pixels > MOST_IN_ALL {
+            return Err(fault(format!("pictures of more than {MOST_IN_ALL} pixels in all, the most that are read")));
+        }
         pictures.push(tiff_picture(&mut file)?);
         if !file.more_images() {
             return Ok(pictures);
@@ -174,7 +180,6 @@ fn read_tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
 fn tiff_picture(file: &mut Tiff) -> Result<Picture, Fault> {
     let (width, height) = file.dimensions().map_err(tiff_fault)?;
     let size = [width as usize, height as usize];
-    check_size(size)?;
     let tiff::ColorType::Gray(bits) = file.colortype().map_err(tiff_fault)? else {
         return Err(fault("a TIFF in colours; a grade needs grey ones"));
     };

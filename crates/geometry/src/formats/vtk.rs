@@ -90,6 +90,9 @@ pub fn read_vtk(bytes: &[u8]) -> Result<Data, Fault> {
     xml(bytes)
 }
 
+/// Most numbers of an array that are read: two gibibytes.
+const MOST: usize = 1 << 28;
+
 /// A `DataArray` element, not yet decoded.
 struct Raw<'a> {
     name: String,
@@ -308,22 +311,24 @@ pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(),
 }
 
 fn decode(r: &Raw, layout: &Layout) -> Result<Vec<f64>, Fault> {
+    if r.format == "ascii" {
+        let words = r.text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        return words
+            .map(|w| super::text::parse(w).ok_or_else(|| fault(format!("{} is not a number", shown(w)))))
+            .collect();
+    }
+    let kind = scalar(&r.kind)?;
+    let most = MOST * kind.width();
     let bytes = match r.format.as_str() {
-        "ascii" => {
-            let words = r.text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-            return words
-                .map(|w| super::text::parse(w).ok_or_else(|| fault(format!("{} is not a number", shown(w)))))
-                .collect();
-        }
-        "binary" => blocks(&unbase64(r.text, layout)?, layout)?,
+        "binary" => blocks(&unbase64(r.text, layout)?, layout, most)?,
         "appended" => {
             let (all, base64) = layout.appended.ok_or_else(|| fault("the file has no appended data"))?;
             let from = all.get(r.offset..).ok_or_else(|| fault("its data begin after the end of the file"))?;
-            if base64 { blocks(&unbase64(from, layout)?, layout)? } else { blocks(from, layout)? }
+            if base64 { blocks(&unbase64(from, layout)?, layout, most)? } else { blocks(from, layout, most)? }
         }
         other => return Err(fault(format!("the format \"{other}\" is not known"))),
     };
-    Ok(scalar(&r.kind)?.decode(&bytes, layout.big))
+    Ok(kind.decode(&bytes, layout.big))
 }
 
 /// A type by its name.
@@ -351,8 +356,8 @@ fn header(bytes: &[u8], at: usize, layout: &Layout) -> Result<usize, Fault> {
     Ok(Scalar::Unsigned(width).decode(b, layout.big)[0] as usize)
 }
 
-/// The bytes behind a header: their number, or the blocks that they are compressed in.
-fn blocks(bytes: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
+/// The bytes behind a header, `most` of them at most: their number, or the blocks that they are compressed in.
+fn blocks(bytes: &[u8], layout: &Layout, most: usize) -> Result<Vec<u8>, Fault> {
     let width = if layout.wide { 8 } else { 4 };
     let cut = || fault("its data end early: truncated");
     if !layout.zlib {
@@ -366,9 +371,14 @@ fn blocks(bytes: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
     for i in 0..count {
         let end = at.checked_add(header(bytes, 3 + i, layout)?).ok_or_else(cut)?;
         let block = bytes.get(at..end).ok_or_else(cut)?;
+        let left = (most - out.len()) as u64;
         flate2::read::ZlibDecoder::new(block)
+            .take(left + 1)
             .read_to_end(&mut out)
             .map_err(|e| fault(format!("its compressed data are damaged: {e}")))?;
+        if out.len() > most {
+            return Err(fault(format!("it inflates to more than {MOST} numbers, the most that are read")));
+        }
         at = end;
     }
     Ok(out)
@@ -494,6 +504,11 @@ mod tests {
         let mut packed = Vec::new();
         flate2::read::ZlibEncoder::new(&values[..], flate2::Compression::default()).read_to_end(&mut packed).unwrap();
         let heads: Vec<u8> = [1u32, 32, 0, packed.len() as u32].iter().flat_map(|v| v.to_le_bytes()).collect();
+        // No more is inflated than may be, whatever the header says.
+        let layout = Layout { zlib: true, ..Layout::default() };
+        let both = [&heads[..], &packed].concat();
+        assert_eq!(blocks(&both, &layout, 32).unwrap(), values);
+        assert!(blocks(&both, &layout, 31).unwrap_err().message.contains("inflates to more than"));
         // Other arrays are ASCII still; the compressor is named for the file.
         let text = format!("{}{}", base64(&heads), base64(&packed));
         let zlib = inline

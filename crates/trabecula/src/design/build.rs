@@ -17,14 +17,11 @@ use crate::environment::{self, Environment};
 use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
-use crate::region::{Notes, Region};
+use crate::region::{FARTHEST, Notes, Region};
 use crate::solid::Solid;
 use crate::truss::Beams;
 use geometry::fault::number;
 use geometry::math::Vec3;
-
-/// How far from the origin a region may reach, mm: a thousand kilometres.
-const FARTHEST: f64 = 1e9;
 
 impl From<PartSpec> for Part {
     fn from(p: PartSpec) -> Part {

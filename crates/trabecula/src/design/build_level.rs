@@ -437,7 +437,11 @@ fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, environment: &Env
             *(if solid { &mut count } else { &mut open }) += 1;
         }
     }
-    let k = ((target * values.len() as f64) as usize).min(values.len() - 1);
+    let Some(last) = values.len().checked_sub(1) else {
+        let message = "no position within the region was found, which is a tiny share of its bounds; give a level by iso or thickness";
+        return Err(message.into());
+    };
+    let k = ((target * values.len() as f64) as usize).min(last);
     if k + open >= values.len() {
         return Err(format!(
             "the void cores of singular lines leave {:.4} of the part; ask for less than that, {} is too much",

@@ -340,6 +340,9 @@ mod tests {
         let normals = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
         let tetrahedron = Intersection::new(normals.map(side).to_vec()).unwrap().bounds();
         assert!((0..3).all(|a| (tetrahedron.min[a] + 12.0).abs() < 1e-9 && (tetrahedron.max[a] - 12.0).abs() < 1e-9));
+        let far = |n: Vec3| -> Region { Arc::new(HalfSpace::new(n.map(|v| 8e6 + v), n).unwrap()) };
+        let tetrahedron = Intersection::new(normals.map(far).to_vec()).unwrap().bounds();
+        assert!(tetrahedron.is_finite() && tetrahedron.min[0] > 7.9e6, "{tetrahedron:?}");
         let open = Intersection::new(normals[..3].iter().map(|n| side(*n)).collect()).unwrap().bounds();
         assert!(!open.is_finite() && !open.is_empty());
         let apart = [side([1.0, 1.0, 0.0]), Arc::new(HalfSpace::new([9.0; 3], [-1.0, -1.0, 0.0]).unwrap())];

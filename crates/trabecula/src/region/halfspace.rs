@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, coordinate_axis, direction, field, fill_rows, flat};
-use super::{BuildRegion, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, FARTHEST, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -80,10 +80,12 @@ impl HalfSpace {
 }
 
 /// A distance (mm) beyond all parts.
-const FAR: f64 = 1e7;
+const FAR: f64 = 4.0 * FARTHEST;
+/// Sines of angles between planes and lines below which they count as parallel: a hundred times the rounding of their normals.
+const PARALLEL: f64 = 1e-13;
 
-/// The bounds of an intersection of half-spaces, infinite where it has no end: of the corners that planes make, those of a large box
-/// included.
+/// The bounds of an intersection of half-spaces, infinite where it has no end: those of what is left of the lines in which two planes meet,
+/// the planes of a large box included.
 pub(super) fn polyhedron_bounds(sides: &[HalfSpace]) -> Aabb {
     let mut planes: Vec<(Vec3, f64)> = sides.iter().map(|s| (s.normal, dot(s.normal, s.point))).collect();
     for a in 0..3 {
@@ -94,15 +96,25 @@ pub(super) fn polyhedron_bounds(sides: &[HalfSpace]) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for (i, p) in planes.iter().enumerate() {
         for (j, q) in planes.iter().enumerate().take(i) {
-            for r in &planes[..j] {
-                let six = dot(p.0, cross(q.0, r.0));
-                let sum =
-                    add(scale(cross(q.0, r.0), p.1), add(scale(cross(r.0, p.0), q.1), scale(cross(p.0, q.0), r.1)));
-                let corner = scale(sum, 1.0 / six);
-                let slack = 1e-9 * (1.0 + norm(corner));
-                if six.abs() > 1e-9 && planes.iter().all(|s| dot(s.0, corner) <= s.1 + slack) {
-                    bounds = bounds.with(corner);
+            let along = cross(p.0, q.0);
+            let square = dot(along, along);
+            if square <= PARALLEL {
+                continue;
+            }
+            let from = scale(add(scale(cross(q.0, along), p.1), scale(cross(along, p.0), q.1)), 1.0 / square);
+            let along = scale(along, 1.0 / square.sqrt());
+            let slack = 1e-12 * (1.0 + norm(from));
+            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+            for (_, r) in planes.iter().enumerate().filter(|(k, _)| *k != i && *k != j) {
+                let (rise, left) = (dot(r.0, along), r.1 - dot(r.0, from));
+                match rise {
+                    _ if rise.abs() <= PARALLEL => high = if left < -slack { f64::NEG_INFINITY } else { high },
+                    0.0.. => high = high.min(left / rise),
+                    _ => low = low.max(left / rise),
                 }
+            }
+            if low <= high + slack {
+                bounds = bounds.with(add(from, scale(along, low))).with(add(from, scale(along, high)));
             }
         }
     }

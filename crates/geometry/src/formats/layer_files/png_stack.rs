@@ -88,8 +88,13 @@ impl Pictures<'_> {
         // The first day that ZIP knows: the bytes depend on the content alone.
         let options = SimpleFileOptions::default().compression_method(method).last_modified_time(DateTime::default());
         let Some(archive) = &mut self.archive else { return Ok(()) };
-        archive.start_file(name, options)?;
-        archive.write_all(bytes)
+        let written =
+            archive.start_file(name, options).map_err(io::Error::from).and_then(|()| archive.write_all(bytes));
+        if written.is_err() {
+            // Dropped, it would try to finish the archive and print what that fails with.
+            core::mem::forget(self.archive.take());
+        }
+        written
     }
 
     fn manifest(&self) -> String {

@@ -221,9 +221,8 @@ impl Operation {
             Add => tidy(Interval::new(a.lo + b.lo, a.hi + b.hi)),
             Subtract => tidy(a - b),
             Multiply => {
-                // The arguments themselves are finite, so nothing times an infinite end is nothing.
-                let times = |p: f64, q: f64| if p == 0.0 || q == 0.0 { 0.0 } else { p * q };
-                hull([times(a.lo, b.lo), times(a.lo, b.hi), times(a.hi, b.lo), times(a.hi, b.hi)])
+                let product = a.times(b);
+                hull([product.lo, product.hi, product.lo, product.hi])
             }
             Divide if has(b, 0.0) => ALL,
             Divide => corners(),
