@@ -306,3 +306,32 @@ def test_keep_zones_are_walls_of_a_flow(tmp_path):
         for name in ("KEEP_bolt", "LATTICE", "X0")
     }
     assert kinds == {"KEEP_bolt": "wall", "LATTICE": "wall", "X0": "patch"}
+
+
+@pytest.mark.parametrize("of", ["pore", "all"])
+def test_all_of_a_keep_zones_wall_is_in_its_set(tmp_path, of):
+    """The wall of a fluid at a round bolt that runs through the part: what the lattice leaves of the bolt's surface."""
+    radius, height = 1.5, 8
+    bolt = lt.region.cylinder(base=[0, 0, 0], radius=radius, height=height)
+    design = lt.Design(
+        lt.region.cylinder(base=[0, 0, 0], radius=5, height=height),
+        lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4), lt.level.fraction(0.3)),
+        keep={"bolt": bolt},
+    )
+    solid = design.build()
+    mesh = solid.volume_mesh(per_cell=12, of=of)
+    faces = mesh.sets["KEEP_bolt"].faces
+    walls = np.array([mesh.elements[e][[c for c in range(4) if c != k]] for e, k in faces])
+    middle = mesh.nodes[walls].mean(axis=1)
+    on = np.abs(np.hypot(middle[:, 0], middle[:, 1]) - radius) < 0.02  # a chord of 0.3 mm is 8 µm high
+    assert on.all() if of == "pore" else on.any()
+    a, b, c = np.moveaxis(mesh.nodes[walls[on]], 1, 0)
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    turn, z = np.meshgrid((np.arange(720) + 0.5) * np.pi / 360, (np.arange(400) + 0.5) * height / 400)
+    lattice = lt.Design(lt.region.cylinder(base=[0, 0, 0], radius=5, height=height), design.lattice).build()
+    at = np.stack([1.0001 * radius * np.cos(turn), 1.0001 * radius * np.sin(turn), z], axis=-1)
+    free = (lattice.field(at.reshape(-1, 3)) > 0).mean()
+    assert area == pytest.approx(free * 2 * np.pi * radius * height, rel=0.01)
+    if of == "pore":
+        mesh.write(tmp_path / "case.foam")
+        assert "REST" not in (tmp_path / "constant" / "polyMesh" / "boundary").read_text()

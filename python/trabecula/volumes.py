@@ -244,7 +244,7 @@ class VolumeMesh(FiniteElements):
         X0 X1 Y0 Y1 Z0 Z1: faces on the bounding planes of a region with such planes, each also for each of several domains as
         DOMAIN_X0. CUT: faces on the region's boundary. LATTICE: faces on the lattice's own surface; between solid and pore
         they belong to the solid. Nodes and tetrahedra are those of the faces. SKIN, KEEP_NAME: all nodes and tetrahedra of a
-        skin or keep zone, and their faces on the boundary.
+        skin or keep zone, and their faces on the boundary and towards a fluid; of a fluid its faces on them.
         """
         return self._named_sets()
 

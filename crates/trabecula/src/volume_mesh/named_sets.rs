@@ -54,13 +54,22 @@ pub(super) fn add_sets(
     let middle = |t: &[u32; 4]| scale(t.iter().fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize])), 0.25);
     let middles: Vec<Vec3> = mesh.tets.par_iter().map(middle).collect();
     let mut first = domains.region;
+    let is_solid = matches!(domains.names.first(), Some(&("SOLID" | "WALL")));
     for (body, name) in domains.filled.iter().zip(bodies) {
         let own = below(first + body.surfaces.len()) & !below(first);
         first += body.surfaces.len();
+        if !is_solid {
+            // Of a fluid the body is a wall; tetrahedra next to it may be within it by a part of a chord's height.
+            let wall = faces.iter().filter(|(_, set, _)| set & region == 0 && set & own != 0).map(|f| f.0).collect();
+            push(mesh, name.clone(), wall);
+            continue;
+        }
         let mut values = vec![0.0; middles.len()];
         values.par_chunks_mut(1024).zip(middles.par_chunks(1024)).for_each(|(v, p)| body.values(p, v));
         let within = |t: u32| values[t as usize] < 0.0 && mesh.domain[t as usize] == 0;
-        let of: Vec<(u32, u8)> = faces.iter().filter(|(f, _, outer)| *outer && within(f.0)).map(|f| f.0).collect();
+        // Its faces towards a fluid are on its surfaces.
+        let is_on = |(f, set, outer): &&((u32, u8), SurfaceSet, bool)| (*outer || set & own != 0) && within(f.0);
+        let of: Vec<(u32, u8)> = faces.iter().filter(is_on).map(|f| f.0).collect();
         let elements: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| within(*t)).collect();
         if !elements.is_empty() {
             let nodes = nodes_of(elements.iter().flat_map(|t| {
@@ -68,10 +77,6 @@ pub(super) fn add_sets(
                 mesh.tets[*t as usize].into_iter().chain(middles.into_iter().flatten())
             }));
             mesh.sets.push(FeSet { name: name.clone(), nodes, elements, faces: of, bulk: true });
-        } else {
-            // Of a fluid the body is a wall.
-            let wall = faces.iter().filter(|(_, set, _)| set & region == 0 && set & own != 0).map(|f| f.0).collect();
-            push(mesh, name.clone(), wall);
         }
     }
 }
