@@ -22,6 +22,10 @@ SCATTER = [(0.0, 0.0, 0.2), (5.0, 0.5, 0.5), (1.5, 4.0, 0.35), (6.0, 3.5, 0.6)]
 # in two orders of its components.
 TURN = {"direction": (1, 0, 1), "stress_vtk": (2, 2, 2, 0, 0, 1), "stress_voigt": (2, 2, 2, 0, 1, 0)}
 
+# The same three axes, as two arrays of axes.vtu whose order and signs change from point to point.
+ORDERS = [(0, 2, 1, 1), (1, 0, -1, 1), (2, 1, 1, -1), (0, 1, -1, -1), (2, 0, 1, 1), (1, 2, 1, -1), (0, 2, -1, 1), (1, 0, 1, 1)]
+AXES = np.array([(1, 0, -1), (0, 1, 0), (1, 0, 1)])
+
 
 def plate(y, z):
     """The numbers of plate.npy at its nodes y = 0, 2, 4, 6 and z = 0, 2, 4."""
@@ -158,6 +162,8 @@ def main():
     nodes, tets = blocks((1, 1, 1), 8.0)
     same = {name: np.tile(v, (len(nodes), 1)) for name, v in TURN.items()}
     (FILES / "turn.vtu").write_text(vtu(nodes - 4.0, tets, **same), encoding="utf-8")
+    mixed = {name: np.array([o[2 + k] * AXES[o[k]] for o in ORDERS]) for k, name in enumerate(("first", "third"))}
+    (FILES / "axes.vtu").write_text(vtu(nodes - 4.0, tets, **mixed), encoding="utf-8")
     rows = [",".join(f"{v:g}" for v in (*point, *TURN["stress_voigt"])) for point in nodes - 4.0]
     (FILES / "turn.csv").write_text("\n".join(["x,y,z,s11,s22,s33,s23,s13,s12", *rows]) + "\n", encoding="utf-8")
     (FILES / "block.vtu").write_text(vtu(*blocks((2, 1, 1), 4.0)), encoding="utf-8")

@@ -42,7 +42,7 @@ pub use rbf::Rbf;
 pub use region_step::region_step;
 pub use remapped::Remapped;
 pub use result::FieldKind;
-pub(crate) use result::{lines, several};
+pub(crate) use result::{lines, pairs, several};
 pub use samples::Samples;
 pub(crate) use scattered::TableKind;
 pub use sigmoid::{Sigmoid, SigmoidKind};

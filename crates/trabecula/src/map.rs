@@ -47,6 +47,7 @@ mod sweep_kind;
 pub(crate) mod tet_map;
 mod tets_kind;
 mod tilt;
+mod two_axes;
 mod winding;
 
 pub use affine::{Affine, Skew};
@@ -64,6 +65,7 @@ pub use surface_frames::Aligned;
 pub use sweep::{Path, Sweep};
 pub use tet_map::Tets;
 pub use tets_kind::{Ends, Joined, LayersSpec, MadeTetsKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind};
+pub use two_axes::TwoAxes;
 
 use std::sync::Arc;
 

@@ -207,13 +207,32 @@ fn grades<const N: usize>(made: Vec<Samples>) -> [Grade; N] {
     core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0)))
 }
 
-/// Numbers made from each tuple of an array, on grids over the region: `choose` gives how many, and each from the tuple and its index.
-fn columns<F: Fn(&[f64], usize) -> f64>(
-    spec: &FieldKind,
+/// Coefficients made of the directions of two arrays of vectors together, at the file's own points; `None` where they are not arrays of
+/// the same points or cells of one file, or two directions are parallel.
+pub(crate) fn pairs<const N: usize>(
+    [first, second]: [&FieldKind; 2],
     path: &str,
     environment: &Environment,
-    choose: impl Fn(&formats::Array) -> Result<(usize, F), DesignError>,
-) -> Result<Vec<Samples>, DesignError> {
+    make: impl Fn(Vec3, Vec3) -> Option<[f64; N]>,
+) -> Result<Option<[Grade; N]>, DesignError> {
+    if first.path != second.path || first.unit != second.unit {
+        return Ok(None);
+    }
+    let ((shape, a), (_, b)) = (loaded(first, path, environment)?, loaded(second, path, environment)?);
+    if [a.components, b.components] != [3, 3] || a.of_cells != b.of_cells || a.values.len() != b.values.len() {
+        return Ok(None);
+    }
+    let vector = |t: &[f64]| [t[0], t[1], t[2]];
+    let both = a.values.chunks_exact(3).zip(b.values.chunks_exact(3));
+    let Some(made) = both.map(|(a, b)| make(vector(a), vector(b))).collect::<Option<Vec<[f64; N]>>>() else {
+        return Ok(None);
+    };
+    let values = (0..N).map(|c| made.iter().map(|m| m[c]).collect()).collect();
+    on_grids(first, path, environment, shape, a.of_cells, values).map(|made| Some(grades(made)))
+}
+
+/// The shape of a file's data, and the array that is meant.
+fn loaded(spec: &FieldKind, path: &str, environment: &Environment) -> Result<(Shape, formats::Array), DesignError> {
     let at = format!("{path}.path");
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let kind = extension(&spec.path);
@@ -237,27 +256,52 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
         );
         return Err(DesignError::new(format!("{path}.array"), message));
     }
+    Ok((data.shape, array.clone()))
+}
+
+/// Numbers made from each tuple of an array, on grids over the region: `choose` gives how many, and each from the tuple and its index.
+fn columns<F: Fn(&[f64], usize) -> f64>(
+    spec: &FieldKind,
+    path: &str,
+    environment: &Environment,
+    choose: impl Fn(&formats::Array) -> Result<(usize, F), DesignError>,
+) -> Result<Vec<Samples>, DesignError> {
+    let (shape, array) = loaded(spec, path, environment)?;
+    let (count, number) = choose(&array)?;
+    let column = |c: usize| array.values.chunks_exact(array.components).map(|t| number(t, c)).collect::<Vec<f64>>();
+    on_grids(spec, path, environment, shape, array.of_cells, (0..count).map(column).collect())
+}
+
+/// Numbers at the points or cells of a file, a list for each grid over the region.
+fn on_grids(
+    spec: &FieldKind,
+    path: &str,
+    environment: &Environment,
+    shape: Shape,
+    of_cells: bool,
+    columns: Vec<Vec<f64>>,
+) -> Result<Vec<Samples>, DesignError> {
+    let at = format!("{path}.path");
+    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let uncovered = |what: &str, share: f64, reach: Aabb| {
         let ask = if spec.unit.is_none() { "; is that its unit? give another as unit, such as \"m\"" } else { "" };
         let message = format!("{}{ask}", not_covered(&spec.path, what, share, &reach));
         DesignError::new(&at, message).found(&spec.path)
     };
     let unit = spec.unit.map_or(1.0, Unit::in_mm);
-    let (count, number) = choose(array)?;
-    let column = |c: usize| array.values.chunks_exact(array.components).map(|t| number(t, c)).collect::<Vec<f64>>();
-    let (points, tets, of): (Vec<Vec3>, _, _) = match data.shape {
+    let (points, tets, of): (Vec<Vec3>, _, _) = match shape {
         Shape::Mesh(elements) => {
             let (tets, of) = elements.tets();
             (elements.points.into_iter().map(|p| scale(p, unit)).collect(), tets, of)
         }
         Shape::Image { origin, step, nodes } => {
             let (origin, step) = (scale(origin, unit), scale(step, unit));
-            let (origin, shape) = if array.of_cells {
+            let (origin, shape) = if of_cells {
                 (core::array::from_fn(|a| origin[a] + 0.5 * step[a]), nodes.map(|n| n.saturating_sub(1).max(1)))
             } else {
                 (origin, nodes)
             };
-            let made = (0..count).map(|c| Samples::new(origin, step, shape, column(c)));
+            let made = columns.into_iter().map(|own| Samples::new(origin, step, shape, own));
             let made = made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong)?;
             return match made.iter().map(|of| (of.uncovered(environment.points), of.bounds())).next() {
                 Some((share, reach)) if share > 0.0 => Err(uncovered("grid", share, reach)),
@@ -266,10 +310,9 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
         }
     };
     // Values of cells go to their corners, weighted by volume.
-    let values: Vec<Vec<f64>> = (0..count)
-        .map(|c| {
-            let own = column(c);
-            if !array.of_cells {
+    let values: Vec<Vec<f64>> = (columns.into_iter())
+        .map(|own| {
+            if !of_cells {
                 return own;
             }
             let (mut sum, mut weight) = (vec![0.0; points.len()], vec![0.0; points.len()]);

@@ -10,8 +10,9 @@ use super::load_cases::Stress;
 use super::phase_grid::Grid;
 use super::principal::{Principal, range};
 use super::singular_lines::Alike;
-use super::smooth_frames::{Averages, LEAST_AVERAGE, Octahedral, Smoothing};
+use super::smooth_frames::{LEAST_AVERAGE, Octahedral, Smoothing};
 use super::surface_frames::Surface;
+use super::two_axes::TwoAxes;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number, position};
 use geometry::math::{
@@ -26,13 +27,8 @@ pub enum Orientation {
     Angles([Grade; 3]),
     /// The third axis along a vector, by the least turn from z. The vector's sign and length do not matter.
     Direction(Axis),
-    /// The first and the third axis along two vectors: the third exactly, the first as nearly as it can.
-    Frame {
-        /// The first axis.
-        x: Axis,
-        /// The third axis.
-        z: Axis,
-    },
+    /// The first and the third axis along two vectors.
+    Frame(TwoAxes),
     /// The axes along the principal directions of a stress.
     Stress(Stress),
 }
@@ -47,52 +43,57 @@ pub enum Axis {
     Line([Grade; 6]),
 }
 
+/// The least cosine of an axis that is given and one of a combed frame that it stands for.
+const MEANT: f64 = 0.9;
+
 impl Axis {
+    /// What axes without signs are made to agree with first.
+    const UP: Vec3 = [1e-6, 1e-3, 1.0];
+
     /// Unit vectors at points; those of lines have arbitrary signs.
-    fn vectors(&self, points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
+    pub(super) fn vectors(&self, points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
         match self {
             Axis::Vector(of) => vectors(of, points, key),
             Axis::Line(of) => along(&columns(of, points, key)?, points, key),
         }
     }
 
-    fn is_constant(&self) -> bool {
+    pub(super) fn is_constant(&self) -> bool {
         match self {
             Axis::Vector(of) => constant(of),
             Axis::Line(of) => constant(of),
         }
     }
 
-    /// Unit vectors at the nodes of a grid, smoothed; of lines with the signs that neighbours have.
-    fn at_nodes(
-        &self,
-        grid: &Grid,
-        nodes: &[Vec3],
-        key: &str,
-        smoothing: Option<&Smoothing>,
-        outside: Option<&[f64]>,
-    ) -> Result<Vec<Vec3>, Fault> {
-        let mut found = self.vectors(nodes, key)?;
-        let own = smoothing.map(|_| found.clone());
-        if let Some(smoothing) = smoothing {
-            let tensors: Vec<[f64; 6]> = found.iter().map(|v| square(*v)).collect();
-            let averages = smoothing.axes(grid, &tensors);
-            let size = |t: &[f64; 6]| t[0] + t[1] + t[2];
-            let least = LEAST_AVERAGE * averages.iter().map(size).fold(0.0, f64::max);
-            // Far from the region nothing is left of the averages: a node there keeps its own direction.
-            let kept =
-                averages.into_iter().zip(tensors).map(|(mean, own)| if size(&mean) > least { mean } else { own });
-            found = along(&kept.collect::<Vec<_>>(), nodes, key)?;
-        }
-        match (self, own) {
-            (Axis::Vector(_), None) => {}
-            // A vector keeps the sign that it was given.
-            (Axis::Vector(_), Some(own)) => {
-                found.iter_mut().zip(&own).for_each(|(v, own)| *v = toward(*v, *own));
+    /// Whether a unit vector is what is given at one of the points.
+    pub(super) fn meaning(&self, points: &[Vec3], key: &str) -> Result<Box<dyn Fn(usize, Vec3) -> bool + Sync>, Fault> {
+        Ok(match self {
+            Axis::Vector(_) => {
+                let given = self.vectors(points, key)?;
+                Box::new(move |n, v| dot(given[n], v) > MEANT)
             }
-            (Axis::Line(_), _) => comb(grid, &mut found, first_in(outside, |_| 1.0), |_, v, to| toward(*v, *to)),
-        }
-        Ok(found)
+            Axis::Line(of) => {
+                let given = columns(of, points, key)?;
+                Box::new(move |n, v| {
+                    let [xx, yy, zz, yz, xz, xy] = given[n];
+                    let [x, y, z] = square(v).as_chunks::<3>().0[0];
+                    let [p, q, r] = square(v).as_chunks::<3>().0[1];
+                    let along = xx * x + yy * y + zz * z + 2.0 * (yz * p + xz * q + xy * r);
+                    along > MEANT * MEANT * (xx + yy + zz)
+                })
+            }
+        })
+    }
+
+    /// Unit vectors at the nodes of a grid, smoothed, of arbitrary signs.
+    fn smoothed(&self, grid: &Grid, nodes: &[Vec3], key: &str, smoothing: &Smoothing) -> Result<Vec<Vec3>, Fault> {
+        let tensors: Vec<[f64; 6]> = self.vectors(nodes, key)?.iter().map(|v| square(*v)).collect();
+        let averages = smoothing.axes(grid, &tensors);
+        let size = |t: &[f64; 6]| t[0] + t[1] + t[2];
+        let least = LEAST_AVERAGE * averages.iter().map(size).fold(0.0, f64::max);
+        // Far from the region nothing is left of the averages: a node there keeps its own direction.
+        let kept = averages.into_iter().zip(tensors).map(|(mean, own)| if size(&mean) > least { mean } else { own });
+        along(&kept.collect::<Vec<_>>(), nodes, key)
     }
 }
 
@@ -121,21 +122,25 @@ impl Orientation {
         surface: Option<&Surface>,
         outside: Option<&[f64]>,
     ) -> Result<Frames, Fault> {
-        if let (Some(smoothing), true) = (smoothing, surface.is_some() || matches!(self, Orientation::Stress(_))) {
-            let (frames, gaps, range) = self.asked(grid, nodes, outside)?;
-            let averages = smoothing.frames(grid, |n| {
-                let own = Octahedral::of(&frames[n], &gaps(n));
-                match surface {
-                    Some(surface) => surface.mixed(n, own),
-                    None => own,
-                }
+        let octahedral = surface.is_some() || matches!(self, Orientation::Stress(_) | Orientation::Frame(_));
+        if let (Some(smoothing), true) = (smoothing, octahedral) {
+            let (own, range) = self.asked(grid, nodes, outside)?;
+            let averages = smoothing.frames(grid, |n| match surface {
+                Some(surface) => surface.mixed(n, own(n)),
+                None => own(n),
             });
-            let mut found = averaged(grid, frames, &averages, range, outside);
+            let mut found = vec![IDENTITY; nodes.len()];
+            let confidence = first_in(outside, |n| averages.confidence(n));
+            let start =
+                comb(grid, &mut found, confidence, |n, _| averages.first(n), |n, _, to| averages.settled(n, to));
             if let Some(surface) = surface {
                 let pin = |(n, f): (usize, &mut Mat3)| *f = surface.pinned(n, f);
-                found.at_nodes.par_iter_mut().enumerate().for_each(pin);
+                found.par_iter_mut().enumerate().for_each(pin);
             }
-            return Ok(found);
+            if let Orientation::Frame(of) = self {
+                found = of.labelled(found, nodes, start)?;
+            }
+            return Ok(Frames { at_nodes: found, trust: Some(averages.trust()), range });
         }
         let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
         match self {
@@ -147,41 +152,50 @@ impl Orientation {
                 sure(angles.into_iter().map(rotation).collect())
             }
             Orientation::Direction(of) => {
-                let mut along = of.at_nodes(grid, nodes, "direction", smoothing, outside)?;
-                comb(grid, &mut along, first_in(outside, |_| 1.0), |_, v, to| toward(*v, *to));
+                let mut along = match smoothing {
+                    Some(smoothing) => of.smoothed(grid, nodes, "direction", smoothing)?,
+                    None => of.vectors(nodes, "direction")?,
+                };
+                let up = |_: usize, v: &Vec3| toward(*v, Axis::UP);
+                comb(grid, &mut along, first_in(outside, |_| 1.0), up, |_, v, to| toward(*v, *to));
                 sure(along.into_iter().map(turned_from_z).collect())
             }
-            Orientation::Frame { x, z } => {
-                let x = x.at_nodes(grid, nodes, "frame.x", smoothing, outside)?;
-                sure(squared(x, z.at_nodes(grid, nodes, "frame.z", smoothing, outside)?, nodes)?)
-            }
+            Orientation::Frame(of) => sure(of.at_nodes(grid, nodes, outside)?),
             Orientation::Stress(_) => {
                 let (found, range) = self.ranged(nodes, outside)?;
                 let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
                 let least = |n: usize| found[n].gaps().into_iter().map(|g| g / range).fold(f64::INFINITY, f64::min);
                 let turns = cube();
-                comb(grid, &mut frames, first_in(outside, least), |n, f, to| {
-                    settled(f, &found[n].own_gaps(range), to, &turns)
-                });
+                let agree = |n: usize, f: &Mat3, to: &Mat3| settled(f, &found[n].own_gaps(range), to, &turns);
+                comb(grid, &mut frames, first_in(outside, least), |n, f| agree(n, f, &IDENTITY), agree);
                 Ok(Frames { at_nodes: frames, trust: None, range })
             }
         }
     }
 
-    /// The frames that are asked for at nodes, without regard to signs and order; how far apart principal values are, relative to the
-    /// range of those in the part; and that range. Where cells are not turned at all, nothing is asked for.
-    fn asked(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<Asked, Fault> {
-        if let Orientation::Stress(_) = self {
-            let (found, range) = self.ranged(nodes, outside)?;
-            let frames = found.iter().map(|p| p.frame).collect();
-            return Ok((frames, Box::new(move |n| scale(found[n].gaps(), 1.0 / range)), range));
+    /// The frames that are asked for at nodes, without signs and order, and the range of a stress in the part. Where cells are not turned
+    /// at all, nothing is asked for.
+    fn asked(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Asked, f64), Fault> {
+        match self {
+            Orientation::Stress(_) => {
+                let (found, range) = self.ranged(nodes, outside)?;
+                let own = move |n: usize| Octahedral::of(&found[n].frame, &scale(found[n].gaps(), 1.0 / range));
+                Ok((Box::new(own), range))
+            }
+            Orientation::Frame(of) => {
+                let all = of.polynomials(nodes)?;
+                Ok((Box::new(move |n| all[n].clone()), 0.0))
+            }
+            Orientation::Angles(_) | Orientation::Direction(_) => {
+                let gaps = match self {
+                    Orientation::Angles(of) if of.iter().all(|a| a.constant() == Some(0.0)) => [0.0; 3],
+                    Orientation::Direction(_) => [0.0, 0.0, 1.0],
+                    _ => [1.0; 3],
+                };
+                let frames = self.frames(grid, nodes, None, None, outside)?.at_nodes;
+                Ok((Box::new(move |n| Octahedral::of(&frames[n], &gaps)), 0.0))
+            }
         }
-        let gaps = match self {
-            Orientation::Angles(of) if of.iter().all(|a| a.constant() == Some(0.0)) => [0.0; 3],
-            Orientation::Direction(_) => [0.0, 0.0, 1.0],
-            _ => [1.0; 3],
-        };
-        Ok((self.frames(grid, nodes, None, None, outside)?.at_nodes, Box::new(move |_| gaps), 0.0))
     }
 
     /// The principal directions of a stress, and the range of its values in the part.
@@ -202,7 +216,7 @@ impl Orientation {
         match self {
             Orientation::Angles(of) => constant(of),
             Orientation::Direction(of) => of.is_constant(),
-            Orientation::Frame { x, z } => x.is_constant() && z.is_constant(),
+            Orientation::Frame(of) => of.is_constant(),
             Orientation::Stress(of) => of.is_constant(),
         }
     }
@@ -211,21 +225,14 @@ impl Orientation {
     pub(super) fn alike(&self) -> Alike {
         match self {
             Orientation::Direction(_) => Alike::Line,
-            Orientation::Stress(_) => Alike::Turned(cube()),
-            Orientation::Frame { .. } if self.is_combed() => {
-                Alike::Turned(cube().into_iter().filter(|t| (0..3).all(|a| t[a][a] != 0.0)).collect())
-            }
-            Orientation::Angles(_) | Orientation::Frame { .. } => Alike::Turned(vec![IDENTITY]),
+            Orientation::Frame(_) | Orientation::Stress(_) => Alike::Turned(cube()),
+            Orientation::Angles(_) => Alike::Turned(vec![IDENTITY]),
         }
     }
 
     /// Whether signs or axes are chosen so that neighbours agree.
     pub(super) fn is_combed(&self) -> bool {
-        match self {
-            Orientation::Angles(_) => false,
-            Orientation::Frame { x, z } => [x, z].iter().any(|a| matches!(a, Axis::Line(_))),
-            Orientation::Direction(_) | Orientation::Stress(_) => true,
-        }
+        !matches!(self, Orientation::Angles(_))
     }
 
     /// The key that it is given by.
@@ -233,7 +240,7 @@ impl Orientation {
         match self {
             Orientation::Angles(_) => "rotate",
             Orientation::Direction(_) => "direction",
-            Orientation::Frame { .. } => "frame",
+            Orientation::Frame(_) => "frame",
             Orientation::Stress(_) => "stress",
         }
     }
@@ -247,14 +254,6 @@ impl Orientation {
     /// The frames at points; where signs and axes are not given, those nearest to `like`. `range` is that of a stress
     /// in the part.
     pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3], range: f64) -> Result<Vec<Mat3>, Fault> {
-        let signed = |of: &Axis, key: &str, axis: usize| -> Result<Vec<Vec3>, Fault> {
-            let mut found = of.vectors(points, key)?;
-            if matches!(of, Axis::Line(_)) {
-                let like = like.iter().map(|l| [l[0][axis], l[1][axis], l[2][axis]]);
-                found.iter_mut().zip(like).for_each(|(v, l)| *v = toward(*v, l));
-            }
-            Ok(found)
-        };
         match self {
             Orientation::Angles(of) => {
                 let angles = columns(of, points, "rotate")?;
@@ -264,7 +263,7 @@ impl Orientation {
                 let along = of.vectors(points, "direction")?.into_iter().zip(like);
                 Ok(along.map(|(v, l)| turned_from_z(toward(v, [l[0][2], l[1][2], l[2][2]]))).collect())
             }
-            Orientation::Frame { x, z } => squared(signed(x, "frame.x", 0)?, signed(z, "frame.z", 2)?, points),
+            Orientation::Frame(of) => of.near(points, like),
             Orientation::Stress(of) => {
                 let (found, turns) = (of.principal(points)?, cube());
                 if range == 0.0 {
@@ -277,16 +276,8 @@ impl Orientation {
     }
 }
 
-/// Frames combed to their averages.
-fn averaged(grid: &Grid, frames: Vec<Mat3>, averages: &Averages, range: f64, outside: Option<&[f64]>) -> Frames {
-    let mut frames = frames;
-    let confidence = first_in(outside, |n| averages.confidence(n));
-    comb(grid, &mut frames, confidence, |n, _, to| averages.settled(n, to));
-    Frames { at_nodes: frames, trust: Some(averages.trust()), range }
-}
-
-/// Frames at nodes, the gaps of each and the range of a stress.
-type Asked = (Vec<Mat3>, Box<dyn Fn(usize) -> Vec3>, f64);
+/// The frame that is asked for at each node, without signs and order.
+type Asked = Box<dyn Fn(usize) -> Octahedral>;
 
 /// Frames at the nodes of a grid.
 pub(super) struct Frames {
@@ -344,8 +335,8 @@ pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], cuts: Option<&CutCells>
     transpose(&[x, cross(z, x), z])
 }
 
-/// The frames of first and third axes.
-fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+/// The frames of first and third axes: the third exactly, the first as nearly as it can.
+pub(super) fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
     let both = x.into_iter().zip(z).enumerate();
     both.map(|(n, (x, z))| {
         let x = sub(x, scale(z, dot(x, z)));
@@ -423,7 +414,7 @@ pub(super) fn cube() -> Vec<Mat3> {
 }
 
 /// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
-fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
+pub(super) fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
     let agree = |m: &Mat3| -> f64 { m.as_flattened().iter().zip(to.as_flattened()).map(|(a, b)| a * b).sum() };
     // Turns of the cube are a quarter or more: within an eighth, whose cosine this is, there is no nearer one.
     if agree(f) > 1.0 + core::f64::consts::SQRT_2 {
@@ -462,13 +453,14 @@ fn least_turn(from: Vec3, to: Vec3) -> Mat3 {
 }
 
 /// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
-/// nodes come last, so that none depends on them. The first is made to agree with the coordinate axes.
-fn comb<T: Copy + FirstOf>(
+/// nodes come last, so that none depends on them. Returns the first, which has the value that `first` gives it.
+pub(super) fn comb<T: Copy>(
     grid: &Grid,
     values: &mut [T],
     sure: impl Fn(usize) -> f64,
+    first: impl Fn(usize, &T) -> T,
     agree: impl Fn(usize, &T, &T) -> T,
-) {
+) -> usize {
     let strides = grid.strides();
     let sure: Vec<f64> = (0..values.len()).map(sure).collect();
     // The surest first, of equals the first node: the number of a node in this order says when it is its turn, and of the nodes that
@@ -481,7 +473,7 @@ fn comb<T: Copy + FirstOf>(
     let mut from_rank = vec![u32::MAX; values.len()];
     let mut heap = BinaryHeap::from([Reverse(0u64)]);
     let start = order.first().map_or(0, |n| *n as usize);
-    values[start] = agree(start, &values[start], &T::FIRST);
+    values[start] = first(start, &values[start]);
     while let Some(Reverse(step)) = heap.pop() {
         checkpoint();
         let [node, from] = [step >> 32, step & 0xffff_ffff].map(|r| order[r as usize] as usize);
@@ -501,25 +493,15 @@ fn comb<T: Copy + FirstOf>(
             }
         }
     }
+    start
 }
 
 /// How sure nodes are, those in the part before all others, and of these the nearest to it first.
-fn first_in<'a>(outside: Option<&'a [f64]>, sure: impl Fn(usize) -> f64 + 'a) -> impl Fn(usize) -> f64 + 'a {
+pub(super) fn first_in<'a>(outside: Option<&'a [f64]>, sure: impl Fn(usize) -> f64 + 'a) -> impl Fn(usize) -> f64 + 'a {
     move |n| match outside.map(|d| d[n]) {
         Some(distance) if distance > 0.0 => -distance,
         _ => sure(n),
     }
-}
-
-/// The frame that the first node is made to agree with.
-trait FirstOf {
-    const FIRST: Self;
-}
-impl FirstOf for Vec3 {
-    const FIRST: Vec3 = [1e-6, 1e-3, 1.0];
-}
-impl FirstOf for Mat3 {
-    const FIRST: Mat3 = IDENTITY;
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 
 use super::stress_kind::StressKind;
 use super::{
-    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, Wanted,
-    given_twice, shared,
+    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, TwoAxes,
+    Wanted, given_twice, shared,
 };
 use crate::environment::Environment;
 use crate::field::Field;
-use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines};
+use crate::grade::{FieldKind, Grade, GradeSpec, Product, Quantity, key_of, lines, pairs};
 use crate::kind::{DesignError, Fault, Key, Kind};
 use crate::region::{Region, RegionKind};
 use geometry::fault::number;
@@ -34,9 +34,8 @@ pub struct PhaseKind {
     /// their directions, below 1 to their sizes.
     #[kind(default = 1.0, min = 0.001, max = 1000.0)]
     angle_weight: f64,
-    /// Length over which a direction, a frame or a stress is smoothed before cells follow it. Signs of a direction, of a frame
-    /// from a result and of a stress do not matter, nor does the order of a stress's; a frame of numbers or formulas keeps the
-    /// signs given, which must not flip. Parts of a stress count by how much they differ between directions. None unless given.
+    /// Length over which a direction, a frame or a stress is smoothed before cells follow it, without regard to the signs and the
+    /// order of their axes. Parts of a stress count by how much they differ between directions. None unless given.
     #[kind(unit = "mm", above = 0.0)]
     smooth: Option<f64>,
     /// "surface": an axis of the cell, whichever is nearest, along the normal of the region's surface, and farther in what is asked for
@@ -127,7 +126,8 @@ pub struct AlongDirection {
 /// Turned to two directions.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct AlongFrame {
-    /// The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }.
+    /// The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }. Signs that flip from one position to the next, and
+    /// axes of a result that change places, do not matter.
     #[kind(keyword)]
     frame: FrameKind,
 }
@@ -395,7 +395,17 @@ impl OrientationKind {
             OrientationKind::Rotate(of) => Orientation::Angles(each(&of.rotate, &below("rotate"), &any)?),
             OrientationKind::Direction(of) => Orientation::Direction(vector(&of.direction, "direction")?),
             OrientationKind::Frame(AlongFrame { frame }) => {
-                Orientation::Frame { x: vector(&frame.x, "frame.x")?, z: vector(&frame.z, "frame.z")? }
+                let both = TwoAxes::new(vector(&frame.x, "frame.x")?, vector(&frame.z, "frame.z")?);
+                let unordered = match (&frame.x, &frame.z) {
+                    (VectorKind::Field(x), VectorKind::Field(z)) => {
+                        pairs([&x.field, &z.field], &below("frame.x.field"), environment, TwoAxes::coefficients)?
+                    }
+                    _ => None,
+                };
+                Orientation::Frame(match unordered {
+                    Some(unordered) => both.unordered(unordered),
+                    None => both,
+                })
             }
             OrientationKind::Stress(of) => Orientation::Stress(of.stress.build(&below("stress"), environment)?),
         })

@@ -9,9 +9,10 @@
 //! The average at a node is φ = (1 − ℓ²Δ)⁻¹ (c q), with the confidence c of each node: it falls off as e^{−d/ℓ}, and only its direction
 //! counts. With mirrored faces the cosines of the DCT-I are the eigenvectors, so a component is one transform forth and back.
 
+use super::frame::{cube, nearest};
 use super::phase_grid::Grid;
 use super::poisson::Poisson;
-use geometry::math::{Mat3, Vec3, add, cross, determinant, norm, scale, sub, transpose};
+use geometry::math::{IDENTITY, Mat3, Vec3, add, cross, determinant, dot, norm, rotation, scale, sub, transpose};
 use geometry::progress::checkpoint;
 
 /// A gap between principal values, over the range of a stress in the part, at which a direction is half trusted.
@@ -21,6 +22,10 @@ pub(super) const LEAST_AVERAGE: f64 = 1e-9;
 /// Most steps to the nearest frame, and the change at which they end.
 const STEPS: usize = 60;
 const CHANGE: f64 = 1e-10;
+/// The relative difference of two such sums that is more than rounding.
+const BETTER: f64 = 1e-9;
+/// The share of the greatest sum that there can be above which a frame is taken as found: halfway between two it is two thirds.
+const CLEAR: f64 = 0.9;
 
 /// A smoothing length, and the weight of each node's own value.
 #[derive(Clone, Copy)]
@@ -82,6 +87,12 @@ impl Averages {
         self.all.iter().zip(&self.whole).map(share).collect()
     }
 
+    /// The frame of the first node.
+    pub fn first(&self, node: usize) -> Mat3 {
+        let q = Octahedral(self.all[node]);
+        if q.0[9] > self.least { q.best() } else { IDENTITY }
+    }
+
     /// The frame of a node that is reached from one with the frame `to`, as a direction of ascent from it.
     pub fn settled(&self, node: usize, to: &Mat3) -> Mat3 {
         let q = Octahedral(self.all[node]);
@@ -97,6 +108,7 @@ pub(super) fn trusted(gap: f64) -> f64 {
 
 /// A harmonic polynomial of degree four, by the coefficients of x⁴, x³y, x²y², xy³, y⁴, x³z, x²yz, xy²z, y³z, from which those with
 /// higher powers of z follow; and the sum of the confidences of the frames that it is made of.
+#[derive(Clone)]
 pub(super) struct Octahedral([f64; 10]);
 
 impl Octahedral {
@@ -121,6 +133,18 @@ impl Octahedral {
         out.iter_mut().for_each(|c| *c *= sure);
         out[9] = sure;
         Octahedral(out)
+    }
+
+    /// Of a frame that is sure, by its coefficients.
+    pub fn sure(of: [f64; 9]) -> Octahedral {
+        let mut all = [1.0; 10];
+        all[..9].copy_from_slice(&of);
+        Octahedral(all)
+    }
+
+    /// The first nine coefficients.
+    pub fn coefficients(&self) -> [f64; 9] {
+        core::array::from_fn(|c| self.0[c])
     }
 
     pub fn times(self, by: f64) -> Octahedral {
@@ -160,9 +184,30 @@ impl Octahedral {
         [dx + radial * x, dy + radial * y, dz + radial * z]
     }
 
+    /// The frame at which that sum is greatest of all; where several are as good, the one that is reached from the coordinate axes.
+    pub fn best(&self) -> Mat3 {
+        let found: Vec<Mat3> = spread().iter().map(|from| self.nearest(from)).collect();
+        let better =
+            |best: Mat3, next: &Mat3| if self.sum(next) > self.sum(&best) * (1.0 + BETTER) { *next } else { best };
+        let best = found[1..].iter().fold(found[0], better);
+        nearest(&best, &IDENTITY, &cube())
+    }
+
+    /// The frame that is reached from another, or the best where that is not nearly a frame of these axes, as halfway between two: of those
+    /// alike the one nearest to the other.
+    pub fn settled(&self, like: &Mat3) -> Mat3 {
+        let found = self.nearest(like);
+        if self.sum(&found) > CLEAR * 3.0 * self.0[9] { found } else { nearest(&self.best(), like, &cube()) }
+    }
+
+    /// The sum over the axes of a frame of the polynomial and ⅗ r⁴ times the confidence: thrice the confidence at a frame that it is of.
+    fn sum(&self, f: &Mat3) -> f64 {
+        transpose(f).iter().map(|u| 0.25 * dot(*u, self.convex_gradient(*u))).sum()
+    }
+
     /// The frame at which the sum of the polynomial over its axes is greatest, from a first one on: axes go to their gradients, made
     /// orthonormal, which does not lower the sum of a convex function. Near the end each step cubes the error of a single frame.
-    fn nearest(&self, to: &Mat3) -> Mat3 {
+    pub fn nearest(&self, to: &Mat3) -> Mat3 {
         let mut axes = transpose(to);
         for _ in 0..STEPS {
             let next = orthonormal(axes.map(|u| self.convex_gradient(u)));
@@ -176,8 +221,24 @@ impl Octahedral {
                 break;
             }
         }
-        transpose(&axes)
+        // Far from the end a step can take two axes past each other; the sum does not know a left-handed frame from a right-handed one.
+        let hand = determinant(&axes).signum();
+        transpose(&axes.map(|u| scale(u, hand)))
     }
+}
+
+/// Frames such that every frame is within 32 degrees of one of them or of one that a cube cannot tell from it: the axes themselves, turned
+/// by 45 degrees about one of them, and by 60 about a diagonal of the cube.
+fn spread() -> Vec<Mat3> {
+    let about_axes = [[45.0, 0.0, 0.0], [0.0, 45.0, 0.0], [0.0, 0.0, 45.0]].map(rotation);
+    let diagonals = [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]];
+    // By 60 degrees about (1, 1, 1)/√3: 2/3 on the diagonal, then -1/3 and 2/3 in turn.
+    let about_diagonals = diagonals.map(|d| {
+        core::array::from_fn(|i| {
+            core::array::from_fn(|j| if i == j { 2.0 } else if (i + 1) % 3 == j { -1.0 } else { 2.0 } * d[i] * d[j] / 3.0)
+        })
+    });
+    [IDENTITY].into_iter().chain(about_axes).chain(about_diagonals).collect()
 }
 
 /// The orthonormal matrix nearest to one, given and returned by rows, by Newton's iteration; NaN for a singular one.
@@ -222,7 +283,7 @@ fn second_power([a, b, c]: Vec3) -> [f64; 9] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::math::{dot, product, rotation};
+    use geometry::math::product;
 
     fn numbers(seed: u64) -> impl FnMut() -> f64 {
         let mut s = seed;
@@ -283,6 +344,29 @@ mod tests {
             assert!(norm(sub(axis, was)) < 1e-9);
             assert!(off(&found, &from) < 2.0 * off(&from, &frame) + 1e-9);
             assert!((determinant(&found) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    /// Without a first frame one is found too, halfway between the axes as well, and from any other the one of those alike that is near.
+    #[test]
+    fn a_frame_is_found_from_anywhere() {
+        let mut random = numbers(17);
+        let halfway = [[45.0, 0.0, 0.0], [0.0, 45.0, 0.0], [0.0, 0.0, 45.0], [45.0, 45.0, 0.0], [45.0, 35.0, 45.0]];
+        let all: Vec<Vec3> = (0..300).map(|_| angles(&mut random)).chain(halfway).collect();
+        for angles in all {
+            let frame = rotation(angles);
+            let q = Octahedral::of(&frame, &[1.0; 3]);
+            let q = Octahedral::sure(q.coefficients());
+            let off = |a: &Mat3, b: &Mat3| (0..3).map(|i| norm(sub(a[i], b[i]))).fold(0.0, f64::max);
+            let found = q.best();
+            let alike = nearest(&frame, &found, &cube());
+            assert!(off(&found, &alike) < 1e-8, "{angles:?}: {found:?} {alike:?}");
+            let like = rotation([0; 3].map(|_| 180.0 * random()));
+            for like in [IDENTITY, like] {
+                let found = q.settled(&like);
+                assert!((determinant(&found) - 1.0).abs() < 1e-9, "{angles:?}: {found:?}");
+                assert!(off(&found, &nearest(&frame, &found, &cube())) < 1e-8, "{angles:?}: {found:?}");
+            }
         }
     }
 }

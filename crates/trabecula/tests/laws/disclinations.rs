@@ -23,6 +23,8 @@ fn closed_forms_have_one_line_at_its_place() {
     let r = format!("sqrt({x}^2 + {y}^2 + 1e-9)");
     let f = |text: String| format!("{{ formula = \"{text}\" }}");
     let plane = |xx: String, yy: String, xy: String| format!("stress = [{}, {}, -20, 0, 0, {}]", f(xx), f(yy), f(xy));
+    let part = |of: &str, by: i32| f(format!("{of}(atan2({y}, {x})/{by})"));
+    let frame = |by: i32| format!("frame = {{ x = [{}, {}, 0], z = [0, 0, 1] }}", part("cos", by), part("sin", by));
     for (what, orientation, turn) in [
         ("half", plane(x.into(), format!("-{x}"), y.into()), 180.0),
         ("trisector", plane(x.into(), format!("-{x}"), format!("-{y}")), 180.0),
@@ -36,6 +38,8 @@ fn closed_forms_have_one_line_at_its_place() {
             ),
             180.0,
         ),
+        ("half of a frame", frame(2), 180.0),
+        ("quarter of a frame", frame(4), 90.0),
     ] {
         let found = lines(&orientation);
         println!("{what}: {found:?}");

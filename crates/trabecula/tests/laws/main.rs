@@ -43,6 +43,7 @@ mod tiling_ends;
 mod tiling_fields;
 mod tiling_net;
 mod tiling_on_grid;
+mod unordered_frames;
 mod volume_angles;
 mod walls;
 mod wavelength;

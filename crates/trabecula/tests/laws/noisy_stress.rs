@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::{cuboid, mean, off_axis, points, within};
 use geometry::math::{Aabb, Vec3, determinant, dot, norm, scale};
 use trabecula::grade::{Grade, Samples};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, Settings, Stretch, Wanted};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, Settings, Stretch, TwoAxes, Wanted};
 use trabecula::region::{Cylinder, Difference, Region};
 
 const STEP: f64 = 0.75;
@@ -115,7 +115,8 @@ fn signs_of_vectors_do_not_count() {
     for smooth in [None, Some(2.0)] {
         let made = [false, true].map(|signs| {
             let direction = Orientation::Direction(Axis::Line(lines(signs, false)));
-            let frame = Orientation::Frame { x: Axis::Line(lines(signs, true)), z: Axis::Line(lines(signs, false)) };
+            let frame =
+                Orientation::Frame(TwoAxes::new(Axis::Line(lines(signs, true)), Axis::Line(lines(signs, false))));
             [direction, frame].map(|of| solved(&b, of, smooth).expect("solved"))
         });
         for p in points(&b, 500) {

@@ -13,7 +13,7 @@ use trabecula::field::Block;
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, Round, Settings, Wanted};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, Round, Settings, TwoAxes, Wanted};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region};
 use trabecula::solid::Solid;
 
@@ -72,7 +72,7 @@ fn a_tube_along_its_hoops_is_wrapped_round_its_axis() {
         let [out, round] = around(base, axis);
         let orientation = if case % 2 == 0 {
             let z = Axis::Vector(axis.map(Grade::Constant));
-            Orientation::Frame { x: Axis::Vector(out.map(|t| formula(&t))), z }
+            Orientation::Frame(TwoAxes::new(Axis::Vector(out.map(|t| formula(&t))), z))
         } else {
             // Hoops carry 2, the axis 1, the radius nothing.
             let square = |a: usize, b: usize| {
@@ -138,7 +138,7 @@ fn swirling() -> Phase {
     let z = Axis::Vector([still(), still(), Grade::Constant(1.0)]);
     let wanted = Wanted {
         wavelength: [formula(&edge), formula(&edge), Grade::Constant(2.0)],
-        ..wanted(2.0, Orientation::Frame { x, z })
+        ..wanted(2.0, Orientation::Frame(TwoAxes::new(x, z)))
     };
     // Coarser than would be chosen for cells this small at the holes: the law holds on any grid.
     solve(&plate(), &wanted, Some(0.35))
@@ -279,7 +279,7 @@ fn what_cannot_close_is_refused_and_what_is_straight_stays() {
     let z = || Axis::Vector([0.0, 0.0, 1.0].map(Grade::Constant));
     for x in [["1", "0.5", "0"], ["1", "0.002*x", "0"]] {
         let x = Axis::Vector(x.map(formula));
-        let map = solve(&region, &wanted(2.0, Orientation::Frame { x, z: z() }), Some(0.5));
+        let map = solve(&region, &wanted(2.0, Orientation::Frame(TwoAxes::new(x, z()))), Some(0.5));
         assert!(map.periods().is_empty());
     }
 }

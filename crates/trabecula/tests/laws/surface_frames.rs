@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm, unit};
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, Settings, Wanted};
+use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, Settings, TwoAxes, Wanted};
 use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
 fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> Wanted {
@@ -55,7 +55,7 @@ fn cells_in_a_curved_panel_follow_it() {
     let up = Axis::Vector([zero(), zero(), Grade::Constant(1.0)]);
     let found = [
         solve(&region, &wanted(2.0, angles([0.0; 3]), Some(4.0))),
-        solve(&region, &wanted(2.0, Orientation::Frame { x: radius, z: up }, None)),
+        solve(&region, &wanted(2.0, Orientation::Frame(TwoAxes::new(radius, up)), None)),
     ]
     .map(|map| {
         let points = within(&region, 5000, 3);

@@ -37,7 +37,9 @@ fn combed_frames_are_smooth_through_a_crossing_of_principal_values() {
     let range = found.iter().map(Principal::difference).fold(0.0, f64::max);
     let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
     let gaps: Vec<Vec3> = found.iter().map(|p| p.own_gaps(range)).collect();
-    comb(&g, &mut frames, |n| gaps[n][0].min(gaps[n][1]).min(gaps[n][2]), |n, f, to| settled(f, &gaps[n], to, &turns));
+    let agree = |n: usize, f: &Mat3, to: &Mat3| settled(f, &gaps[n], to, &turns);
+    let sure = |n: usize| gaps[n].into_iter().fold(f64::INFINITY, f64::min);
+    comb(&g, &mut frames, sure, |n, f| agree(n, f, &IDENTITY), agree);
     let by = product(&transpose(&frame(nodes[0])), &frames[0]);
     for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
         // The eigenvectors' rounding over the gap; where values agree, the two steps to the next node that is sure, on each of
