@@ -605,9 +605,11 @@ class LayersMade(Report):
     at: list[float]
     """Where it is, mm."""
     least: float
-    """The least of these, where layers do not taper to their end."""
+    """The least of these heights."""
+    lower: float
+    """Share of that area where they are lower than nine tenths of these."""
     mean: float
-    """Mean of their heights over those asked for."""
+    """Mean over their area of their heights in those asked for, where layers do not taper to their end."""
     prisms: int
     """Number of prisms and wedges, each cut into tetrahedra."""
 
