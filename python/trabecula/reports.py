@@ -1416,8 +1416,12 @@ class WallSpread(Report):
     """Maximum of some thousand."""
     mean: float
     """Mean: volume of walls over area of their mid-surface."""
+    merged: float
+    """Share of the mid-surface from which a wall runs into the next one before it ends."""
     min: float
     """Minimum of some thousand."""
+    through: float
+    """Mean length of the solid along normals, to where it ends: more than the mean wall where walls run into each other."""
 
 
 class WarningReport(Report):

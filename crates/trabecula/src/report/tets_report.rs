@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::Varying;
 use crate::kind::Warning;
 use crate::mesher::{Fit, MadeLayers};
+use crate::tiling::Spread as Walls;
 
 /// The figures of a tetrahedral mesh.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -159,6 +160,13 @@ pub struct LostFeatureReport {
 impl From<&MadeLayers> for LayersMade {
     fn from(m: &MadeLayers) -> Self {
         LayersMade { prisms: m.prisms, mean: m.mean, lower: m.lower, least: m.least, at: m.at }
+    }
+}
+
+impl From<&Walls> for WallSpread {
+    fn from(w: &Walls) -> Self {
+        let Walls { min, low, mean, high, max, merged, through } = *w;
+        WallSpread { min, low, mean, high, max, merged, through }
     }
 }
 
@@ -333,6 +341,10 @@ pub struct WallSpread {
     pub high: f64,
     /// Maximum of some thousand.
     pub max: f64,
+    /// Share of the mid-surface from which a wall runs into the next one before it ends.
+    pub merged: f64,
+    /// Mean length of the solid along normals, to where it ends: more than the mean wall where walls run into each other.
+    pub through: f64,
 }
 
 /// Angles between walls at the faces of tetrahedra, degrees.
