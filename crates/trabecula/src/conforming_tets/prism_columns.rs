@@ -1,7 +1,7 @@
 //! Columns of prisms between nodes of the boundary and where these are pushed to, and their shapes.
 //!
-//! Nodes are pushed as far as there is room. Columns with badly shaped tetrahedra then are tilted and shortened, each as a whole, while
-//! the worst of their shapes improves: at sharp edges, where columns lean and the prisms' inner ends are small, and where neighbours are
+//! Nodes are pushed where the mesh leaves room. Columns with badly shaped tetrahedra then are tilted and shortened, each as a whole, while
+//! their shapes improve: at sharp edges, where columns lean and the prisms' inner ends are small, and where neighbours are
 //! of very different lengths. The mesh beneath is improved in between.
 
 use super::node_surfaces::{SurfaceSet, onto};
@@ -141,7 +141,7 @@ impl Columns {
         each.fold([f64::INFINITY, 0.0], |[lo, hi], h| [h.min(lo), h.max(hi)])
     }
 
-    /// The layers that were made, of so many prisms.
+    /// The layers that were made, of this number of prisms.
     pub fn made(&self, prisms: usize) -> MadeLayers {
         let mut made = MadeLayers { prisms, mean: 0.0, lower: 0.0, least: f64::INFINITY, at: [0.0; 3] };
         let (mut area, mut first) = (0.0, u32::MAX);
