@@ -559,7 +559,7 @@ def test_layers_lie_along_the_face_that_they_are_asked_for_on(tmp_path):
 
 @pytest.mark.parametrize("hole", [0, 6])
 def test_layers_all_over_a_part_with_edges_have_no_flat_tetrahedra(hole):
-    """Columns that meet at a sharp edge are tilted and shortened before their inner ends are flat, and it is said how much of them is lower."""
+    """Columns that meet at a sharp edge are tilted and shortened, and it is said on which share of the area they are lower."""
     region = lt.region.cylinder(base=[0, 0, 0], radius=12, height=20)
     if hole:
         region = lt.region.difference(region, lt.region.cylinder(base=[0, 0, -1], radius=hole, height=22))
