@@ -557,6 +557,21 @@ def test_layers_lie_along_the_face_that_they_are_asked_for_on(tmp_path):
     assert "no triangle of the boundary has its middle in this region" in command("tets", design, expected=1)[1]
 
 
+@pytest.mark.parametrize("hole", [0, 6])
+def test_layers_all_over_a_part_with_edges_have_no_flat_tetrahedra(hole):
+    """Columns that meet at a sharp edge are tilted and shortened, and it is said on which share of the area they are lower."""
+    region = lt.region.cylinder(base=[0, 0, 0], radius=12, height=20)
+    if hole:
+        region = lt.region.difference(region, lt.region.cylinder(base=[0, 0, -1], radius=hole, height=22))
+    tets = {"region": region, "lattice": {"core": {"map": lt.map.tets(size=3, layers={"count": 2, "height": 1.0})}}}
+    report = lt.TetMesh.of(tets).report()
+    angles, found = report["quality"]["dihedral"], report["layers"]
+    assert angles["min"] > 8 and angles["max"] < 164
+    assert 0 < found["least"] < found["mean"] < 1 and found["mean"] > 0.75 and 0.05 < found["lower"] < 0.6
+    said = [w["message"] for w in report["warnings"] if w["path"].endswith("layers")]
+    assert len(said) == 1 and f"on {100 * found['lower']:.0f} % of their area" in said[0]
+
+
 def test_triangles_within_a_part_are_no_surface_to_be_near(tmp_path):
     """Two boxes that overlap, in one file: the fit is that of their union."""
     trimesh = pytest.importorskip("trimesh")

@@ -605,9 +605,11 @@ class LayersMade(Report):
     at: list[float]
     """Where it is, mm."""
     least: float
-    """The least of these, where layers do not taper to their end."""
+    """The least of these heights."""
+    lower: float
+    """Share of that area where they are lower than nine tenths of these."""
     mean: float
-    """Mean of their heights over those asked for."""
+    """Mean over their area of their heights in those asked for, where layers do not taper to their end."""
     prisms: int
     """Number of prisms and wedges, each cut into tetrahedra."""
 
@@ -1414,8 +1416,12 @@ class WallSpread(Report):
     """Maximum of some thousand."""
     mean: float
     """Mean: volume of walls over area of their mid-surface."""
+    merged: float
+    """Share of the mid-surface from which a wall runs into the next one before it ends."""
     min: float
     """Minimum of some thousand."""
+    through: float
+    """Mean length of the solid along normals, to where it ends: more than the mean wall where walls run into each other."""
 
 
 class WarningReport(Report):

@@ -250,6 +250,10 @@ def _tet_mesh(it: Report) -> Iterator[str]:
     yield f"dihedral    {angles.min:.1f}° to {angles.max:.1f}°; {inner}"
     yield f"aspect      {q.aspect.mean:.2f} on average, {q.aspect.max:.2f} at most (1 is regular)"
     yield f"slivers     {q.slivers} below 10° or above 170°; {q.inverted} inverted"
+    if layers := it.layers:
+        yield f"layers      {layers.prisms} prisms, {100 * layers.mean:.0f} % of the height asked for on average,"
+        low = f"less than nine tenths of it on {100 * layers.lower:.0f} % of their area"
+        yield f"            {low}, {100 * layers.least:.0f} % at {point(layers.at)} mm"
     if fit:
         yield from _fit(fit)
 

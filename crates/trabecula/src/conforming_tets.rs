@@ -17,6 +17,7 @@ mod node_surfaces;
 mod partition;
 mod patch_cuts;
 mod prepared;
+mod prism_columns;
 mod prism_layers;
 mod shaping;
 mod slivers;

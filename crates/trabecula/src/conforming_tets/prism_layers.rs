@@ -9,18 +9,15 @@
 //! (Dompierre, Labbé, Vallet, Camarero 1999).
 
 use super::chord_balance::interfaces;
-use super::node_surfaces::{HELD, SurfaceSet, onto};
-use super::shaping::{POOR, Shaping};
+use super::node_surfaces::{HELD, SurfaceSet};
+use super::prism_columns::{Columns, Pushed, ascending, has_twice, staircase};
+use super::shaping::Shaping;
 use super::tet_shape::shape;
 use crate::region::Region;
 use geometry::fault::Fault;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, cross, inverse, norm, scale, sub};
-use geometry::progress::checkpoint;
-use geometry::tetmesh::{FACES, volume};
+use geometry::tetmesh::FACES;
 
-/// Rounds of pushing and improvement, and the parts of the way that are tried in each.
-const ROUNDS: usize = 24;
-const STEPS: [f64; 3] = [0.25, 0.125, 0.0625];
 /// Longest way of a node, in heights of all layers: that of a corner of 60 degrees.
 const LONGEST: f64 = 2.0;
 /// Damping of the equations of a node over their trace, and the number of times they are solved for what is left: ways across planes are
@@ -54,32 +51,14 @@ impl PrismLayers {
 pub struct MadeLayers {
     /// Number of prisms and wedges.
     pub prisms: usize,
-    /// The mean of the heights over those that are asked for, of nodes where layers do not taper.
+    /// The mean over their area of the heights in those that are asked for, of nodes where layers do not taper.
     pub mean: f64,
+    /// The share of their area where they are lower than nine tenths of these.
+    pub lower: f64,
     /// The least of these.
     pub least: f64,
     /// Where it is, mm.
     pub at: Vec3,
-}
-
-/// A node of the boundary that is pushed inwards.
-struct Pushed {
-    node: u32,
-    /// Where it was, and where it goes to.
-    from: Vec3,
-    by: Vec3,
-    /// The surfaces along which it moves.
-    along: SurfaceSet,
-    /// How much of the way is behind it.
-    share: f64,
-}
-
-impl Pushed {
-    /// Its position at a share of the way; `None` if that is on none of its surfaces.
-    fn at(&self, shaping: &Shaping, share: f64) -> Option<Vec3> {
-        let p = add(self.from, scale(self.by, share));
-        if self.along == 0 { Some(p) } else { onto(shaping.surfaces, self.along, p, norm(self.by)) }
-    }
 }
 
 /// The shortest solution of the normal equations of a node, but for directions in which they say little.
@@ -88,23 +67,6 @@ fn shortest(matrix: &Mat3, right: Vec3) -> Vec3 {
     let damped = inverse(&core::array::from_fn(|i| add(matrix[i], scale(IDENTITY[i], DAMPING * trace))));
     let solved = (0..SOLUTIONS).fold([0.0; 3], |x, _| add(x, apply(&damped, sub(right, apply(matrix, x)))));
     if solved.iter().all(|v| v.is_finite()) { solved } else { [0.0; 3] }
-}
-
-/// The nodes of a face in ascending order, and whether these too are counter-clockwise seen from outside.
-fn ascending([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
-    let mut sorted = [a, b, c];
-    sorted.sort_unstable();
-    (sorted, [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted))
-}
-
-/// The three tetrahedra of a prism over a face, between two levels of the columns of its nodes in ascending order; of negative volume
-/// where these are counter-clockwise seen from outside.
-fn staircase<T: Copy>([a, b, c]: [[T; 2]; 3]) -> [[T; 4]; 3] {
-    [[a[0], b[0], c[0], c[1]], [b[0], a[0], b[1], c[1]], [a[0], a[1], b[1], c[1]]]
-}
-
-fn has_twice<T: PartialEq>(corners: &[T; 4]) -> bool {
-    (0..4).any(|i| (0..i).any(|j| corners[i] == corners[j]))
 }
 
 impl Shaping<'_> {
@@ -128,9 +90,8 @@ impl Shaping<'_> {
             return Err(Fault::new("layers.count", message));
         }
         let depth = layers.ends.last().copied().unwrap_or(0.0);
-        let mut pushed = self.pushed(&chosen, &others, depth);
-        let boundary: Vec<(u32, SurfaceSet)> = pushed.iter().map(|p| (p.node, self.on[p.node as usize])).collect();
-        if pushed.iter().all(|p| norm(p.by) <= 0.0) {
+        let mut columns = Columns::new(self.pushed(&chosen, &others, depth), &chosen, &layers.ends, self);
+        if columns.pushed.iter().all(|p| norm(p.by) <= 0.0) {
             let message = format!(
                 "all nodes of the {} triangles of the boundary in this region lie at its edge, where layers end; enlarge it, or give a \
                  smaller size",
@@ -138,20 +99,17 @@ impl Shaping<'_> {
             );
             return Err(Fault::new("layers.on", message));
         }
-        pushed.iter().for_each(|p| self.on[p.node as usize] = HELD);
-        self.push(&mut pushed, &chosen, &layers.ends);
-        for (p, (node, on)) in pushed.iter().zip(&boundary) {
-            self.on[*node as usize] = if p.share > 0.0 { p.along } else { *on };
+        let boundary: Vec<SurfaceSet> = columns.pushed.iter().map(|p| self.on[p.node as usize]).collect();
+        columns.pushed.iter().for_each(|p| self.on[p.node as usize] = HELD);
+        for fair in [false, true] {
+            self.push(&mut columns, fair);
+            self.settle(&mut columns);
         }
-        let prisms = self.fill(&chosen, &pushed, &boundary, &layers.ends);
-        let whole: Vec<&Pushed> = pushed.iter().filter(|p| norm(p.by) > 0.0).collect();
-        let least = whole.iter().min_by(|p, q| p.share.total_cmp(&q.share).then(p.node.cmp(&q.node)));
-        Ok(MadeLayers {
-            prisms,
-            mean: whole.iter().map(|p| p.share).sum::<f64>() / whole.len().max(1) as f64,
-            least: least.map_or(0.0, |p| p.share),
-            at: least.map_or([0.0; 3], |p| p.from),
-        })
+        for (p, on) in columns.pushed.iter().zip(&boundary) {
+            self.on[p.node as usize] = if p.is_pushed() { p.along } else { *on };
+        }
+        let prisms = self.fill(&columns, &boundary);
+        Ok(columns.made(prisms))
     }
 
     /// The faces of the boundary that have their middles in a region, counter-clockwise seen from outside, and the others.
@@ -201,113 +159,39 @@ impl Shaping<'_> {
             let ends_here = along & leave != 0;
             let (matrix, right) = sums[node as usize];
             let by = if ends_here { [0.0; 3] } else { shortest(&matrix, right) };
-            let by = scale(by, (LONGEST * depth / norm(by).max(f64::MIN_POSITIVE)).min(1.0));
-            Pushed { node, from, by, along: along & !HELD, share: 0.0 }
+            let reach = (LONGEST * depth / norm(by).max(f64::MIN_POSITIVE)).min(1.0);
+            Pushed { node, from, by: scale(by, reach), along: along & !HELD, way: [0.0; 3], reach }
         };
         nodes.map(way).collect()
     }
 
-    /// Pushes nodes inwards while shapes stay fair and prisms have volume, and improves shapes in between.
-    fn push(&mut self, pushed: &mut [Pushed], chosen: &[[u32; 3]], ends: &[f64]) {
-        let goes_on = || true;
-        let mut number = vec![usize::MAX; self.nodes.len()];
-        pushed.iter().enumerate().for_each(|(i, p)| number[p.node as usize] = i);
-        let mut faces: Vec<Vec<[u32; 3]>> = vec![Vec::new(); pushed.len()];
-        for f in chosen {
-            f.iter().for_each(|n| faces[number[*n as usize]].push(*f));
-        }
-        let depth = ends.last().copied().unwrap_or(1.0);
-        let levels: Vec<f64> = core::iter::once(0.0).chain(ends.iter().map(|e| e / depth)).collect();
-        for _ in 0..ROUNDS {
-            checkpoint();
-            let (mut moved, mut left) = (false, false);
-            for i in 0..pushed.len() {
-                let p = &pushed[i];
-                if p.share >= 1.0 || norm(p.by) <= 0.0 {
-                    continue;
-                }
-                let (here, before) = (self.nodes[p.node as usize], p.share);
-                let mut may = |share: f64| {
-                    let to = pushed[i].at(self, share)?;
-                    self.worst(pushed[i].node, sub(to, here), POOR)?;
-                    pushed[i].share = share;
-                    let hollow = |f: &[u32; 3]| !self.has_volume(f.map(|n| &pushed[number[n as usize]]), *f, &levels);
-                    let fits = !faces[i].iter().any(hollow);
-                    pushed[i].share = before;
-                    fits.then_some((share, to))
-                };
-                let next = STEPS.iter().find_map(|s| may((before + s).min(1.0)));
-                let p = &mut pushed[i];
-                if let Some((share, to)) = next {
-                    p.share = share;
-                    self.nodes[p.node as usize] = to;
-                    for t in &self.around[p.node as usize] {
-                        self.shapes[*t as usize] = shape(self.tets[*t as usize].map(|n| self.nodes[n as usize]));
-                    }
-                    moved = true;
-                }
-                left |= p.share < 1.0;
-            }
-            if !moved {
-                break;
-            }
-            self.improve(&goes_on);
-            if !left {
-                break;
-            }
-        }
-    }
-
-    /// Whether all tetrahedra of the column over a face have volume, but those of which two corners are one.
-    fn has_volume(&self, pushed: [&Pushed; 3], face: [u32; 3], levels: &[f64]) -> bool {
-        let (sorted, outward) = ascending(face);
-        let columns = sorted.map(|n| pushed[face.iter().position(|m| *m == n).unwrap_or(0)]);
-        levels.windows(2).all(|between| {
-            // Each position with a number: both ends of a node that was not pushed are one.
-            let mut ends = [[(0, [0.0; 3]); 2]; 3];
-            for (k, (column, ends)) in columns.iter().zip(&mut ends).enumerate() {
-                for (l, (level, end)) in between.iter().zip(ends).enumerate() {
-                    let Some(at) = column.at(self, column.share * level) else { return false };
-                    *end = (2 * k + if column.share > 0.0 { l } else { 0 }, at);
-                }
-            }
-            staircase(ends).into_iter().all(|mut corners| {
-                if outward {
-                    corners.swap(0, 1);
-                }
-                has_twice(&corners.map(|c| c.0)) || volume(corners.map(|c| c.1)) > 0.0
-            })
-        })
-    }
-
     /// Fills the space behind the pushed nodes with a column of prisms over each face; their number. `boundary` has the surfaces on
     /// which each node was.
-    fn fill(&mut self, chosen: &[[u32; 3]], pushed: &[Pushed], boundary: &[(u32, SurfaceSet)], ends: &[f64]) -> usize {
-        let depth = ends.last().copied().unwrap_or(1.0);
+    fn fill(&mut self, columns: &Columns, boundary: &[SurfaceSet]) -> usize {
+        let last = columns.levels.len() - 1;
         // The nodes of each pushed one from the surface inwards.
-        let mut columns: Vec<Vec<u32>> = vec![Vec::new(); self.nodes.len()];
-        for (p, (_, on)) in pushed.iter().zip(boundary) {
-            let mut column = Vec::with_capacity(ends.len() + 1);
-            for (level, end) in core::iter::once(&0.0).chain(ends).enumerate() {
-                let at = if level == 0 { Some(p.from) } else { p.at(self, p.share * end / depth) };
-                match at {
-                    Some(at) if p.share > 0.0 && level < ends.len() => {
+        let mut nodes: Vec<Vec<u32>> = Vec::with_capacity(columns.pushed.len());
+        for (p, on) in columns.pushed.iter().zip(boundary) {
+            let mut column = Vec::with_capacity(last + 1);
+            for (k, level) in columns.levels.iter().enumerate() {
+                match p.at(self, p.way, *level) {
+                    Some(at) if p.is_pushed() && k < last => {
                         column.push(self.nodes.len() as u32);
                         self.nodes.push(at);
-                        self.on.push(if level == 0 { *on } else { p.along });
+                        self.on.push(if k == 0 { *on } else { p.along });
                         self.next.push(self.nodes.len() as u32 - 1);
                         self.around.push(Vec::new());
                     }
                     _ => column.push(p.node),
                 }
             }
-            columns[p.node as usize] = column;
+            nodes.push(column);
         }
         let mut prisms = 0;
-        for face in chosen {
-            let (by_number, outward) = ascending(*face);
-            let [a, b, c] = by_number.map(|n| &columns[n as usize]);
-            for level in 0..ends.len() {
+        for face in &columns.faces {
+            let (sorted, outward) = ascending(*face);
+            let [a, b, c] = sorted.map(|i| &nodes[i]);
+            for level in 0..last {
                 let before = self.tets.len();
                 let made = staircase([a, b, c].map(|column| [column[level], column[level + 1]]));
                 made.into_iter().for_each(|t| self.add_tet(t, outward));

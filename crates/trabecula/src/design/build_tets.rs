@@ -28,8 +28,8 @@ const MUCH: f64 = 0.1;
 const FAR: f64 = 0.5;
 /// The least height of a layer, over that of all: thinner ones are lost in the rounding of positions.
 const THINNEST: f64 = 1e-4;
-/// The share of the heights of layers below which it is warned of.
-const THINNED: f64 = 0.9;
+/// The share of the area of layers from which on it is warned of those that are lower than asked for.
+const NOTABLE: f64 = 0.05;
 /// Tetrahedra along the longest side of a part that a warning of too few advises.
 const ACROSS: f64 = 4.0;
 /// Number of lost features that a warning names.
@@ -81,7 +81,7 @@ impl From<&TetReport> for TetMeshReport {
             quality: (&r.quality).into(),
             fit: r.fit.as_ref().map(FitReport::from),
             region_volume: r.region_volume,
-            layers: r.layers.map(|m| LayersMade { prisms: m.prisms, mean: m.mean, least: m.least, at: m.at }),
+            layers: r.layers.as_ref().map(LayersMade::from),
             warnings: None,
         }
     }
@@ -236,7 +236,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     made.warnings.extend(oversized(spec, bounds.size(), &made.report, &environment.path));
     made.report.region_volume = Some(own);
     made.report.layers = layers;
-    made.warnings.extend(layers.and_then(|l| thinned(&l, &environment.path)));
+    made.warnings.extend(layers.and_then(|l| lowered(&l, &environment.path)));
     made.names = names;
     Ok(made)
 }
@@ -262,16 +262,17 @@ fn prism_layers(spec: &LayersSpec, environment: &Environment) -> Result<PrismLay
     Ok(PrismLayers { ends, on: spec.on.as_ref().map(|of| environment.region(of, &on)).transpose()? })
 }
 
-/// A warning of layers that are much thinner than asked for.
-fn thinned(made: &MadeLayers, path: &str) -> Option<Warning> {
-    (made.least < THINNED).then(|| Warning {
+/// A warning of layers that are lower than asked for.
+fn lowered(made: &MadeLayers, path: &str) -> Option<Warning> {
+    (made.lower >= NOTABLE).then(|| Warning {
         path: format!("{path}.layers"),
         message: format!(
-            "layers have {:.0} % of their heights on average, and {:.0} % at ({}) mm: the tetrahedra there leave no more room; give \
-             fewer or lower ones, or a smaller size",
+            "on {:.0} % of their area, layers are lower than nine tenths of the height asked for: they have {:.0} % of it on average, and \
+             {:.0} % at ({}) mm, where the tetrahedra leave no more room; give fewer or lower ones, or a smaller size",
+            100.0 * made.lower,
             100.0 * made.mean,
             100.0 * made.least,
-            made.at.map(|v| format!("{v:.3}")).join(", ")
+            made.at.map(|v| rounded(v, 3).to_string()).join(", ")
         ),
     })
 }

@@ -29,6 +29,8 @@ use geometry::symmetry::Group;
 
 /// By how much a solid fraction that is found by samples may be off.
 const SAMPLED: f64 = 1e-3;
+/// How thick the solid may be along normals of walls, in their mean thickness, before it is warned of.
+const THICKER: f64 = 1.1;
 
 /// A tetrahedral mesh that the part is made of, and the lattice in it.
 pub(super) struct Domain<'a> {
@@ -516,6 +518,16 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
             s.mean, s.low, s.high, s.min, s.max
         );
         warnings.push(Warning { path: path.to_string(), message });
+        if s.through > THICKER * s.mean {
+            let message = format!(
+                "on {:.0} % of the mid-surface walls run into each other: where {:.4} mm are asked for, the solid is {:.4} mm thick along its \
+                 normals; give a smaller thickness, larger tetrahedra, or a cell whose walls are farther apart",
+                100.0 * s.merged,
+                s.mean,
+                s.through
+            );
+            warnings.push(Warning { path: path.to_string(), message });
+        }
     }
 }
 

@@ -310,7 +310,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
     let spread = tiling.thickness();
     let tets = TilingReport {
         pieces: it.alone.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
-        thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
+        thickness: spread.as_ref().map(WallSpread::from),
         ports: Some(cell.count(part, 0.5 * (levels.lo + levels.hi)).ports),
         face_fraction: Some(iso.map(|t| cell.face_fraction(part, t)).varying()),
         creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max, smoothed: c.smoothed }),

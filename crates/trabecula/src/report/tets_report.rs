@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use super::Varying;
 use crate::kind::Warning;
-use crate::mesher::Fit;
+use crate::mesher::{Fit, MadeLayers};
+use crate::tiling::Spread as Walls;
 
 /// The figures of a tetrahedral mesh.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -35,9 +36,11 @@ pub struct TetMeshReport {
 pub struct LayersMade {
     /// Number of prisms and wedges, each cut into tetrahedra.
     pub prisms: usize,
-    /// Mean of their heights over those asked for.
+    /// Mean over their area of their heights in those asked for, where layers do not taper to their end.
     pub mean: f64,
-    /// The least of these, where layers do not taper to their end.
+    /// Share of that area where they are lower than nine tenths of these.
+    pub lower: f64,
+    /// The least of these heights.
     pub least: f64,
     /// Where it is, mm.
     pub at: [f64; 3],
@@ -152,6 +155,19 @@ pub struct LostFeatureReport {
     pub size: f64,
     /// The greatest distance from the boundary of the mesh, mm.
     pub depth: f64,
+}
+
+impl From<&MadeLayers> for LayersMade {
+    fn from(m: &MadeLayers) -> Self {
+        LayersMade { prisms: m.prisms, mean: m.mean, lower: m.lower, least: m.least, at: m.at }
+    }
+}
+
+impl From<&Walls> for WallSpread {
+    fn from(w: &Walls) -> Self {
+        let Walls { min, low, mean, high, max, merged, through } = *w;
+        WallSpread { min, low, mean, high, max, merged, through }
+    }
 }
 
 impl From<Spread> for MinMeanMax {
@@ -325,6 +341,10 @@ pub struct WallSpread {
     pub high: f64,
     /// Maximum of some thousand.
     pub max: f64,
+    /// Share of the mid-surface from which a wall runs into the next one before it ends.
+    pub merged: f64,
+    /// Mean length of the solid along normals, to where it ends: more than the mean wall where walls run into each other.
+    pub through: f64,
 }
 
 /// Angles between walls at the faces of tetrahedra, degrees.

@@ -41,6 +41,21 @@ pub struct Spread {
     pub high: f64,
     /// The greatest of some thousand.
     pub max: f64,
+    /// The share of the mid-surface from which a wall runs into the next one before it ends.
+    pub merged: f64,
+    /// The mean length of the solid along normals, both ways to where it ends: that of the walls unless they run into each other.
+    pub through: f64,
+}
+
+/// A wall along a normal of the mid-surface.
+struct Wall {
+    /// How thick it is, mm; one that runs into the next one ends half way.
+    thickness: f64,
+    /// The area (mm²) of mid-surface that it stands for.
+    area: f64,
+    /// How far the solid goes, mm, and whether that is into the next wall.
+    through: f64,
+    merged: bool,
 }
 
 /// Something weighted by area (mm²), and that area.
@@ -70,24 +85,26 @@ impl Tiling {
             let some: Vec<&Piece> = pieces.iter().skip(i % every).step_by(every).collect();
             self.along_normals(t, &some)
         };
-        let all: Vec<Vec<[f64; 2]>> = self.some().into_par_iter().enumerate().map(tet).collect();
-        let mut all = all.concat();
-        all.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-        let area: f64 = all.iter().map(|v| v[1]).sum();
+        let all: Vec<Vec<Wall>> = self.some().into_par_iter().enumerate().map(tet).collect();
+        let mut all: Vec<Wall> = all.into_iter().flatten().collect();
+        all.sort_unstable_by(|a, b| a.thickness.total_cmp(&b.thickness).then(a.area.total_cmp(&b.area)));
+        let area: f64 = all.iter().map(|w| w.area).sum();
         let share = |s: f64| {
             let mut below = 0.0;
-            let at = all.iter().find(|v| {
-                below += v[1];
+            let at = all.iter().find(|w| {
+                below += w.area;
                 below >= s * area
             });
-            at.map(|v| v[0])
+            at.map(|w| w.thickness)
         };
         Some(Spread {
-            min: all.first()?[0],
+            min: all.first()?.thickness,
             low: share(0.05)?,
             mean: self.mean_wall(&pieces),
             high: share(0.95)?,
-            max: all.last()?[0],
+            max: all.last()?.thickness,
+            merged: all.iter().filter(|w| w.merged).map(|w| w.area).sum::<f64>() / area,
+            through: all.iter().map(|w| w.through * w.area).sum::<f64>() / area,
         })
     }
 
@@ -182,8 +199,8 @@ impl Tiling {
         found.map(|v| v / known.len() as f64)
     }
 
-    /// The walls (mm) of a tetrahedron along the normals of these pieces of the mid-surface, each with the piece's area.
-    fn along_normals(&self, t: usize, pieces: &[&Piece]) -> Vec<[f64; 2]> {
+    /// The walls of a tetrahedron along the normals of these pieces of the mid-surface.
+    fn along_normals(&self, t: usize, pieces: &[&Piece]) -> Vec<Wall> {
         let mut places: Vec<Vec3> = pieces.iter().map(|p| self.map.place(t, p.at)).collect();
         // On to the mid-surface, where overlap has moved it too.
         let mut known = self.known(&places);
@@ -195,10 +212,12 @@ impl Tiling {
         }
         let on = |i: &usize| known[*i].t > 0.0 && known[*i].f.abs() < 0.01 * known[*i].t;
         let found: Vec<usize> = (0..places.len()).filter(on).collect();
-        let mut walls = vec![0.0; places.len()];
+        let nothing =
+            |p: &&Piece| Wall { thickness: 0.0, area: self.first_order(t, p)[1], through: 0.0, merged: false };
+        let mut walls: Vec<Wall> = pieces.iter().map(nothing).collect();
         for side in [1.0, -1.0] {
             let mut open = found.clone();
-            // f and t − f at the last step.
+            // f and t − |f| at the last step; f is infinite in the next wall.
             let mut last: Vec<[f64; 2]> = known.iter().map(|k| [0.0, k.t]).collect();
             for step in 1..=4 * STEPS {
                 let h = |i: usize| known[i].t / norm(known[i].slope) / STEPS as f64;
@@ -209,21 +228,32 @@ impl Tiling {
                 let beyond = self.known(&open.iter().map(at).collect::<Vec<Vec3>>());
                 let mut left = Vec::with_capacity(open.len());
                 for (i, k) in open.into_iter().zip(beyond) {
-                    let (f, short) = (side * k.f, k.t - side * k.f);
-                    let before = last[i][1];
+                    let (f, short) = (side * k.f, k.t - k.f.abs());
+                    let [f_before, before] = last[i];
+                    let (wall, done) = (&mut walls[i], h(i) * (step - 1) as f64);
+                    let own = f_before.is_finite();
                     if short <= 0.0 {
-                        walls[i] += h(i) * ((step - 1) as f64 + before / (before - short));
-                    } else if f < last[i][0] || step == 4 * STEPS {
-                        // A wall that runs into the next one ends half way.
-                        walls[i] += h(i) * (step - 1) as f64;
+                        let length = done + h(i) * before / (before - short);
+                        wall.through += length;
+                        wall.thickness += if own { length } else { 0.0 };
+                        continue;
+                    }
+                    // A wall that runs into the next one ends half way.
+                    let turns = own && (f < f_before || step == 4 * STEPS);
+                    wall.thickness += if turns { done } else { 0.0 };
+                    wall.merged |= turns;
+                    if step == 4 * STEPS {
+                        wall.through += done;
                     } else {
-                        last[i] = [f, short];
+                        last[i] = [if turns || !own { f64::INFINITY } else { f }, short];
                         left.push(i);
                     }
                 }
                 open = left;
             }
         }
-        found.into_iter().map(|i| [walls[i], self.first_order(t, pieces[i])[1]]).collect()
+        let mut on = vec![false; walls.len()];
+        found.iter().for_each(|i| on[*i] = true);
+        walls.into_iter().zip(on).filter(|(_, on)| *on).map(|(w, _)| w).collect()
     }
 }

@@ -1,10 +1,12 @@
 //! Layers of prisms along the surface of tetrahedral meshes.
 
+use std::sync::Arc;
+
 use geometry::math::Vec3;
 use geometry::tetmesh::TetMesh;
 use trabecula::grade::Grade;
 use trabecula::mesher::{Background, PrismLayers, background};
-use trabecula::region::Region;
+use trabecula::region::{Cylinder, Difference, Region};
 
 use crate::common::{Random, cases, cuboid, fault, region, within};
 
@@ -124,5 +126,56 @@ fn layers_taper_where_they_end_and_are_thinner_where_there_is_no_room() {
         let refused =
             background(&space, &space.bounds(), &Grade::Constant(0.7), &inside, Some(&few)).expect_err("refused");
         assert!(refused.at == "layers.on" && refused.message.contains(words), "{refused}");
+    }
+}
+
+/// A cylinder, a tube, a box or a plate with two holes, and how thick it is.
+fn with_edges(kind: usize, some: &mut Random) -> (Region, f64) {
+    let rod = |base: Vec3, axis: Vec3, radius: f64, height: f64| -> Region {
+        Arc::new(Cylinder::new(base, axis, radius, height).expect("cylinder"))
+    };
+    let less = |parts: Vec<Region>| -> Region { Arc::new(Difference::new(parts).expect("difference")) };
+    let z = [0.0, 0.0, 1.0];
+    match kind {
+        0 => {
+            let axis = [some.between(-1.0, 1.0), some.between(-1.0, 1.0), 1.0];
+            (rod([0.1, 0.2, 0.3], axis, some.between(6.0, 9.0), some.between(8.0, 12.0)), 8.0)
+        }
+        1 => {
+            let (hole, wall) = (some.between(4.0, 6.0), some.between(4.0, 6.0));
+            let around = rod([0.0; 3], z, hole + wall, 12.0);
+            (less(vec![around, rod([0.0, 0.0, -1.0], z, hole, 14.0)]), wall)
+        }
+        2 => (cuboid([0.0; 3], [0; 3].map(|_| some.between(8.0, 14.0))), 8.0),
+        _ => {
+            let (thick, hole) = (some.between(5.0, 8.0), some.between(3.0, 4.0));
+            let holes = [[8.0, 7.0, -1.0], [20.0, 13.0, -1.0]].map(|at| rod(at, z, hole, thick + 2.0));
+            (less([cuboid([0.0; 3], [28.0, 20.0, thick])].into_iter().chain(holes).collect()), thick)
+        }
+    }
+}
+
+/// At sharp edges columns are tilted and shortened until their tetrahedra have fair angles: no less than 0.4 of those of right prisms as high
+/// as layers are asked to be, or of 15 degrees if these are less, and none above 172 degrees.
+#[test]
+fn layers_of_parts_with_edges_have_no_flat_tetrahedra() {
+    let mut some = Random(31);
+    for i in 0..cases(8) as usize {
+        let (space, thick) = with_edges(i % 4, &mut some);
+        let size = thick * some.between(0.35, 0.5);
+        let count = 1 + (some.share() * 3.0) as u32;
+        let asked = layers(count, size * some.between(0.2, 0.6) / f64::from(count), some.between(1.0, 1.2), None);
+        let height = asked.ends[0];
+        let what = format!("kind {}, size {size}, {count} layers of {height}", i % 4);
+        let plain = made(&space, size, None).mesh;
+        let layered = made(&space, size, Some(asked));
+        sound(&what, &layered.mesh);
+        assert!((layered.mesh.volume() / plain.volume() - 1.0).abs() < 1e-12, "{what}");
+        let found = layered.layers.expect("layers");
+        assert_eq!(found.prisms, count as usize * plain.boundary().triangles.len(), "{what}: {found:?}");
+        assert!(found.mean > 0.6 && found.mean <= 1.0 && found.least <= found.mean, "{what}: {found:?}");
+        let angles = layered.mesh.quality().expect("tetrahedra").dihedral;
+        let right = (height / size).atan().to_degrees().min(15.0);
+        assert!(angles.min > 0.4 * right && angles.max < 172.0, "{what}: {} to {}", angles.min, angles.max);
     }
 }
