@@ -1,8 +1,8 @@
 //! The half-beams of a hub that can be active in a box: mostly few of them, and N over these few is N.
 //!
-//! A half-beam whose G is negative is not active, since no τ is. One is neither where another, i, is active alone and G_k < τ_ik G_i;
-//! and N is that of half-beams i and j alone if no other half-beam k has G above Ry there: of i alone, of j alone where it can have
-//! the larger G, and of both. These differences are affine functions of the position, so their maxima over a box are exact.
+//! A half-beam whose G is negative is not active, since no τ is. Nor is half-beam k where another, i, is active alone and
+//! G_k < τ_ik G_i. N is that of half-beams i and j alone if no other has G above Ry there: of i alone, of j alone where it can
+//! have the larger G, and of both. These differences are affine functions of the position, so their maxima over a box are exact.
 
 use geometry::math::{Vec3, scale};
 

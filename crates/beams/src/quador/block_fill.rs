@@ -98,8 +98,8 @@ impl Fill<'_> {
         self.hubs.truncate(own);
     }
 
-    /// Adds those of the hubs from number `first` on, the least first, that can be nearest in a box, by proven bounds; and bounds the
-    /// field there. Where only its sign is wanted, it ends with the first hub that contains the box.
+    /// Adds those of the hubs from number `first` on, the least first, that can be nearest in a box, by proven bounds; and
+    /// bounds the field there. Where only its sign is wanted, it ends with the first hub that contains the box.
     fn cull(&mut self, bounds: &Aabb, first: usize) -> Interval {
         let own = self.hubs.len();
         let mut range = Interval::new(self.quadors.cap, self.quadors.cap);

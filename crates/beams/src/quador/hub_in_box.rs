@@ -85,8 +85,8 @@ impl Quadors {
         (within, Interval::new(within.least, hi + slack))
     }
 
-    /// Lowers values at positions in a box (at most `MOST_POINTS`, by coordinate) to those of a hub. They are the least of the same
-    /// values as one by one, to the last bit.
+    /// Lowers values at positions in a box (at most `MOST_POINTS`, by coordinate) to those of a hub. They are the least of the
+    /// same values as one by one, to the last bit.
     pub(super) fn lower(&self, within: &HubInBox, points: [&[f64]; 3], least: &mut [f64], few: &mut FewHalfBeams) {
         let (ball, hub) = (&self.balls[within.hub as usize], self.hub(within.hub as usize));
         let mut values = [0.0; MOST_POINTS];
@@ -176,10 +176,41 @@ impl Hub<'_> {
     }
 }
 
-/// The largest half second derivative of N where two half-beams are active, from the gradients of their G: the larger eigenvalue
-/// of (p pᵀ − τ (p qᵀ + q pᵀ) + q qᵀ)/(1 − τ²).
+/// The largest half second derivative of N where two half-beams are active, from the gradients of their G: the larger
+/// eigenvalue of (p pᵀ − τ (p qᵀ + q pᵀ) + q qᵀ)/(1 − τ²).
 fn curvature_of_two(tau: f64, p: Vec3, q: Vec3) -> f64 {
     let (pp, pq, qq, rest) = (dot(p, p), dot(p, q), dot(q, q), (1.0 - tau) * (1.0 + tau));
     let (half, product) = ((pp - 2.0 * tau * pq + qq) / (2.0 * rest), (pp * qq - pq * pq) / rest);
     half + (half * half - product).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Fillet, tests};
+    use super::*;
+
+    /// Small boxes, many of which creases cross: there N has more than one gradient.
+    #[test]
+    fn bounds_of_small_boxes_hold_every_value_near_creases_and_fillets() {
+        let mut random = tests::Random(21);
+        for n in [2, 3, 6] {
+            for fillet in [Fillet::None, Fillet::Auto, Fillet::Tau(0.9)] {
+                for _ in 0..60 {
+                    let q = Quadors::new(&tests::random_star(&mut random, n), fillet).expect("a star");
+                    for _ in 0..100 {
+                        let center = scale(random.direction(), 3.0 * random.next());
+                        let half = [(); 3].map(|()| 0.15 * random.next());
+                        let at = |k: usize| {
+                            let o = [k % 3, k / 3 % 3, k / 9];
+                            [0, 1, 2].map(|a| center[a] + half[a] * (o[a] as f64 - 1.0))
+                        };
+                        let bound = q.bound(&Aabb { min: at(0), max: at(26) });
+                        for v in (0..27).map(|k| q.value(at(k))) {
+                            assert!(bound.lo <= v && v <= bound.hi, "{n} {fillet:?} {center:?}: {v} {bound:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
