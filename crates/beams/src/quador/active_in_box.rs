@@ -190,3 +190,21 @@ impl Hub<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_gives_back_its_half_beams_and_all_from_the_64th_on_together() {
+        for all in [0, 1, 10, 63, 64, 65, 90] {
+            assert!(HalfBeamSet::ALL.of(all).eq(0..all), "{all}");
+            let few: Vec<usize> = (0..all.min(63)).filter(|i| i % 7 == 3).collect();
+            let mut set = HalfBeamSet::NONE;
+            few.iter().for_each(|i| set.add(*i));
+            assert!(set.of(all).eq(few.iter().copied()), "{all}");
+            set.add(80);
+            assert!(set.of(all).eq(few.into_iter().chain(63..all)), "{all}");
+        }
+    }
+}

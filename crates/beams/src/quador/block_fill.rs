@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn a_block_has_the_values_of_its_nodes_to_the_last_bit_about_random_hubs() {
         let mut random = tests::Random(11);
-        for n in [1, 2, 3, 5, 8, 14] {
+        for n in [1, 2, 3, 5, 8, 14, 70] {
             for fillet in [Fillet::None, Fillet::Auto, Fillet::Tau(0.9), Fillet::Radius(0.2)] {
                 let q = Quadors::new(&tests::random_star(&mut random, n), fillet).expect("a star");
                 let step = 0.03 + 0.2 * random.next();
