@@ -1,28 +1,44 @@
-//! The half-beams of a hub that can be active in a box: where they are one or two, N takes a few operations.
+//! The half-beams of a hub that can be active in a box: mostly few of them, and N over these few is N.
 //!
-//! With half-beams i and j alone N is that of all, at every position of a box, if no other half-beam k has G above Ry there: of
-//! i alone (G_k < τ_ik G_i), of j alone where it can have the larger G, and of both. These differences are affine functions of the
-//! position, so their maxima over a box are exact.
+//! A half-beam whose G is negative is not active, since no τ is. Nor is half-beam k where another, i, is active alone and
+//! G_k < τ_ik G_i. N is that of half-beams i and j alone if no other has G above Ry there: of i alone, of j alone where it can
+//! have the larger G, and of both. These differences are affine functions of the position, so their maxima over a box are exact.
 
-use geometry::math::{Vec3, dot, scale, sub};
+use geometry::math::{Vec3, scale};
 
 use super::hub::{AffineFunction, Hub};
-use super::smooth_union::{ROUNDING, largest};
+use super::smooth_union::ROUNDING;
 
 /// Bound of the rounding of an affine function and of its maximum, relative to the sum of its terms' magnitudes.
 const SLACK: f64 = 1e-12;
 
-/// The half-beams that can be active in a box, by their numbers in the hub.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum ActiveInBox {
-    /// None: there the hub is its ball.
-    None,
-    /// This one, with a positive G throughout.
-    One(usize),
-    /// One of these two or both, in ascending order; the larger G is positive throughout.
-    Two(usize, usize),
-    /// Any.
-    Any,
+/// A set of half-beams of a hub: a bit for each of the first 63, and one for all others.
+#[derive(Clone, Copy)]
+pub(super) struct HalfBeamSet(u64);
+
+impl HalfBeamSet {
+    pub(super) const NONE: HalfBeamSet = HalfBeamSet(0);
+    pub(super) const ALL: HalfBeamSet = HalfBeamSet(u64::MAX);
+
+    pub(super) fn add(&mut self, i: usize) {
+        self.0 |= 1 << i.min(63);
+    }
+
+    /// Those of `all` half-beams that it has, in ascending order.
+    #[inline]
+    pub(super) fn of(self, all: usize) -> impl Iterator<Item = usize> {
+        let mut left = if all < 64 { self.0 & !(u64::MAX << all) } else { self.0 };
+        let mut beyond = if left >> 63 == 1 { 63..all } else { 0..0 };
+        left &= u64::MAX >> 1;
+        core::iter::from_fn(move || {
+            let i = left.trailing_zeros() as usize;
+            if left == 0 {
+                return beyond.next();
+            }
+            left &= left - 1;
+            Some(i)
+        })
+    }
 }
 
 /// A box in the frame of a hub: its centre and half its edges.
@@ -51,17 +67,83 @@ impl Around {
     }
 }
 
-impl Hub<'_> {
-    /// The half-beams that can be active in a box, of those that can be in a box around it.
-    pub(super) fn active_in_box(&self, outer: ActiveInBox, around: &Around) -> ActiveInBox {
-        match outer {
-            ActiveInBox::Any => self.with_g(around.at, |g| self.active_of_all(largest(g), around)),
-            ActiveInBox::Two(i, j) if self.is_alone(i, j, around) => ActiveInBox::One(i),
-            ActiveInBox::Two(i, j) if self.is_alone(j, i, around) => ActiveInBox::One(j),
-            _ => outer,
+/// Half-beams of a hub by their numbers in it, in ascending order, with their G and R close together in memory.
+#[derive(Default)]
+pub(super) struct FewHalfBeams {
+    numbers: Vec<usize>,
+    g: Vec<AffineFunction>,
+    taus: Vec<f64>,
+}
+
+impl FewHalfBeams {
+    pub(super) fn set(&self) -> HalfBeamSet {
+        let mut set = HalfBeamSet::NONE;
+        self.numbers.iter().for_each(|i| set.add(*i));
+        set
+    }
+
+    /// The hub as if it had no other half-beams that can be active.
+    pub(super) fn of<'a>(&'a self, hub: &Hub<'a>) -> Hub<'a> {
+        Hub { g: &self.g, taus: &self.taus, ..*hub }
+    }
+
+    /// Takes the half-beams of a set.
+    pub(super) fn take(&mut self, hub: &Hub, set: HalfBeamSet) {
+        self.numbers.clear();
+        self.numbers.extend(set.of(hub.g.len()));
+        self.gather(hub);
+    }
+
+    /// Takes the half-beams that can be active in a box, of those that can be in a box around it.
+    pub(super) fn take_active(&mut self, hub: &Hub, outer: HalfBeamSet, around: &Around) {
+        self.numbers.clear();
+        let (mut first, mut most) = (usize::MAX, f64::NEG_INFINITY);
+        for i in outer.of(hub.g.len()) {
+            let g = hub.g[i].at(around.at);
+            if around.is_negative(&hub.g[i], &[&hub.g[i]], 1.0) {
+                continue;
+            }
+            if g > most {
+                (first, most) = (i, g);
+            }
+            self.numbers.push(i);
+        }
+        if self.numbers.len() > 1 && most > 0.0 && hub.is_positive(first, around) {
+            self.keep_alone(hub, first, around);
+        }
+        self.gather(hub);
+    }
+
+    fn gather(&mut self, hub: &Hub) {
+        self.g.clear();
+        self.g.extend(self.numbers.iter().map(|i| hub.g[*i]));
+        self.taus.clear();
+        if !hub.sharp() && self.numbers.len() > 1 {
+            for i in &self.numbers {
+                self.taus.extend(self.numbers.iter().map(|j| hub.tau(*i, *j)));
+            }
         }
     }
 
+    /// Keeps one or two half-beams if they alone can be active in a box, one of them with a positive G throughout.
+    fn keep_alone(&mut self, hub: &Hub, first: usize, around: &Around) {
+        let mut above = self.numbers.iter().copied().filter(|k| *k != first && !hub.is_below(*k, first, around));
+        let (second, third) = (above.next(), above.next());
+        if third.is_some() {
+            return;
+        }
+        let rest = self.numbers.iter().copied().filter(|k| *k != first && Some(*k) != second);
+        let alone = match second {
+            Some(second) => hub.are_alone(first, second, rest, around),
+            None => true,
+        };
+        if alone {
+            self.numbers.retain(|k| *k == first || Some(*k) == second);
+        }
+    }
+}
+
+impl Hub<'_> {
     /// Whether half-beam k is surely not active where i alone is, and smaller.
     #[inline]
     fn is_below(&self, k: usize, i: usize, around: &Around) -> bool {
@@ -75,34 +157,15 @@ impl Hub<'_> {
         around.is_negative(&AffineFunction { a: scale(g.a, -1.0), b: -g.b }, &[g], 1.0)
     }
 
-    #[inline]
-    fn is_alone(&self, i: usize, other: usize, around: &Around) -> bool {
-        self.is_positive(i, around) && self.is_below(other, i, around)
-    }
-
-    fn active_of_all(&self, (first, most): (usize, f64), around: &Around) -> ActiveInBox {
-        if most <= 0.0 {
-            let all = self.g.iter().all(|g| around.is_negative(g, &[g], 1.0));
-            return if all { ActiveInBox::None } else { ActiveInBox::Any };
-        }
-        if !self.is_positive(first, around) {
-            return ActiveInBox::Any;
-        }
-        let all = 0..self.g.len();
-        let mut above = all.clone().filter(|k| *k != first && !self.is_below(*k, first, around));
-        let Some(second) = above.next() else {
-            return ActiveInBox::One(first);
-        };
-        if above.next().is_some() {
-            return ActiveInBox::Any;
-        }
+    /// Whether none of `rest`, which are below `first`, is active in a box where only it and `second` can be.
+    fn are_alone(&self, first: usize, second: usize, mut rest: impl Iterator<Item = usize>, around: &Around) -> bool {
         let (of, with) = (&self.g[first], &self.g[second]);
         let leads = !around.is_negative(&with.plus(-1.0, of), &[with, of], 1.0);
         let tau = self.tau(first, second);
         // y of the second of the two.
         let large = 1.0 / ((1.0 - tau) * (1.0 + tau));
         let y = (!self.sharp()).then(|| AffineFunction::default().plus(large, &with.plus(-tau, of)));
-        let apart = all.filter(|k| *k != first && *k != second).all(|k| {
+        rest.all(|k| {
             let g = &self.g[k];
             (!leads || self.is_below(k, second, around))
                 && y.is_none_or(|y| {
@@ -110,14 +173,14 @@ impl Hub<'_> {
                     let over = g.plus(-own, &of.plus(-tau, &y)).plus(-other, &y);
                     around.is_negative(&over, &[g, of, with], 2.0 * large)
                 })
-        });
-        if apart { ActiveInBox::Two(first.min(second), first.max(second)) } else { ActiveInBox::Any }
+        })
     }
 
     /// N where only two half-beams with these G can be active.
     #[inline]
     pub(super) fn union_of_two(tau: f64, p: f64, q: f64) -> f64 {
         let (most, other) = if q > p { (q, p) } else { (p, q) };
+        let most = most.max(0.0);
         let over = other - tau * most;
         if over > ROUNDING * most {
             let with = over / ((1.0 - tau) * (1.0 + tau));
@@ -126,22 +189,22 @@ impl Hub<'_> {
             most * most
         }
     }
+}
 
-    /// S − N and its gradient at x, where only these half-beams can be active, and an upper bound of half the second derivative of N.
-    #[inline]
-    pub(super) fn gradient_of(&self, active: ActiveInBox, x: Vec3, curvature: f64) -> (f64, Vec3, f64) {
-        let s = dot(x, x) - self.radius * self.radius;
-        match active {
-            ActiveInBox::None => (s, scale(x, 2.0), 0.0),
-            ActiveInBox::One(i) => {
-                let g = &self.g[i];
-                let y = g.at(x);
-                (s - y * y, sub(scale(x, 2.0), scale(g.a, 2.0 * y)), dot(g.a, g.a))
-            }
-            _ => {
-                let (value, gradient) = self.gradient(x);
-                (value, gradient, curvature)
-            }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_gives_back_its_half_beams_and_all_from_the_64th_on_together() {
+        for all in [0, 1, 10, 63, 64, 65, 90] {
+            assert!(HalfBeamSet::ALL.of(all).eq(0..all), "{all}");
+            let few: Vec<usize> = (0..all.min(63)).filter(|i| i % 7 == 3).collect();
+            let mut set = HalfBeamSet::NONE;
+            few.iter().for_each(|i| set.add(*i));
+            assert!(set.of(all).eq(few.iter().copied()), "{all}");
+            set.add(80);
+            assert!(set.of(all).eq(few.into_iter().chain(63..all)), "{all}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The field at all nodes of a structured block: the hubs that can matter are found for parts of it instead of for each node.
 
 use super::Quadors;
+use super::active_in_box::FewHalfBeams;
 use super::hub_in_box::{HubInBox, MOST_POINTS};
 use geometry::math::{Aabb, Interval, norm};
 
@@ -24,6 +25,8 @@ struct Fill<'a> {
     diagonal: f64,
     /// The hubs of the parts from the whole block to the present one.
     hubs: Vec<HubInBox>,
+    /// Of the hub at hand those that can be active.
+    few: FewHalfBeams,
     out: &'a mut [f32],
 }
 
@@ -36,7 +39,16 @@ impl Quadors {
         }
         let widest = axes.map(|axis| axis.windows(2).fold(0.0f64, |most, w| most.max(w[1] - w[0])));
         let around = if wanted.near { widest.into_iter().fold(0.0, f64::max) * (1.0 + 1e-9) } else { 0.0 };
-        let mut fill = Fill { quadors: self, axes, wanted, around, diagonal: norm(widest), hubs: Vec::new(), out };
+        let mut fill = Fill {
+            quadors: self,
+            axes,
+            wanted,
+            around,
+            diagonal: norm(widest),
+            hubs: Vec::new(),
+            few: FewHalfBeams::default(),
+            out,
+        };
         let shape = axes.map(<[f64]>::len);
         let bounds = fill.bounds([0; 3], shape);
         let mut hubs = Vec::new();
@@ -86,28 +98,32 @@ impl Fill<'_> {
         self.hubs.truncate(own);
     }
 
-    /// Adds those of the hubs from number `first` on that can be nearest in a box, by proven bounds; and bounds the field there.
+    /// Adds those of the hubs from number `first` on, the least first, that can be nearest in a box, by proven bounds; and
+    /// bounds the field there. Where only its sign is wanted, it ends with the first hub that contains the box.
     fn cull(&mut self, bounds: &Aabb, first: usize) -> Interval {
         let own = self.hubs.len();
         let mut range = Interval::new(self.quadors.cap, self.quadors.cap);
-        let mut lows = Vec::with_capacity(own - first);
         for n in first..own {
-            let apart = self.quadors.apart(self.hubs[n].hub, bounds);
+            let outer = self.hubs[n];
+            if outer.least > range.hi || self.wanted.near && range.hi < 0.0 {
+                break;
+            }
+            let apart = self.quadors.apart(outer.hub, bounds);
             if apart == 0.0 || apart < range.hi {
-                let (hub, of) = self.quadors.hub_in_box(&self.hubs[n], bounds);
+                let (hub, of) = self.quadors.hub_in_box(&outer, bounds, &mut self.few);
                 range = range.min(of);
-                lows.push(of.lo);
                 self.hubs.push(hub);
             }
         }
         let mut kept = own;
-        for (n, lo) in lows.into_iter().enumerate() {
-            if lo <= range.hi {
-                self.hubs[kept] = self.hubs[own + n];
+        for n in own..self.hubs.len() {
+            if self.hubs[n].least <= range.hi {
+                self.hubs[kept] = self.hubs[n];
                 kept += 1;
             }
         }
         self.hubs.truncate(kept);
+        self.hubs[own..].sort_unstable_by(|a, b| a.least.total_cmp(&b.least));
         range
     }
 
@@ -145,16 +161,11 @@ impl Fill<'_> {
             }
         }
         let mut least = [self.quadors.cap; MOST_POINTS];
-        // Values that take few operations first: most others need not be found then.
-        let (simple, rest): (Vec<&HubInBox>, Vec<&HubInBox>) = self.hubs[first..].iter().partition(|h| h.is_simple());
-        for hub in simple {
-            self.quadors.lower(hub, points.each_ref().map(|p| &p[..n]), &mut least[..n]);
-        }
-        let rest: Vec<u32> = rest.iter().map(|h| h.hub).collect();
-        if !rest.is_empty() {
-            for (k, least) in least[..n].iter_mut().enumerate() {
-                *least = self.quadors.value_among([0, 1, 2].map(|a| points[a][k]), &rest, *least);
+        for hub in &self.hubs[first..] {
+            if hub.least >= least[..n].iter().copied().fold(f64::NEG_INFINITY, f64::max) {
+                break;
             }
+            self.quadors.lower(hub, points.each_ref().map(|p| &p[..n]), &mut least[..n], &mut self.few);
         }
         let mut rows = least.chunks(hi[0] - lo[0]);
         for k in lo[2]..hi[2] {
@@ -214,7 +225,7 @@ mod tests {
     #[test]
     fn a_block_has_the_values_of_its_nodes_to_the_last_bit_about_random_hubs() {
         let mut random = tests::Random(11);
-        for n in [1, 2, 3, 5, 8, 14] {
+        for n in [1, 2, 3, 5, 8, 14, 70] {
             for fillet in [Fillet::None, Fillet::Auto, Fillet::Tau(0.9), Fillet::Radius(0.2)] {
                 let q = Quadors::new(&tests::random_star(&mut random, n), fillet).expect("a star");
                 let step = 0.03 + 0.2 * random.next();

@@ -82,9 +82,9 @@ pub struct Hub<'a> {
     pub radius: f64,
     /// Its half-beams.
     pub half_beams: &'a [HalfBeam],
-    /// G of each, close together in memory.
+    /// G of each that may be active, close together in memory.
     pub(crate) g: &'a [AffineFunction],
-    /// R: τ of each pair of half-beams and 1 on the diagonal, row by row; empty if they meet in creases.
+    /// R: τ of each pair of these and 1 on the diagonal, row by row; empty if they meet in creases.
     pub(crate) taus: &'a [f64],
     /// Upper bound of N where no G is more than 1.
     pub(crate) most: f64,
@@ -98,7 +98,7 @@ impl Hub<'_> {
 
     /// τ of two half-beams.
     pub fn tau(&self, i: usize, j: usize) -> f64 {
-        if self.sharp() { 1.0 } else { self.taus[i * self.half_beams.len() + j] }
+        if self.sharp() { 1.0 } else { self.taus[i * self.g.len() + j] }
     }
 
     /// How far x lies outside the range of the hub's formula (mm; positive outside), and the gradient, if that is more than

@@ -67,14 +67,20 @@ impl Quadors {
     #[inline]
     pub(super) fn below(&self, hub: &Hub, x: Vec3, least: f64) -> f64 {
         hub.with_g(x, |g| {
-            let from_center = dot(x, x);
-            let square = from_center - hub.radius * hub.radius;
-            let level = if least < 0.0 { 2.0 * self.scale * least } else { least * (least + 2.0 * self.scale) };
-            // What is surely not less stays so after rounding: the least value does not depend on the order of the hubs.
-            let enough = square - level - ROUNDING * (from_center + level.abs());
-            let v = self.length(square - hub.union_of(g, largest(g), [f64::INFINITY, enough]));
+            let v = self.length_below(hub, x, g, least);
             if v < least { hub.past_cut_of(x, g, v).0 } else { v }
         })
+    }
+
+    /// As `below`, not raised past the cut planes, for given G at x.
+    #[inline]
+    pub(super) fn length_below(&self, hub: &Hub, x: Vec3, g: &[f64], least: f64) -> f64 {
+        let from_center = dot(x, x);
+        let square = from_center - hub.radius * hub.radius;
+        let level = if least < 0.0 { 2.0 * self.scale * least } else { least * (least + 2.0 * self.scale) };
+        // What is surely not less stays so after rounding: the least value does not depend on the order of the hubs.
+        let enough = square - level - ROUNDING * (from_center + level.abs());
+        self.length(square - hub.union_of(g, largest(g), [f64::INFINITY, enough]))
     }
 
     fn value_and_gradient(&self, p: Vec3) -> (f64, Vec3) {

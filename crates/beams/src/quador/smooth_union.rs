@@ -174,7 +174,7 @@ impl Hub<'_> {
     }
 
     fn row(&self, i: usize) -> &[f64] {
-        let n = self.half_beams.len();
+        let n = self.g.len();
         &self.taus[i * n..(i + 1) * n]
     }
 
@@ -193,7 +193,7 @@ impl Hub<'_> {
         let (y, rest) = work.split_at_mut(room);
         let (z, rest) = rest.split_at_mut(room);
         let (h, l) = rest.split_at_mut(room);
-        let (all, mut factored) = (self.half_beams.len(), 0);
+        let (all, mut factored) = (self.g.len(), 0);
         let tolerance = ROUNDING * g[active[0]];
         // Each step raises 2 y·g − yᵀRy; the limit ends cycles of rounding.
         for _ in 0..4 * all + 16 {

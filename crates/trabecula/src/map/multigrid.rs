@@ -16,6 +16,8 @@ const LEAST: usize = 5;
 const APART: f64 = 1.5;
 /// Rows that are worked on in one go.
 const ROWS: usize = 8;
+/// Fewest numbers that are worth another thread: on coarse grids that takes longer to start than they do.
+const SHARED: usize = 16_384;
 
 /// A grid and the grids coarser than it.
 pub(super) struct Multigrid {
@@ -170,7 +172,8 @@ impl Level {
                 out.iter_mut().zip(given).zip(&product).for_each(|((o, b), p)| *o = of(*o, *b, *p));
             }
         };
-        out.par_chunks_mut(nx * ROWS).zip(given.par_chunks(nx * ROWS)).enumerate().for_each(rows);
+        let chunks = out.par_chunks_mut(nx * ROWS).zip(given.par_chunks(nx * ROWS));
+        chunks.enumerate().with_min_len(SHARED.div_ceil(nx * ROWS)).for_each(rows);
     }
 
     /// Row number `row` of A x.
@@ -214,10 +217,10 @@ impl Level {
                 false => self.apply(x, left, |_, right, product| right - product, right),
             }
             let parts = (
-                x.par_chunks_mut(4096),
-                change.par_chunks_mut(4096),
-                left.par_chunks(4096),
-                self.inverse.par_chunks(4096),
+                x.par_chunks_mut(SHARED),
+                change.par_chunks_mut(SHARED),
+                left.par_chunks(SHARED),
+                self.inverse.par_chunks(SHARED),
             );
             parts.into_par_iter().for_each(|(x, change, left, inverse)| {
                 for (((x, c), l), d) in x.iter_mut().zip(change).zip(left).zip(inverse) {
@@ -232,7 +235,7 @@ impl Level {
     fn restrict(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
-        to.par_chunks_mut(cx).enumerate().for_each(|(row, to)| {
+        to.par_chunks_mut(cx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
             let mut line = vec![0.0; nx];
             for (k, wk) in self.taps(2, row / cy) {
                 for (j, wj) in self.taps(1, row % cy) {
@@ -250,7 +253,7 @@ impl Level {
     fn prolong(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
-        to.par_chunks_mut(nx).enumerate().for_each(|(row, to)| {
+        to.par_chunks_mut(nx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
             let mut line = vec![0.0; cx];
             for (k, wk) in self.sources(2, row / ny) {
                 for (j, wj) in self.sources(1, row % ny) {
