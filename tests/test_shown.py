@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
+from test_viewer import unpacked
 from trabecula.camera import towards
 from trabecula.shown import SHOWN, look
 from trabecula.trajectories import trajectories
@@ -269,7 +270,7 @@ def test_overhang_is_told_by_the_build_direction(tmp_path):
     """A box from below: its lower face hangs over, by 0 degrees to the layers; no other face faces down."""
     box = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
     draw = {"size": (160, 130), "azimuth": 30, "elevation": -40, "background": "white"}
-    grey = pixels(box.png(**draw, color=np.full(8, np.nan)))
+    grey = pixels(box.png(**draw, color=np.full(8, np.nan), span=(0, 90)))
     for up, count in (((0, 0, 1), 1), ((0, 0, 5), 1), ((0, 0, -1), 0), ((-1, 0, 0), 1), ((0, 1, -1e-9), 0)):
         seen = pixels(box.png(**draw, color="overhang", up=up))
         lower = (np.abs(seen - grey).max(axis=2) > 30) & (seen[:, :, 1] < 90)
@@ -288,6 +289,39 @@ def test_overhang_is_told_by_the_build_direction(tmp_path):
         with pytest.raises(SystemExit):
             in_process(*command, "--show", "overhang", "--up", wrong)
     in_process(*command, "--show", "fraction", status=2)
+
+
+@pytest.mark.parametrize(
+    ("value", "ends"), [(0.3, (0, 0.6)), (-2.0, (-4, 0)), (0.0, (0, 1)), (5e-324, (0, 1e-323)), (7e12, (0, 1.4e13))]
+)
+def test_one_value_is_in_the_middle_of_its_scale_in_pictures_and_pages(value, ends):
+    mesh = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
+    values = np.full(8, value)
+    assert mesh._tint(values, "", None, (0, 0, 1))[2] == mesh.view(values)._span == ends
+    assert f"{ends[0]:.4g}<i></i>{ends[1]:.4g}" in mesh.view(values).figure()
+    head = unpacked(mesh.view(values).packed)[0]
+    assert tuple(head["span"]) == ends and not head["missing"]
+    # A constant to rounding is one value.
+    if value:
+        assert np.allclose(mesh.view(values * (1 + 1e-13 * np.arange(8)))._span, ends, rtol=1e-9, atol=0)
+
+
+def test_what_has_no_value_is_grey_and_the_scale_says_so():
+    mesh = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
+    values = np.arange(8.0)
+    for hole in (np.nan, np.inf, -np.inf):
+        some = np.where(values == 6, hole, values)
+        assert mesh._tint(some, "T, K", None, (0, 0, 1))[::2] == ("T, K (grey: no value)", (0.0, 7.0))
+        assert mesh._tint(some, "", None, (0, 0, 1))[0] == "grey: no value"
+        none = np.full(8, hole)
+        for wrong in (lambda none=none: mesh.png((60, 50), color=none), lambda none=none: mesh.view(none)):
+            with pytest.raises(ValueError, match="has no finite number, so there is nothing to show"):
+                wrong()
+        with pytest.raises(ValueError, match="values has no finite number"):
+            _ = mesh.view(lambda points, hole=hole: np.full(len(points), hole)).packed
+        with pytest.warns(lt.DesignWarning, match="too small"):
+            assert mesh.png((60, 50), color=none, span=(0, 1))  # the scale is given
+    assert mesh._tint(values, "T, K", None, (0, 0, 1))[0] == "T, K"
 
 
 def test_a_view_of_a_solid_is_saved_as_it_is_rendered(tmp_path):

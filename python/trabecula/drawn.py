@@ -53,10 +53,10 @@ if TYPE_CHECKING:
         up: Sequence[float]
 
 
-__all__ = ["OVERHANG", "WALL", "Drawn", "Picture", "numbers"]
+__all__ = ["NO_VALUE", "OVERHANG", "WALL", "Drawn", "Picture", "numbers", "scale_of", "scale_over"]
 
-#: What colours say that are computed.
-WALL, OVERHANG = "wall thickness, mm", "overhang, degrees to the layers (grey: none)"
+#: What colours say that are computed; and what they say where there is no finite number.
+WALL, OVERHANG, NO_VALUE = "wall thickness, mm", "overhang, degrees to the layers (grey: none)", "grey: no value"
 #: Points along the longer side of a section at which its colours are computed.
 ACROSS = 240
 
@@ -109,7 +109,8 @@ class Drawn(Picture):
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
         ``color`` is a number for each vertex, or a function of points (n, 3) in mm that gives such numbers, shown on a scale
-        that says ``label`` and goes over ``span``, or from the least to the greatest; or ``"thickness"``, see
+        that says ``label`` and goes over ``span``, or from the least to the greatest (one value alone is in the middle of a
+        scale from 0); triangles with a corner that has no finite number are grey. Or it is ``"thickness"``, see
         ``thickness_at_vertices``; or ``"overhang"``, the angle (degrees) between the surface and layers stacked along ``up``,
         where it faces down and the angle is less than the end of ``span``, 90 unless given. ``shares`` are instead numbers from
         0 to 1 for each vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm,
@@ -311,15 +312,12 @@ class Drawn(Picture):
             direction, label, span = [v / length for v in vector_of("up", up)], label or OVERHANG, span or (0.0, 90.0)
         else:
             values = numbers("color", color(self.vertices) if callable(color) else color, (self.counts[0], "vertex"))
-        if span is None:
-            finite = values[np.isfinite(values)]
-            span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-            if span[1] > 0 and span[1] - span[0] <= 1e-9 * span[1]:
-                span = (0.0, 2 * span[1])  # one value is in the middle of its scale
-        low, high = (number("span", v) for v in span)
+            if not np.isfinite(values).all():
+                label = f"{label} ({NO_VALUE})" if label else NO_VALUE
+        low, high = (number("span", v) for v in (scale_of("color", values) if span is None else span))
         if not -math.inf < low <= high < math.inf:
             raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
-        return label, values.tolist(), (low, high if high > low else low + 1.0), direction
+        return label, values.tolist(), scale_over(low, high), direction
 
     def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
         import numpy as np
@@ -354,6 +352,23 @@ def numbers(what: str, given: ArrayLike, many: tuple[int, str]) -> NDArray[np.fl
     if values.shape != (many[0],):
         raise ValueError(f"{what} must be {many[0]} numbers, one for each {many[1]}, found shape {values.shape}")
     return values
+
+
+def scale_of(what: str, values: NDArray[np.float64]) -> tuple[float, float]:
+    """The ends of the scale that shows these values; a ValueError where none of them is a finite number."""
+    import numpy as np
+
+    finite = values[np.isfinite(values)]
+    if values.size and not finite.size:
+        raise ValueError(f"{what} has no finite number, so there is nothing to show")
+    return scale_over(float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+
+
+def scale_over(low: float, high: float) -> tuple[float, float]:
+    """The ends of a scale over these numbers: one value alone is in the middle of a scale from 0, and 0 the end of 0 to 1."""
+    if high - low > 1e-9 * max(abs(low), abs(high)):
+        return low, high
+    return (min(0.0, 2 * high), max(0.0, 2 * high)) if high else (0.0, 1.0)
 
 
 def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:
