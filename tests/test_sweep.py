@@ -6,7 +6,9 @@ import io
 import itertools
 import json
 import math
+import multiprocessing
 import os
+import pickle
 import random
 import signal
 import subprocess
@@ -14,6 +16,7 @@ import sys
 import time
 import types
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -258,12 +261,28 @@ def test_each_figure_has_its_error_and_each_row_what_reports_warn_of(tmp_path: P
     assert columns["permeability_error"] == [permeability.error]
     said = columns["warnings"][0].split(" | ")
     reports = zip(names, (stiffness, conductivity, permeability), strict=True)
-    wanted = [f"{name}: {warning.message}" for name, found in reports for warning in found.warnings]
+    wanted = [f"{name}: {warning.path}: {warning.message}" for name, found in reports for warning in found.warnings]
     assert len(wanted) > 2 and [words for words in said if words.partition(":")[0] in names] == wanted
     assert any("grid steps" in words for words in said), said  # of the mesh
     # Those that are known before are those that are made.
     job = Job(lt.load(path), per_cell=8, properties=dict.fromkeys(names, settings))
     assert list(columns) == columns_of_job(job, ["lattice.a.level.fraction"])
+
+
+def test_warnings_of_a_row_say_what_they_are_of(tmp_path: Path):
+    """Of two lattices the primitive network of a fraction below 0.21 falls apart."""
+    sweep = '"lattice.b.level.fraction" = [0.1, 0.3]\n'
+    other = 'lattice.b = { cell = "primitive", part = "lower", map.affine.wavelength = 4, level.fraction = 0.3 }\n'
+    blend = 'blend = { between = ["a", "b"], weight = { linear = { along = [1, 0, 0], stops = [[-2, 0], [2, 1]] } } }\n'
+    (tmp_path / "two.toml").write_text(blend + other + BASE + "[sweep]\n" + sweep)
+    columns = lt.sweep(tmp_path / "two.toml", per_cell=8)
+    data = lt.load(tmp_path / "two.toml").to_dict()
+    del data["sweep"]
+    for row, fraction in enumerate((0.1, 0.3)):
+        data["lattice"]["b"]["level"]["fraction"] = fraction
+        wanted = [f"{w['path']}: {w['message']}" for w in lt.Design(**data).build().warnings]
+        assert columns["warnings"][row].split(" | ")[: len(wanted)] == wanted
+        assert any(words.startswith("lattice.b.level.fraction: ") for words in wanted) == (fraction < 0.2)
 
 
 # --- stopped and started again ---------------------------------------------------------------------------------------
@@ -680,6 +699,24 @@ def test_an_objective_is_a_plain_function():
         lt.objective(design, [path], ["E1"], properties=["stifness"])
     with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
         of({})
+
+
+def test_an_objective_goes_to_other_processes(tmp_path: Path, monkeypatch):
+    """As pools of optimisers have it; a file of the design is found from any folder, errors come back."""
+    monkeypatch.chdir(tmp_path)
+    Path("box.toml").write_text(BASE)
+    lt.load("box.toml").build().mesh(per_cell=8).write("part.stl")
+    path, core = "lattice.a.level.fraction", lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.3))
+    for design in ("box.toml", lt.Design(region=lt.region.mesh("part.stl"), lattice={"a": core})):
+        monkeypatch.chdir(tmp_path)
+        of = lt.objective(design, [path], ["volume_mm3", "wall_mm"], per_cell=8)
+        made = of({path: 0.3})
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            assert pool.submit(of, {path: 0.3}).result() == made
+            with pytest.raises(ValueError, match=r"fraction is 1\.5"):
+                pool.submit(of, {path: 1.5}).result()
+        monkeypatch.chdir("/")
+        assert pickle.loads(pickle.dumps(of))({path: 0.3}) == made
 
 
 @pytest.mark.parametrize(
