@@ -2,12 +2,17 @@
 
 import zlib
 
+import hypothesis
 import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
+from hypothesis import strategies as st
 from test_viewer import unpacked
 from trabecula.camera import towards
+from trabecula.cli import parser
+from trabecula.drawing import resolution
+from trabecula.drawn import _paper
 from trabecula.shown import SHOWN, look
 from trabecula.trajectories import trajectories
 
@@ -308,6 +313,25 @@ def test_one_value_is_in_the_middle_of_its_scale_in_pictures_and_pages(value, en
     # A constant to rounding is one value.
     if value:
         assert np.allclose(mesh.view(values * (1 + 1e-13 * np.arange(8)))._span, ends, rtol=1e-9, atol=0)
+
+
+def test_a_keyword_that_is_none_is_refused_by_the_name_that_was_called(tmp_path):
+    part = solid()
+    mesh = part.mesh(edge=1, islands="keep")
+    for thing, name in ((mesh, "render"), (part, "render"), (mesh, "png"), (mesh, "svg")):
+        file = (tmp_path / "a.png",) if name == "render" else ()
+        with pytest.raises(TypeError, match=rf"^{name} has no argument view\. It takes .*size, azimuth, .*projection"):
+            getattr(thing, name)(*file, view="up")
+        with pytest.raises(TypeError, match=rf"^{name} has no argument sections; did you mean section\?"):
+            getattr(thing, name)(*file, sections="z=1")
+
+
+@hypothesis.given(st.integers(10, 30000), st.integers(10, 30000), st.sampled_from([None, 96, 300, 1200.0]))
+def test_a_drawing_has_the_size_on_paper_that_is_asked_for(wide, high, dpi):
+    """In hundredths of a mm, which no whole number of pixels may be."""
+    size = f"{wide / 100:g}x{high / 100:g}mm"
+    args = parser().parse_args(["render", "a.stl", "-o", "a.svg", "--size", size, *(["--dpi", str(dpi)] if dpi else [])])
+    assert _paper(*resolution(args)) == ([wide / 100, high / 100], "mm")
 
 
 def test_what_has_no_value_is_grey_and_the_scale_says_so():

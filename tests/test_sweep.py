@@ -693,6 +693,8 @@ def test_an_objective_is_a_plain_function():
         lt.objective(design, [other], ["solid_fraction"])
     with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
         lt.objective(design, ["beams.b.radius"], ["solid_fraction"])
+    with pytest.raises(ValueError, match=r"^lattice\.a\.level\.fraction lies in lattice\.a\.level, which is a parameter too"):
+        lt.objective(design, [path, "lattice.a.level"], ["solid_fraction"])
     with pytest.raises(ValueError, match=r'unknown output "volume"; did you mean "volume_mm3"\?'):
         lt.objective(design, [path], ["volume"])
     with pytest.raises(ValueError, match=r'unknown property "stifness"; did you mean "stiffness"\?'):
@@ -740,6 +742,11 @@ def test_an_objective_goes_to_other_processes(tmp_path: Path, monkeypatch):
         ('"lattice.a.map.affine.offset[0]" = [1]', "lattice.a.map.affine.offset is none in the design"),
         ('"lattice.a.level.fraction" = [0.2, nan]', "value 2 is nan, which no key can have; give a finite number"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 3 }\nsampling = "sobol"\ncount = 4', "is of a grid"),
+        (
+            '"lattice.a.level" = [{ fraction = 0.3 }]\n"lattice.a.level.fraction" = [0.2]',
+            "sweep.lattice.a.level.fraction: it lies in lattice.a.level, which varies too; vary one of them",
+        ),
+        ('"region.box.size" = [[4, 4, 4]]\n"region.box.size[0]" = [3]', "it lies in region.box.size, which varies too"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: str, said: str):

@@ -135,6 +135,21 @@ def grid(n, thick, shift=0.0):
     return np.concatenate(faces), np.concatenate([up[:, ::-1], up + (n + 1) ** 2])
 
 
+def test_a_section_outside_of_the_part_is_refused_by_a_view(mesh):
+    """By all doors as by that of pictures; a plane at an end is where a user may move it."""
+    seen = mesh.view()
+    for section, words in (("z=300", "cuts nothing off"), ("z<-1", "leaves nothing"), ("x>13", "leaves nothing")):
+        with pytest.raises(ValueError, match=f'section "{section}" {words}: the mesh lies from 0 to'):
+            mesh.view(section=section)
+        with pytest.raises(ValueError, match=words):
+            seen.section = section
+    for section in ("z<8", "z<0", "x>12", "y=10"):
+        seen.section = section
+    far = mesh.moved([1234.5678, 0, 0])
+    for x in (far.bounds[0][0], far.bounds[1][0]):
+        far.view(section=f"x<{x:.7g}")  # as the viewer rounds it
+
+
 def test_vertices_without_a_value_are_marked_in_the_page(mesh):
     x = mesh.vertices[:, 0]
     for hole in (np.nan, np.inf):

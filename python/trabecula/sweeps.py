@@ -26,6 +26,7 @@ from .sent import digests
 from .simulated import Simulated
 from .study import Study
 from .unfinished import alone
+from .varying import overlapping
 from .workers import rows_by_processes, rows_here
 
 __all__ = ["FEW", "Journal", "columns_of", "objective", "run", "sweep", "write_table"]
@@ -92,6 +93,8 @@ def objective(
         if not isinstance(path, str):
             raise TypeError(f"expected paths of keys as text, found {path!r}")
     check_paths(design, paths)
+    if both := overlapping(paths):
+        raise ValueError(f"{both[1]} lies in {both[0]}, which is a parameter too; take one of them")
     known = columns_of_job(job, paths)
     for name in wanted:
         if name not in known:

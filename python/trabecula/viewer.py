@@ -10,7 +10,7 @@ from functools import cached_property
 from html import escape
 from importlib.resources import files
 
-from .camera import section_plane, towards
+from .camera import towards
 from .drawn import NO_VALUE, WALL, numbers, scale_of
 from .files import extension, write_text
 from .given import number
@@ -107,7 +107,7 @@ def checked(view: View, name: str, value: Any) -> Any:
     if name == "section":
         if not value:
             return ""
-        (normal, offset) = section_plane(value, towards(view.azimuth, view.elevation))
+        (normal, offset) = view.mesh._plane(value, towards(view.azimuth, view.elevation), ends=True)
         side = sum(normal)
         return f"{'xyz'[[abs(v) for v in normal].index(1)]}{'<' if side > 0 else '>'}{side * offset:.7g}"
     if name == "color":
