@@ -301,8 +301,9 @@ def test_another_run_is_not_mixed_in(tmp_path: Path, whole):
     stopped(path, 3)
     cases = {"design": (built(NETWORK.replace("1.3", "1.2")), EDGE, 1), "edge": (built(), 0.08, 1), "range": (built(), EDGE, 2)}
     for key, (solid, edge, size) in cases.items():
-        with pytest.raises(Refused, match=f"changed since are .*{key}.*; take that back, or begin anew with --new"):
+        with pytest.raises(Refused, match=f"changed since are .*{key}.*; take that back, or begin anew with --new") as said:
             ranges.save(solid, str(path), edge, "drop", size=size)
+        assert "count" not in str(said.value)  # of ranges, which follows from the edge
     assert again(path, 2, new=True) == whole[1] and path.read_bytes() == whole[0]
 
 

@@ -2,11 +2,17 @@
 
 import zlib
 
+import hypothesis
 import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
+from hypothesis import strategies as st
+from test_viewer import unpacked
 from trabecula.camera import towards
+from trabecula.cli import parser
+from trabecula.drawing import resolution
+from trabecula.drawn import _paper
 from trabecula.shown import SHOWN, look
 from trabecula.trajectories import trajectories
 
@@ -241,12 +247,16 @@ def test_a_picture_that_turns_has_the_colours_too(tmp_path, show):
 
 def test_stiffness_is_by_the_law_of_the_cell():
     part = graded()
-    given, mesh = shown(part, "stiffness", per_cell=4)
-    known = lt.law("gyroid", "sheet", 0.2, 0.5, 4, n=32, properties=["stiffness"])
+    with pytest.warns(lt.DesignWarning, match=r"core: stiffness at a fraction of 0\.2: .* n = \d+ of `law`, a picture has 48$"):
+        given, mesh = shown(part, "stiffness", per_cell=4)
+    known = lt.law("gyroid", "sheet", 0.2, 0.5, 4, properties=["stiffness"])
     at = np.clip(0.2 + 0.025 * mesh.vertices[:, 0], 0.2, 0.5)
     # Both are cubics through points of the law: 8 and 4 of them.
     assert np.allclose(given["color"](mesh.vertices), known.at("E", at), rtol=0.02)
-    assert given["label"] == "E of the cell along its axes, over that of the solid"
+    words, error = given["label"].split(" (error ")
+    assert words == "E along the cell's axes over the solid's"
+    # That of the worst of the fractions, of which both laws have the ends.
+    assert 100 * known.columns["E_error"][[0, -1]].max() <= float(error.removesuffix(" %)")) * 1.01 < 10
     even = solid()
     constant, mesh = shown(even, "stiffness", per_cell=4)
     assert np.ptp(constant["color"](mesh.vertices)) < 1e-9
@@ -269,7 +279,7 @@ def test_overhang_is_told_by_the_build_direction(tmp_path):
     """A box from below: its lower face hangs over, by 0 degrees to the layers; no other face faces down."""
     box = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
     draw = {"size": (160, 130), "azimuth": 30, "elevation": -40, "background": "white"}
-    grey = pixels(box.png(**draw, color=np.full(8, np.nan)))
+    grey = pixels(box.png(**draw, color=np.full(8, np.nan), span=(0, 90)))
     for up, count in (((0, 0, 1), 1), ((0, 0, 5), 1), ((0, 0, -1), 0), ((-1, 0, 0), 1), ((0, 1, -1e-9), 0)):
         seen = pixels(box.png(**draw, color="overhang", up=up))
         lower = (np.abs(seen - grey).max(axis=2) > 30) & (seen[:, :, 1] < 90)
@@ -288,6 +298,58 @@ def test_overhang_is_told_by_the_build_direction(tmp_path):
         with pytest.raises(SystemExit):
             in_process(*command, "--show", "overhang", "--up", wrong)
     in_process(*command, "--show", "fraction", status=2)
+
+
+@pytest.mark.parametrize(
+    ("value", "ends"), [(0.3, (0, 0.6)), (-2.0, (-4, 0)), (0.0, (0, 1)), (5e-324, (0, 1e-323)), (7e12, (0, 1.4e13))]
+)
+def test_one_value_is_in_the_middle_of_its_scale_in_pictures_and_pages(value, ends):
+    mesh = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
+    values = np.full(8, value)
+    assert mesh._tint(values, "", None, (0, 0, 1))[2] == mesh.view(values)._span == ends
+    assert f"{ends[0]:.4g}<i></i>{ends[1]:.4g}" in mesh.view(values).figure()
+    head = unpacked(mesh.view(values).packed)[0]
+    assert tuple(head["span"]) == ends and not head["missing"]
+    # A constant to rounding is one value.
+    if value:
+        assert np.allclose(mesh.view(values * (1 + 1e-13 * np.arange(8)))._span, ends, rtol=1e-9, atol=0)
+
+
+def test_a_keyword_that_is_none_is_refused_by_the_name_that_was_called(tmp_path):
+    part = solid()
+    mesh = part.mesh(edge=1, islands="keep")
+    for thing, name in ((mesh, "render"), (part, "render"), (mesh, "png"), (mesh, "svg")):
+        file = (tmp_path / "a.png",) if name == "render" else ()
+        with pytest.raises(TypeError, match=rf"^{name} has no argument view\. It takes .*size, azimuth, .*projection"):
+            getattr(thing, name)(*file, view="up")
+        with pytest.raises(TypeError, match=rf"^{name} has no argument sections; did you mean section\?"):
+            getattr(thing, name)(*file, sections="z=1")
+
+
+@hypothesis.given(st.integers(10, 30000), st.integers(10, 30000), st.sampled_from([None, 96, 300, 1200.0]))
+def test_a_drawing_has_the_size_on_paper_that_is_asked_for(wide, high, dpi):
+    """In hundredths of a mm, which no whole number of pixels may be."""
+    size = f"{wide / 100:g}x{high / 100:g}mm"
+    args = parser().parse_args(["render", "a.stl", "-o", "a.svg", "--size", size, *(["--dpi", str(dpi)] if dpi else [])])
+    assert _paper(*resolution(args)) == ([wide / 100, high / 100], "mm")
+
+
+def test_what_has_no_value_is_grey_and_the_scale_says_so():
+    mesh = lt.Mesh.of([[x, y, z] for z in (0, 2) for y in (0, 3) for x in (0, 4)], BOX_FACES)
+    values = np.arange(8.0)
+    for hole in (np.nan, np.inf, -np.inf):
+        some = np.where(values == 6, hole, values)
+        assert mesh._tint(some, "T, K", None, (0, 0, 1))[::2] == ("T, K (grey: no value)", (0.0, 7.0))
+        assert mesh._tint(some, "", None, (0, 0, 1))[0] == "grey: no value"
+        none = np.full(8, hole)
+        for wrong in (lambda none=none: mesh.png((60, 50), color=none), lambda none=none: mesh.view(none)):
+            with pytest.raises(ValueError, match="has no finite number, so there is nothing to show"):
+                wrong()
+        with pytest.raises(ValueError, match="values has no finite number"):
+            _ = mesh.view(lambda points, hole=hole: np.full(len(points), hole)).packed
+        with pytest.warns(lt.DesignWarning, match="too small"):
+            assert mesh.png((60, 50), color=none, span=(0, 1))  # the scale is given
+    assert mesh._tint(values, "T, K", None, (0, 0, 1))[0] == "T, K"
 
 
 def test_a_view_of_a_solid_is_saved_as_it_is_rendered(tmp_path):

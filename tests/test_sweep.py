@@ -6,7 +6,9 @@ import io
 import itertools
 import json
 import math
+import multiprocessing
 import os
+import pickle
 import random
 import signal
 import subprocess
@@ -14,6 +16,7 @@ import sys
 import time
 import types
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -258,12 +261,28 @@ def test_each_figure_has_its_error_and_each_row_what_reports_warn_of(tmp_path: P
     assert columns["permeability_error"] == [permeability.error]
     said = columns["warnings"][0].split(" | ")
     reports = zip(names, (stiffness, conductivity, permeability), strict=True)
-    wanted = [f"{name}: {warning.message}" for name, found in reports for warning in found.warnings]
+    wanted = [f"{name}: {warning.path}: {warning.message}" for name, found in reports for warning in found.warnings]
     assert len(wanted) > 2 and [words for words in said if words.partition(":")[0] in names] == wanted
     assert any("grid steps" in words for words in said), said  # of the mesh
     # Those that are known before are those that are made.
     job = Job(lt.load(path), per_cell=8, properties=dict.fromkeys(names, settings))
     assert list(columns) == columns_of_job(job, ["lattice.a.level.fraction"])
+
+
+def test_warnings_of_a_row_say_what_they_are_of(tmp_path: Path):
+    """Of two lattices the primitive network of a fraction below 0.21 falls apart."""
+    sweep = '"lattice.b.level.fraction" = [0.1, 0.3]\n'
+    other = 'lattice.b = { cell = "primitive", part = "lower", map.affine.wavelength = 4, level.fraction = 0.3 }\n'
+    blend = 'blend = { between = ["a", "b"], weight = { linear = { along = [1, 0, 0], stops = [[-2, 0], [2, 1]] } } }\n'
+    (tmp_path / "two.toml").write_text(blend + other + BASE + "[sweep]\n" + sweep)
+    columns = lt.sweep(tmp_path / "two.toml", per_cell=8)
+    data = lt.load(tmp_path / "two.toml").to_dict()
+    del data["sweep"]
+    for row, fraction in enumerate((0.1, 0.3)):
+        data["lattice"]["b"]["level"]["fraction"] = fraction
+        wanted = [f"{w['path']}: {w['message']}" for w in lt.Design(**data).build().warnings]
+        assert columns["warnings"][row].split(" | ")[: len(wanted)] == wanted
+        assert any(words.startswith("lattice.b.level.fraction: ") for words in wanted) == (fraction < 0.2)
 
 
 # --- stopped and started again ---------------------------------------------------------------------------------------
@@ -674,12 +693,32 @@ def test_an_objective_is_a_plain_function():
         lt.objective(design, [other], ["solid_fraction"])
     with pytest.raises(ValueError, match=r"there is no beams\.b; the design has no beams$"):
         lt.objective(design, ["beams.b.radius"], ["solid_fraction"])
+    with pytest.raises(ValueError, match=r"^lattice\.a\.level\.fraction lies in lattice\.a\.level, which is a parameter too"):
+        lt.objective(design, [path, "lattice.a.level"], ["solid_fraction"])
     with pytest.raises(ValueError, match=r'unknown output "volume"; did you mean "volume_mm3"\?'):
         lt.objective(design, [path], ["volume"])
     with pytest.raises(ValueError, match=r'unknown property "stifness"; did you mean "stiffness"\?'):
         lt.objective(design, [path], ["E1"], properties=["stifness"])
     with pytest.raises(ValueError, match=r"expected values of lattice\.a\.level\.fraction, found none"):
         of({})
+
+
+def test_an_objective_goes_to_other_processes(tmp_path: Path, monkeypatch):
+    """As pools of optimisers have it; a file of the design is found from any folder, errors come back."""
+    monkeypatch.chdir(tmp_path)
+    Path("box.toml").write_text(BASE)
+    lt.load("box.toml").build().mesh(per_cell=8).write("part.stl")
+    path, core = "lattice.a.level.fraction", lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.3))
+    for design in ("box.toml", lt.Design(region=lt.region.mesh("part.stl"), lattice={"a": core})):
+        monkeypatch.chdir(tmp_path)
+        of = lt.objective(design, [path], ["volume_mm3", "wall_mm"], per_cell=8)
+        made = of({path: 0.3})
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            assert pool.submit(of, {path: 0.3}).result() == made
+            with pytest.raises(ValueError, match=r"fraction is 1\.5"):
+                pool.submit(of, {path: 1.5}).result()
+        monkeypatch.chdir("/")
+        assert pickle.loads(pickle.dumps(of))({path: 0.3}) == made
 
 
 @pytest.mark.parametrize(
@@ -703,6 +742,11 @@ def test_an_objective_is_a_plain_function():
         ('"lattice.a.map.affine.offset[0]" = [1]', "lattice.a.map.affine.offset is none in the design"),
         ('"lattice.a.level.fraction" = [0.2, nan]', "value 2 is nan, which no key can have; give a finite number"),
         ('"lattice.a.level.fraction" = { from = 0.1, to = 0.3, count = 3 }\nsampling = "sobol"\ncount = 4', "is of a grid"),
+        (
+            '"lattice.a.level" = [{ fraction = 0.3 }]\n"lattice.a.level.fraction" = [0.2]',
+            "sweep.lattice.a.level.fraction: it lies in lattice.a.level, which varies too; vary one of them",
+        ),
+        ('"region.box.size" = [[4, 4, 4]]\n"region.box.size[0]" = [3]', "it lies in region.box.size, which varies too"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused_with_its_line(tmp_path: Path, sweep: str, said: str):

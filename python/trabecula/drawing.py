@@ -42,9 +42,7 @@ def render(args) -> None:
     shown |= {"projection": args.projection, "scale_bar": args.scale_bar, "axes": args.axes, "solid": solid}
     shown |= {"up": args.up} if args.up else {}
     if line_art:
-        # Not a whole number of pixels an inch, so that the width is the one asked for.
-        exact = 25.4 * pixels[0] / args.size[0] if args.size[2] == "mm" else dpi
-        made.render(args.output, pixels, *angles, section=args.section, dpi=exact, line_width=args.line_width, **shown)
+        made.render(args.output, pixels, *angles, section=args.section, dpi=dpi, line_width=args.line_width, **shown)
     else:
         shown |= {"background": args.background or "shaded", "dpi": dpi}
         if args.turn is None:
@@ -60,17 +58,16 @@ def render(args) -> None:
     )
 
 
-def resolution(args) -> tuple[tuple[int, int], float | None]:
-    """Pixels across and down, and how many are an inch, if that is said."""
+def resolution(args) -> tuple[tuple[float, float], float | None]:
+    """Pixels across and down, of a drawing also parts of one, and how many are an inch, if that is said."""
     wide, high, unit = args.size
     if unit == "px":
         return (int(wide), int(high)), args.dpi
     dpi = args.dpi or 300.0
+    if kind_of(args.output) == "svg":
+        dpi = min(dpi, 25.4 * MOST_PIXELS / max(wide, high))  # lines have no pixels
+        return (wide / 25.4 * dpi, high / 25.4 * dpi), dpi
     across, down = (max(1, round(v / 25.4 * dpi)) for v in (wide, high))
-    if max(across, down) > MOST_PIXELS and kind_of(args.output) == "svg":
-        # Lines have no pixels: these only give the shape of the drawing.
-        finer = MOST_PIXELS / max(wide, high)
-        return (max(1, round(wide * finer)), max(1, round(high * finer))), dpi
     if max(across, down) > MOST_PIXELS:
         found = f"--size {wide:g}x{high:g}mm at {dpi:g} dpi is {across} × {down} pixels"
         raise Refused(f"{found}; at most {MOST_PIXELS} are possible each")
@@ -113,7 +110,7 @@ def camera(args) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def turning(made: Mesh, args, pixels: tuple[int, int], angles: tuple[float, float], shown: dict) -> None:
+def turning(made: Mesh, args, pixels: tuple[float, float], angles: tuple[float, float], shown: dict) -> None:
     """Pictures from all round as one that is animated."""
     from .turntable import animated
 

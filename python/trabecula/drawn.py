@@ -11,7 +11,7 @@ from functools import cached_property
 from .camera import BACKGROUNDS, NO_SCALE, PROJECTIONS, section_plane, towards
 from .errors import DesignWarning
 from .files import extension, write_bytes
-from .given import number, positive, whole
+from .given import check_keywords, named, number, parameters, positive, whole
 from .transforms import vector_of
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -53,10 +53,10 @@ if TYPE_CHECKING:
         up: Sequence[float]
 
 
-__all__ = ["OVERHANG", "WALL", "Drawn", "Picture", "numbers"]
+__all__ = ["NO_VALUE", "OVERHANG", "WALL", "Drawn", "Picture", "numbers", "scale_of", "scale_over"]
 
-#: What colours say that are computed.
-WALL, OVERHANG = "wall thickness, mm", "overhang, degrees to the layers (grey: none)"
+#: What colours say that are computed; and what they say where there is no finite number.
+WALL, OVERHANG, NO_VALUE = "wall thickness, mm", "overhang, degrees to the layers (grey: none)", "grey: no value"
 #: Points along the longer side of a section at which its colours are computed.
 ACROSS = 240
 
@@ -85,6 +85,7 @@ class Drawn(Picture):
     vertices: NDArray[np.float64]
     thickness_at_vertices: Callable[[], NDArray[np.float64]]
 
+    @named
     def png(
         self,
         size: tuple[int, int] = (1600, 1200),
@@ -109,7 +110,8 @@ class Drawn(Picture):
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
 
         ``color`` is a number for each vertex, or a function of points (n, 3) in mm that gives such numbers, shown on a scale
-        that says ``label`` and goes over ``span``, or from the least to the greatest; or ``"thickness"``, see
+        that says ``label`` and goes over ``span``, or from the least to the greatest (one value alone is in the middle of a
+        scale from 0); triangles with a corner that has no finite number are grey. Or it is ``"thickness"``, see
         ``thickness_at_vertices``; or ``"overhang"``, the angle (degrees) between the surface and layers stacked along ``up``,
         where it faces down and the angle is less than the end of ``span``, 90 unless given. ``shares`` are instead numbers from
         0 to 1 for each vertex by a name: each name has a colour, shares mix them. ``lines`` are polylines, points (n, 3) in mm,
@@ -133,9 +135,10 @@ class Drawn(Picture):
             _warn_small(seen, "legend, scale bar or axes" if scale_bar or axes else "its legend")
         return made
 
+    @named
     def svg(
         self,
-        size: tuple[int, int] = (1600, 1200),
+        size: tuple[float, float] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
         section: str | None = None,
@@ -157,16 +160,18 @@ class Drawn(Picture):
         """A line drawing as the text of an SVG file, for papers: contours, where the surface turns away from the eye; edges,
         where its faces meet at more than 35°, where it ends, and between the lattice and the faces that the region cut;
         without hidden lines. A ``section`` is hatched; camera, section, scale bar, axes and solid as for ``png``. ``size`` is
-        in pixels, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges, section, hatching and
-        scale_bar are a path each, by these names. Contours are ``line_width`` wide (mm with ``dpi``, pixels else; 1/340 of the
-        width of the drawing unless given), other lines thinner in proportion. With ``color``, ``shares`` or ``lines``, as for
-        ``png``, a picture of as many pixels lies behind the lines, and a legend in lines and words below. ValueError for what
-        cannot be drawn.
+        in pixels, parts of one included, ``dpi`` of them an inch: the drawing then has its size in mm. Contours, edges,
+        section, hatching and scale_bar are a path each, by these names. Contours are ``line_width`` wide (mm with ``dpi``,
+        pixels else; 1/340 of the width of the drawing unless given), other lines thinner in proportion. With ``color``,
+        ``shares`` or ``lines``, as for ``png``, a picture of as many pixels lies behind the lines, and a legend in lines and
+        words below. ValueError for what cannot be drawn.
         """
-        seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
+        wide, high = (positive("size", v) for v in size)
+        pixels = max(round(wide), 1), max(round(high), 1)
+        seen, cut = self._camera(pixels, azimuth, elevation, section, projection, scale_bar, axes)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
         stroke = None if line_width is None else positive("line_width", line_width)
-        made, fits_foot = self._core.svg(seen, cut, (*_paper(seen[:2], dpi), stroke), solid and solid._core, *colours)
+        made, fits_foot = self._core.svg(seen, cut, (*_paper((wide, high), dpi), stroke), solid and solid._core, *colours)
         if not fits_foot:
             _warn_small(seen, "legend, scale bar or axes")
         return made
@@ -174,7 +179,7 @@ class Drawn(Picture):
     def render(
         self,
         path: str | os.PathLike[str],
-        size: tuple[int, int] = (1600, 1200),
+        size: tuple[float, float] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
         background: str = "shaded",
@@ -186,6 +191,7 @@ class Drawn(Picture):
 
         Raises ValueError for another suffix, and for what cannot be drawn.
         """
+        check_keywords("render", look, [*parameters(Drawn.render), *parameters(Drawn.png)])
         if extension(path, ("png", "svg")) == "svg":
             made = self.svg(size, azimuth, elevation, line_width=line_width, **look).encode()
         elif line_width is not None:
@@ -229,14 +235,16 @@ class Drawn(Picture):
         plane = None if section is None else self._plane(section, towards(*angles))
         return (wide, high, *angles, parallel), (plane, bool(scale_bar), bool(axes))
 
-    def _plane(self, section: str, eye: tuple[float, float, float]) -> Plane:
-        """The plane of a section; a ValueError where it leaves nothing, or all because it lies outside."""
+    def _plane(self, section: str, eye: tuple[float, float, float], ends: bool = False) -> Plane:
+        """The plane of a section; a ValueError where it leaves nothing, or all because it lies outside. With ``ends`` it may be
+        that of an end, as when a user moves it there.
+        """
         normal, offset = section_plane(section, eye)
         axis = [abs(n) for n in normal].index(1)
         low, high = (end[axis] for end in self.bounds)
-        place, slack = normal[axis] * offset, 1e-6 * math.dist(*self.bounds)
-        nothing = min(normal[axis] * low, normal[axis] * high) >= offset
-        if nothing or not low - slack <= place <= high + slack:
+        place, slack = normal[axis] * offset, 1e-6 * max(math.dist(*self.bounds), abs(low), abs(high))
+        nothing, outside = min(normal[axis] * low, normal[axis] * high) >= offset, not low - slack <= place <= high + slack
+        if outside or (nothing and not ends):
             what = "leaves nothing" if nothing else "cuts nothing off"
             raise ValueError(f'section "{section}" {what}: the mesh lies from {low:.6g} to {high:.6g} mm along {"xyz"[axis]}')
         return normal, offset
@@ -311,15 +319,12 @@ class Drawn(Picture):
             direction, label, span = [v / length for v in vector_of("up", up)], label or OVERHANG, span or (0.0, 90.0)
         else:
             values = numbers("color", color(self.vertices) if callable(color) else color, (self.counts[0], "vertex"))
-        if span is None:
-            finite = values[np.isfinite(values)]
-            span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-            if span[1] > 0 and span[1] - span[0] <= 1e-9 * span[1]:
-                span = (0.0, 2 * span[1])  # one value is in the middle of its scale
-        low, high = (number("span", v) for v in span)
+            if not np.isfinite(values).all():
+                label = f"{label} ({NO_VALUE})" if label else NO_VALUE
+        low, high = (number("span", v) for v in (scale_of("color", values) if span is None else span))
         if not -math.inf < low <= high < math.inf:
             raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
-        return label, values.tolist(), (low, high if high > low else low + 1.0), direction
+        return label, values.tolist(), scale_over(low, high), direction
 
     def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
         import numpy as np
@@ -356,14 +361,31 @@ def numbers(what: str, given: ArrayLike, many: tuple[int, str]) -> NDArray[np.fl
     return values
 
 
-def _paper(pixels: tuple[int, int], dpi: float | None) -> tuple[list[float], str]:
+def scale_of(what: str, values: NDArray[np.float64]) -> tuple[float, float]:
+    """The ends of the scale that shows these values; a ValueError where none of them is a finite number."""
+    import numpy as np
+
+    finite = values[np.isfinite(values)]
+    if values.size and not finite.size:
+        raise ValueError(f"{what} has no finite number, so there is nothing to show")
+    return scale_over(float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+
+
+def scale_over(low: float, high: float) -> tuple[float, float]:
+    """The ends of a scale over these numbers: one value alone is in the middle of a scale from 0, and 0 the end of 0 to 1."""
+    if high - low > 1e-9 * max(abs(low), abs(high)):
+        return low, high
+    return (min(0.0, 2 * high), max(0.0, 2 * high)) if high else (0.0, 1.0)
+
+
+def _paper(pixels: tuple[float, float], dpi: float | None) -> tuple[list[float], str]:
     """The size of a drawing, and its unit: mm where pixels are so many an inch."""
     if dpi is None:
-        return [float(n) for n in pixels], "px"
-    wide = round(25.4 * pixels[0] / positive("dpi", dpi), 2)
+        return list(pixels), "px"
+    wide, high = (round(25.4 * v / positive("dpi", dpi), 2) for v in pixels)
     if not 0.1 <= wide <= 1e5:
-        raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
-    return [wide, round(wide * pixels[1] / pixels[0], 2)], "mm"
+        raise ValueError(f"dpi is {dpi:g}, by which {pixels[0]:g} pixels are {wide:g} mm; a drawing is 0.1 to 1e5 mm wide")
+    return [wide, max(high, 0.01)], "mm"
 
 
 def _warn_small(seen: tuple, what: str) -> None:

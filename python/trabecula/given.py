@@ -25,6 +25,7 @@ __all__ = [
     "QUEUES",
     "Points",
     "Stops",
+    "check_keywords",
     "cluster_name",
     "control",
     "copied",
@@ -33,6 +34,7 @@ __all__ = [
     "named",
     "number",
     "pairs",
+    "parameters",
     "plain",
     "poisson",
     "positions",
@@ -58,24 +60,34 @@ DEPTH = 64
 def named(builder: Builder) -> Builder:
     """The function or data class; a keyword that it does not have is refused with the nearest that it has."""
     function = builder.__init__ if isinstance(builder, type) else builder
-    code = function.__code__
-    known = [name for name in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount] if name != "self"]
+    known = parameters(function)
 
     @functools.wraps(function)
     def call(*args: Any, **given: Any) -> Any:
-        for name in given:
-            if name not in known:
-                import difflib  # where it is wanted only
-
-                near = difflib.get_close_matches(name, known, 1)
-                hint = f"; did you mean {near[0]}?" if near else "."
-                raise TypeError(f"{builder.__name__} has no argument {name}{hint} It takes {', '.join(known)}")
+        check_keywords(builder.__name__, given, known)
         return function(*args, **given)
 
     if isinstance(builder, type):
         builder.__init__ = call
         return builder
     return call
+
+
+def parameters(function: Callable[..., Any]) -> list[str]:
+    """The names of the parameters of a function or method, without those that take any keyword."""
+    code = getattr(function, "__wrapped__", function).__code__
+    return [name for name in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount] if name != "self"]
+
+
+def check_keywords(function: str, given: Iterable[str], known: Sequence[str]) -> None:
+    """Refuses keywords that a function does not have, with the nearest that it has."""
+    for name in given:
+        if name not in known:
+            import difflib  # where it is wanted only
+
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"; did you mean {near[0]}?" if near else "."
+            raise TypeError(f"{function} has no argument {name}{hint} It takes {', '.join(dict.fromkeys(known))}")
 
 
 def number(name: str, value: Any) -> float:

@@ -364,12 +364,13 @@ class Mesh(Drawn, Transformed):
         triangles: int | None = None,
         progress: Callable[[int, int], Any] | None = None,
     ) -> Mesh:
-        """A lighter mesh that keeps every guarantee, sharp edges, and the volume.
+        """A lighter mesh that keeps every guarantee and sharp edges, and the volume but for what changes at these edges and
+        at borders of cuts.
 
         No point of either surface is farther than ``tolerance`` (mm) from the other one; or the mesh is brought down to
-        ``triangles``, and ``simplification`` of the result says how far it is then at most. With both, whichever is
-        reached first. A mesh that is not closed, or crosses itself, is refused. ``progress(done, total)`` is called now
-        and then.
+        ``triangles``, however far that takes it: ``simplification`` of the result says how far at most. With both,
+        whichever is reached first. A mesh that is not closed, or crosses itself, is refused. ``progress(done, total)`` is
+        called now and then.
         """
         if tolerance is None and triangles is None:
             raise ValueError("give a tolerance (mm), a number of triangles, or both")

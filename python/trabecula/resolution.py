@@ -103,8 +103,8 @@ class Resolution:
         if abs(found - share) > min(0.05, share / 3, math.inf if tets else 0.05 * share + 0.005):
             better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
             warnings.warn(
-                f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design {share:.3g}; use "
-                f"{_a(word)} of {better:.2g} mm or less",
+                f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design one of about "
+                f"{share:.2g}; use {_a(word)} of {better:.2g} mm or less",
                 DesignWarning,
                 stacklevel=3,
             )

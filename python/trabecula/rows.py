@@ -113,7 +113,7 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", DesignWarning)
         solid = Solid(core.build(folder), folder)
-        said: list[str] = [w["message"] for w in solid.warnings]
+        said: list[str] = [_located(w) for w in solid.warnings]
         reported: list[str] = []
         failed: list[str] = []
         figures |= _asked(solid)
@@ -136,11 +136,16 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
                 figures |= dict.fromkeys(PROPERTIES[name].columns)
                 continue
             figures |= dict(zip(PROPERTIES[name].columns, PROPERTIES[name].figures(found), strict=True))
-            reported += [f"{name}: {warning.message}" for warning in found.warnings]
+            reported += [f"{name}: {_located(warning)}" for warning in found.warnings]
     said += [*(str(w.message) for w in heard if isinstance(w.message, DesignWarning)), *reported]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     figures["error"] = " | ".join(failed) or None
     return figures
+
+
+def _located(warning: Mapping[str, str]) -> str:
+    """What a warning says, with the path that it is of."""
+    return str(DesignWarning(warning["message"], warning["path"]))
 
 
 def is_made(row: Mapping[str, Any]) -> bool:

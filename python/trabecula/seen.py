@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 
 from .camera import towards
-from .drawn import Picture
-from .given import positions
+from .drawn import Drawn, Picture
+from .given import check_keywords, parameters, positions
 from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -91,7 +91,7 @@ class Seen(Picture):
     def render(
         self,
         path: str | os.PathLike[str],
-        size: tuple[int, int] = (1600, 1200),
+        size: tuple[float, float] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
         show: str | None = None,
@@ -111,6 +111,7 @@ class Seen(Picture):
         surface; ``singularities``, the lines round which they do not come back to themselves. Of a blend: ``lattice``, which
         lattice is where. A ValueError where the design has none.
         """
+        check_keywords("render", style, [*parameters(Seen.render), *parameters(Drawn.render), *parameters(Drawn.png)])
         seen = None if show is None else look(self, show, threads)
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
         shown = dict(seen(made, towards(azimuth, elevation))) if seen else {}

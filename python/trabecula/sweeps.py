@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 from . import _core
@@ -25,6 +26,7 @@ from .sent import digests
 from .simulated import Simulated
 from .study import Study
 from .unfinished import alone
+from .varying import overlapping
 from .workers import rows_by_processes, rows_here
 
 __all__ = ["FEW", "Journal", "columns_of", "objective", "run", "sweep", "write_table"]
@@ -78,33 +80,46 @@ def objective(
     properties: Mapping[str, Mapping[str, Any]] | Iterable[str] = (),
 ) -> Callable[[Mapping[str, Any]], dict[str, float]]:
     """A function of {path: value} that gives {column: value}, for optimisers: of the design with these values the ``outputs``,
-    names of columns of ``sweep``. It raises ValueError where there is no such design.
+    names of columns of ``sweep``. It raises ValueError where there is no such design, and can be pickled for other processes.
 
     Raises ValueError for parameters that are no keys of the design, and outputs that are no columns.
     """
     paths, wanted = _names("parameters", parameters), _names("outputs", outputs)
     design = design_of(template)
+    if design.folder is None:
+        design = replace(design, folder=os.getcwd())  # files that it names are found from other processes too
     job = Job(design, edge, per_cell, properties=settings_of(properties))
     for path in paths:
         if not isinstance(path, str):
             raise TypeError(f"expected paths of keys as text, found {path!r}")
     check_paths(design, paths)
+    if both := overlapping(paths):
+        raise ValueError(f"{both[1]} lies in {both[0]}, which is a parameter too; take one of them")
     known = columns_of_job(job, paths)
     for name in wanted:
         if name not in known:
             raise ValueError(f'unknown output "{name}"; {nearest(name, known)}')
+    return Objective(job, tuple(paths), tuple(wanted))
 
-    def of(values: Mapping[str, Any]) -> dict[str, float]:
+
+@dataclass(frozen=True)
+class Objective:
+    """What ``objective`` gives."""
+
+    job: Job
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def __call__(self, values: Mapping[str, Any]) -> dict[str, float]:
+        """The outputs of the design with these values."""
         if not isinstance(values, Mapping):
             raise TypeError(f"expected {{path: value}}, found {values!r:.80}")
-        if set(values) != set(paths):
-            raise ValueError(f"expected values of {', '.join(paths)}, found {', '.join(values) or 'none'}")
-        row = row_of(job, 0, {path: values[path] for path in paths})
+        if set(values) != set(self.parameters):
+            raise ValueError(f"expected values of {', '.join(self.parameters)}, found {', '.join(values) or 'none'}")
+        row = row_of(self.job, 0, {path: values[path] for path in self.parameters})
         if row["error"]:
             raise ValueError(row["error"])
-        return {name: row[name] for name in wanted}
-
-    return of
+        return {name: row[name] for name in self.outputs}
 
 
 def design_of(given: Design | dict | str | os.PathLike[str]) -> Design:

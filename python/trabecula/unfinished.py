@@ -121,6 +121,8 @@ class Unfinished:
         from .sweeps import differences
 
         changed = differences(old, self.head)
+        if len(changed) > 1:
+            changed = [name for name in changed if name != "count"]  # of ranges: it follows from the others
         if changed:
             raise Refused(
                 f"{self.folder} holds a part of another run: changed since are {', '.join(changed[:6])}; take that back, or "

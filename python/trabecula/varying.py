@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from .errors import DesignError
 from .keys import listless, missing
 
-__all__ = ["check_values", "explained"]
+__all__ = ["check_values", "explained", "overlapping"]
 
 #: What stands for no number in TOML, JSON and Python.
 NO_NUMBER = re.compile(r"(?<![\w.\"'])[+-]?(?:nan|inf|null|NaN|Infinity)(?![\w.\"'])")
 
 
 def check_values(sweep: Mapping[str, Any] | None, text: str = "", name: str = "") -> None:
-    """Refuses what is no value in a sweep: NaN and the like in a list, and a number of values where the sampling takes none;
-    with the line of the ``text`` that it was read from, of the file ``name``.
+    """Refuses what is no value in a sweep: NaN and the like in a list, a number of values where the sampling takes none, and
+    paths of which one lies in another; with the line of the ``text`` that it was read from, of the file ``name``.
     """
+    if both := overlapping(sweep or {}):
+        raise _error(
+            f"sweep.{both[1]}", f"it lies in {both[0]}, which varies too; vary one of them", _line_of(both[1], text), name
+        )
     for path, of in (sweep or {}).items():
         line = _line_of(path, text)
         if isinstance(of, Mapping):
@@ -36,6 +40,12 @@ def check_values(sweep: Mapping[str, Any] | None, text: str = "", name: str = ""
                         line, found = next(_no_numbers_in(text, line or 1), (line, found))
                     message = f"value {i + 1} is {found}, which no key can have; give a finite number, or leave it out"
                     raise _error(f"sweep.{path}", message, line, name)
+
+
+def overlapping(paths: Iterable[str]) -> tuple[str, str] | None:
+    """Two of the paths of which the second lies in the first; None where there are none."""
+    known = list(paths)
+    return next(((outer, inner) for inner in known for outer in known if inner.startswith((f"{outer}.", f"{outer}["))), None)
 
 
 def explained(error: DesignError, data: Mapping[str, Any] | None, name: str = "") -> DesignError:

@@ -4,6 +4,8 @@
 "use strict";
 
 const CREASE = Math.cos((35 * Math.PI) / 180);
+// What stands for no value at a corner: no number of the shaders' is larger.
+const MISSING = 1e38;
 
 const VERTEX = `#version 300 es
 in vec3 position; in vec4 normal; in float value;
@@ -35,7 +37,7 @@ vec4 lit(vec3 n, float isCut, float amount) {
   vec3 seen = turn * n;
   vec3 base = mix(vec3(0.72, 0.76, 0.80), vec3(0.93, 0.80, 0.58), isCut);
   if (colours == 1) base = -n.z > steep ? vec3(0.86, 0.28, 0.22) : vec3(0.74, 0.77, 0.80);
-  if (colours >= 2) base = scale((amount - span.x) / max(span.y - span.x, 1e-12));
+  if (colours >= 2) base = amount > 1e37 ? vec3(0.667) : scale((amount - span.x) / max(span.y - span.x, 1e-12));
   float key = max(dot(seen, normalize(vec3(-0.35, 0.55, 0.76))), 0.0);
   float fill = max(dot(seen, normalize(vec3(0.8, -0.2, 0.5))), 0.0);
   return vec4(base * (0.30 + 0.62 * key + 0.18 * fill), 1.0);
@@ -74,11 +76,12 @@ async function unpacked(raw) {
   const triangles = take(Uint32Array, 3 * head.triangles);
   const cut = take(Uint8Array, head.triangles);
   const values = head.span ? take(Uint16Array, head.vertices) : null;
-  return { head, vertices, triangles, cut, values };
+  const missing = head.missing ? take(Uint8Array, head.vertices) : null;
+  return { head, vertices, triangles, cut, values, missing };
 }
 
 // Arrays by corner: the position; the normal, and whether the triangle is cut, as 16-bit numbers; the value. Normals are the mean of those of the triangles round a vertex that lie within 35° of the corner's own.
-function corners({ head, vertices, triangles, cut, values }) {
+function corners({ head, vertices, triangles, cut, values, missing }) {
   const count = head.triangles;
   const normals = new Float32Array(3 * count);
   const first = new Uint32Array(head.vertices + 1);
@@ -96,6 +99,7 @@ function corners({ head, vertices, triangles, cut, values }) {
   const lengths = Float32Array.from({ length: count }, (_, t) => length(t));
   const of = { position: new Float32Array(9 * count), normal: new Int16Array(12 * count), value: new Float32Array(values ? 3 * count : 0) };
   for (let t = 0; t < count; t++) {
+    const isMissing = missing && [0, 1, 2].some((k) => missing[triangles[3 * t + k]]);
     for (let k = 0; k < 3; k++) {
       const v = triangles[3 * t + k], at = 3 * t + k;
       const sum = [0, 0, 0];
@@ -107,7 +111,7 @@ function corners({ head, vertices, triangles, cut, values }) {
       of.position.set(vertices.subarray(3 * v, 3 * v + 3), 3 * at);
       const one = 32767 / (Math.hypot(...sum) || 1);
       of.normal.set([one * sum[0], one * sum[1], one * sum[2], cut[t] ? 32767 : 0], 4 * at);
-      if (values) of.value[at] = head.span[0] + (values[v] / 65535) * (head.span[1] - head.span[0]);
+      if (values) of.value[at] = isMissing ? MISSING : head.span[0] + (values[v] / 65535) * (head.span[1] - head.span[0]);
     }
   }
   return of;

@@ -10,16 +10,18 @@ from functools import cached_property
 from html import escape
 from importlib.resources import files
 
-from .camera import section_plane, towards
-from .drawn import WALL, numbers
+from .camera import towards
+from .drawn import NO_VALUE, WALL, numbers, scale_of
 from .files import extension, write_text
 from .given import number
+from .nearest_vertex import nearest_vertices
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from .mesh import Mesh
@@ -105,7 +107,7 @@ def checked(view: View, name: str, value: Any) -> Any:
     if name == "section":
         if not value:
             return ""
-        (normal, offset) = section_plane(value, towards(view.azimuth, view.elevation))
+        (normal, offset) = view.mesh._plane(value, towards(view.azimuth, view.elevation), ends=True)
         side = sum(normal)
         return f"{'xyz'[[abs(v) for v in normal].index(1)]}{'<' if side > 0 else '>'}{side * offset:.7g}"
     if name == "color":
@@ -136,12 +138,14 @@ class View:
     """A mesh to turn: by the pointer, fingers or arrow keys; with a section plane, and colours by the faces that the region
     cut, by the angle of overhang, or by ``values``: a number for each vertex that ``label`` names, a function of points (n, 3)
     in mm that gives such numbers, or ``"thickness"`` for the local thickness of walls. A notebook shows it, with anywidget
-    (extra ``notebook``) as a widget; ``save`` makes a page or a picture. Of a mesh of more than 150,000 triangles, without
-    values at vertices, a lighter one is shown; while it is made ``progress(done, total)`` is called. ``section``, ``azimuth``,
-    ``elevation``, ``zoom``, ``overhang`` and ``color`` are how it is seen at first; in a widget what is set is shown at once,
-    and what the user turns can be read.
+    (extra ``notebook``) as a widget; ``save`` makes a page or a picture. Of a mesh of more than 150,000 triangles a lighter one
+    is shown, whose vertices have the values of the nearest ones of the mesh; while it is made ``progress(done, total)`` is
+    called. ``section``, ``azimuth``, ``elevation``, ``zoom``, ``overhang`` and ``color`` are how it is seen at first; in a
+    widget what is set is shown at once, and what the user turns can be read. Triangles with a corner that has no finite
+    value are grey.
 
-    Raises ValueError for values that are not one number for each vertex, and for a look that cannot be.
+    Raises ValueError for values that are not one number for each vertex or of which none is finite, and for a look that
+    cannot be.
     """
 
     def __init__(
@@ -161,6 +165,8 @@ class View:
         self._at: At | None = values if callable(values) else None
         known = values is None or self._computed or self._at is not None
         self._values = None if known else numbers("values", values, (mesh.counts[0], "vertex"))
+        if self._values is not None:
+            scale_of("values", self._values)
         self._solid: Seen | None = None
         self._progress = progress
         self._widget: Widget | None = None
@@ -208,33 +214,40 @@ class View:
     @cached_property
     def values(self) -> NDArray | None:
         """The values at the vertices of the mesh that is shown, None without."""
+        shown = self._light
         if self._at is not None:
-            return numbers("values", self._at(self._light.vertices), (self._light.counts[0], "vertex"))
-        return self._light.thickness_at_vertices(progress=self._progress) if self._computed else self._values
+            return numbers("values", self._at(shown.vertices), (shown.counts[0], "vertex"))
+        if self._computed:
+            return shown.thickness_at_vertices(progress=self._progress)
+        return self._values if self._values is None or shown is self.mesh else self._values[nearest_vertices(self.mesh, shown)]
 
     @cached_property
     def _light(self) -> Mesh:
-        """The mesh, made lighter if it is large, closed and has no values of its own."""
+        """The mesh, made lighter if it is large and sound."""
         mesh = self.mesh
-        if mesh.counts[1] <= LIGHT or self._values is not None or mesh.defects or mesh.self_intersections:
+        if mesh.counts[1] <= LIGHT or mesh.defects or mesh.self_intersections:
             return mesh
         return mesh.simplified(triangles=LIGHT, progress=self._progress)
 
     @cached_property
     def _span(self) -> tuple[float, float] | None:
-        """The least and the greatest of the finite values."""
+        """The ends of the scale of values."""
+        return None if self.values is None else scale_of("values", self.values)
+
+    @cached_property
+    def _missing(self) -> NDArray[np.bool_] | None:
+        """Which vertices have no finite value; None where all have."""
         import numpy as np
 
-        if self.values is None:
-            return None
-        finite = self.values[np.isfinite(self.values)]
-        return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+        missing = None if self.values is None else ~np.isfinite(self.values)
+        return missing if missing is not None and missing.any() else None
 
     @cached_property
     def stream(self) -> bytes:
         """The mesh as bytes: a DEFLATE stream of a line of JSON (``vertices``, ``triangles``, ``min``, ``max`` in mm,
-        ``span`` of values or null), then positions (3 × uint16 of the bounds each, little-endian), triangles (3 × uint32 each),
-        whether each triangle is on the region's surface (uint8), and values (uint16 of the span) if there are any.
+        ``span`` of values or null, whether some are ``missing``), then positions (3 × uint16 of the bounds each,
+        little-endian), triangles (3 × uint32 each), whether each triangle is on the region's surface (uint8), values (uint16
+        of the span) if there are any, and whether each vertex has none (uint8) if some are missing.
         """
         import numpy as np
 
@@ -243,13 +256,14 @@ class View:
         extent = np.where(high > low, high - low, 1.0)
         places = np.rint((mesh.vertices - low) / extent * STEPS).astype("<u2")
         parts = [places.tobytes(), mesh.triangles.astype("<u4").tobytes(), mesh.cut.astype("u1").tobytes()]
-        span = None
-        if self.values is not None and self._span is not None:
-            least, most = self._span
-            span = [least, most if most > least else least + 1.0]
-            share = (np.nan_to_num(self.values, nan=least) - span[0]) / (span[1] - span[0])
+        span = self._span
+        if self.values is not None and span is not None:
+            share = (np.where(np.isfinite(self.values), self.values, span[0]) - span[0]) / (span[1] - span[0])
             parts.append(np.rint(share.clip(0, 1) * STEPS).astype("<u2").tobytes())
+        if self._missing is not None:
+            parts.append(self._missing.astype("u1").tobytes())
         head = {"vertices": mesh.counts[0], "triangles": mesh.counts[1], "min": list(low), "max": list(high), "span": span}
+        head["missing"] = self._missing is not None
         return zlib.compress(json.dumps(head).encode() + b"\n" + b"".join(parts), 9)
 
     @cached_property
@@ -277,7 +291,7 @@ class View:
         choices = "".join(f'<option value="{v}"{" selected" * (v == chosen)}>{word}</option>' for v, word in enumerate(words))
         legend = ""
         if self._span is not None:
-            legend = "{:.4g}<i></i>{:.4g}".format(*self._span)
+            legend = "{:.4g}<i></i>{:.4g}".format(*self._span) + (f" ({NO_VALUE})" if self._missing is not None else "")
         return f"""<figure class="viewer" style="--high: {escape(high)}">
 <canvas tabindex="0" role="img"
  aria-label="The part in three dimensions; arrow keys turn it, plus and minus zoom, Home resets"></canvas>
