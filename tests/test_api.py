@@ -548,6 +548,28 @@ def test_a_disk_without_room(tmp_path, monkeypatch, name):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_disk_without_room_is_known_before_the_work(tmp_path, monkeypatch, capsys):
+    from trabecula import cli, machine
+
+    (tmp_path / "cube.toml").write_text(
+        'schema = 1\nregion.box.size = [8, 8, 8]\n[lattice.a]\ncell = "gyroid"\npart = "sheet"\n'
+        "map.affine.wavelength = 4\nlevel.fraction = 0.3\n"
+    )
+    MESH.write(tmp_path / "whole.stl")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(machine, "free_disk", lambda folder: 500.0)
+
+    def worked(*_, **__):
+        raise AssertionError("the disk is asked too late")
+
+    monkeypatch.setattr(lt.Solid, "voxels", worked)
+    monkeypatch.setattr(lt.Mesh, "simplified", worked)
+    for words in (["voxels", "cube.toml", "-o", "a.vti"], ["simplify", "whole.stl", "-o", "a.stl", "--triangles", "100"]):
+        assert cli.main([str(tmp_path / w) if "." in w else w for w in words]) == 1
+        assert "of disk space" in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == before
+
+
 @pytest.mark.parametrize("kind", ["stl", "3mf", "ply", "obj"])
 def test_sizes_of_files(tmp_path, kind):
     """The estimate is right to a third, and seldom too small."""

@@ -33,6 +33,7 @@ from .starter import starter
 from .terminal import Progress, figure, put_json, say, settle, warned
 from .texts import counted
 from .volumes import check_case, check_order, check_solver, check_steps
+from .voxels import fits_file
 
 # fmt: off
 __all__ = [
@@ -126,6 +127,8 @@ def voxels(args) -> None:
             size = options.get("step"), options.get("per_cell")
             made = solid._save_voxels(args.output, *size, args.threads, progress, apart, settle)
         else:
+            spacing, count = solid._voxel_grid(options.get("step"), options.get("per_cell"))
+            fits_file(args.output, count, spacing)
             grid = solid.voxels(threads=args.threads, progress=progress, **options)
             settle()
             grid.write(args.output)

@@ -7,10 +7,11 @@ import time
 from collections.abc import Callable, Sequence
 
 from .errors import Refused, WrongUsage
-from .files import check_place
+from .files import check_place, extension
 from .formats import MESH_WRITES, STEP_PROTOCOLS, STEP_WRITES, dotted, kind_of
 from .given import shard_bytes
 from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
+from .machine import file_size, fits
 from .mesh import Mesh
 from .parts import part_files, write_parts
 from .solid import OPEN_IN_RANGES, Solid
@@ -278,7 +279,12 @@ def simplify(args) -> None:
     start = time.perf_counter()
     if same_file(args.file, args.output):
         raise Refused(f"{args.output} is what is simplified; name another output")
-    made = simplified(Mesh.read(args.file), args)
+    mesh = Mesh.read(args.file)
+    if args.triangles:
+        # Of a tolerance the triangles are not known before they are made.
+        triangles = min(args.triangles, len(mesh.triangles))
+        fits(file_size(extension(args.output, MESH_WRITES), triangles), f"{triangles:.3g} triangles", args.output)
+    made = simplified(mesh, args)
     made.write(args.output)
     if args.json:
         put_json(made.simplification.to_dict() | {"seconds": round(time.perf_counter() - start, 3)})

@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 __all__ = ["Voxels"]
 
 
+def fits_file(path: str | os.PathLike[str], count: int, step: float) -> None:
+    """Refuses voxels for which there is no room on the disk of a file."""
+    fits(1000.0 + count, f"{count:.3g} voxels", path, step, 3, "step")
+
+
 class Voxels:
     """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
 
@@ -76,6 +81,6 @@ class Voxels:
         """Writes the voxels: .npy (indexed [x, y, z]) or .vti (an image for ParaView, with origin and step)."""
         kind = extension(path, VOXEL_WRITES)
         count = math.prod(self.shape)
-        fits(1000.0 + count, f"{count:.3g} voxels", path, self.step, 3, "step")
+        fits_file(path, count, self.step)
         with whole_file(path) as temporary:
             self._core.write(temporary, kind)
