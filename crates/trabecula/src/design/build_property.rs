@@ -165,9 +165,17 @@ impl Property<'_> {
         let (mut at, mut slope) = self.coarse_root(asked)?;
         let [low, high] = self.range()?;
         let mut last: Option<[f64; 2]> = None;
+        // Values on few voxels are noisy, and steps may not come nearer: the nearest counts.
+        let mut nearest = [f64::INFINITY, at];
         for _ in 0..STEPS[1] {
             let off = (self.value(at, self.fine())? / asked).ln();
-            if !off.is_finite() || off.abs() <= MET[1] {
+            if !off.is_finite() {
+                break;
+            }
+            if off.abs() < nearest[0] {
+                nearest = [off.abs(), at];
+            }
+            if off.abs() <= MET[1] {
                 break;
             }
             if let Some([x, y]) = last
@@ -178,7 +186,7 @@ impl Property<'_> {
             last = Some([at.ln(), off]);
             at = (at.ln() - off / slope).exp().clamp(low, high);
         }
-        Ok(at)
+        Ok(nearest[1])
     }
 
     /// Voxels along a fine cell.
