@@ -82,10 +82,9 @@ def phase(
         everything, the error goes where this is small. [optional]
     angle_weight: Weight of an error of angle against the same error of spacing: where no map can follow both, above 1
         cells are nearer to their directions, below 1 to their sizes. [from 0.001 to 1000, default 1.0]
-    smooth: Length over which a direction, a frame or a stress is smoothed before cells follow it. Signs of a direction,
-        of a frame from a result and of a stress do not matter, nor does the order of a stress's; a frame of numbers or
-        formulas keeps the signs given, which must not flip. Parts of a stress count by how much they differ between
-        directions. None unless given. [mm, above 0, optional]
+    smooth: Length over which a direction, a frame or a stress is smoothed before cells follow it, without regard to the
+        signs and the order of their axes. Parts of a stress count by how much they differ between directions. None
+        unless given. [mm, above 0, optional]
     align: "surface": an axis of the cell, whichever is nearest, along the normal of the region's surface, and farther
         in what is asked for there; without an orientation, what continues the surface's. [optional]
     align_depth: How deep that reaches below the surface; two wavelengths unless given. [mm, above 0, optional]
@@ -107,7 +106,8 @@ def phase(
     rotate_y: The angle about y alone. [degrees, optional]
     rotate_z: The angle about z alone. [degrees, optional]
     direction: Direction of the cell's z axis; its sign and length do not matter. [optional]
-    frame: The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }. [optional]
+    frame: The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }. Signs that flip from one
+        position to the next, and axes of a result that change places, do not matter. [optional]
     stress: A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, the
         field of a result, a table, or several load cases, { cases = [...] }. [optional]
     """

@@ -356,7 +356,7 @@ mod tests {
         assert!(self_intersections(&touching, 1000) > 0);
     }
 
-    /// A cone over a polygon of many sides, in a random place; a fold or a fin at its apex or its rim is found as for few sides.
+    /// A cone over a polygon of many sides, in a random place; a fold or a fin at its apex or its base is found as for few sides.
     #[test]
     fn fans_are_judged_as_other_triangles() {
         let n = 4 * FAN as u32;

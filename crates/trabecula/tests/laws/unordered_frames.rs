@@ -66,7 +66,9 @@ fn orders_and_signs_of_a_result_do_not_count() {
         for seed in [1, 2, 3] {
             let shuffled = solved(Orientation::Frame(result(Some(seed))), smooth);
             let off = apart(&ordered, &shuffled);
-            assert!(off < 1e-9, "smooth {smooth:?}, seed {seed}: {off:e}");
+            // An averaged frame is found by steps from a neighbour's, of which there are sixty at most: which neighbour rounding decides.
+            let within = if smooth.is_some() { 1e-4 } else { 1e-9 };
+            assert!(off < within, "smooth {smooth:?}, seed {seed}: {off:e}");
         }
         let misfits = ordered.misfits(&points(&BOX, 500).collect::<Vec<_>>()).expect("misfits");
         let most = misfits.iter().flat_map(|m| m.angle).fold(0.0, f64::max);
