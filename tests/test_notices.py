@@ -105,6 +105,23 @@ def test_a_design_on_standard_input(tmp_path, cube):
     assert "UTF-8" in subprocess.run([*COMMAND, "check", "-"], input=b"\xff", capture_output=True, cwd=tmp_path).stderr.decode()
 
 
+@pytest.mark.parametrize("start", [0.0, 3.0, 30.0])
+def test_what_comes_before_the_first_step_does_not_count_in_the_time_left(monkeypatch, start):
+    """Steps of equal length after a start of some seconds: from the second on, half of what is done tells their length."""
+    from trabecula import terminal
+
+    now = 0.0
+    monkeypatch.setattr(sys, "stderr", screen := io.StringIO())
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now)
+    terminal.listen(quiet=False, strict=False)
+    with terminal.Progress("meshing", True) as progress:
+        for done in range(1, 101):
+            now = start + 0.5 * done
+            progress(done, 100)
+    left = [int(line.split(", ")[1].split()[0]) for line in screen.getvalue().splitlines() if "left" in line]
+    assert left == [45, 40, 35, 30, 25, 20, 15, 10, 5, 0]
+
+
 def test_a_warning_has_a_line_of_its_own(monkeypatch):
     """On a terminal the progress line is taken away before a message."""
     from itertools import count

@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import time
+from collections import deque
 
 __all__ = [
     *("Progress", "fail", "figure", "interrupts_leave", "interrupts_raise", "left", "listen", "outcome", "put_json"),
@@ -29,14 +30,23 @@ if TYPE_CHECKING:
         message: str
 
 
+#: The share between two times that the pace is taken from.
+FINE = 0.002
+
+
 class Progress:
-    """Share done and time left, on stderr, a few times a second."""
+    """Share done and time left, on stderr, a few times a second.
+
+    The time left is by the pace of the second half of what is done: work starts with files to read and fields to set up.
+    """
 
     def __init__(self, word: str, wanted: bool | None):
         self.word = word
         self.terminal = sys.stderr.isatty()
         self.shown = not _voice.quiet and (self.terminal if wanted is None else wanted)
-        self.start = self.last = time.monotonic()
+        self.last = time.monotonic()
+        #: Shares done and when, of which the first is the last before half of what is done now.
+        self.past = deque([(0.0, self.last)])
         self.tenth = 0
         self.width = 0
 
@@ -54,7 +64,12 @@ class Progress:
         if not self.shown or not total:
             return
         share = done / total
-        left = (now - self.start) * (1 - share) / share if share > 0 else math.inf
+        while len(self.past) > 1 and self.past[1][0] <= share / 2:
+            self.past.popleft()
+        before, then = self.past[0]
+        left = (now - then) * (1 - share) / (share - before) if share > before else math.inf
+        if share >= self.past[-1][0] + FINE:
+            self.past.append((share, now))
         text = f"{self.word}: {100 * share:3.0f} %" + (f", {duration(left)} left" if math.isfinite(left) else "")
         if self.terminal:
             if now - self.last >= 0.1:
