@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -98,6 +99,31 @@ def test_sets_of_the_design_are_triangles_within_their_region():
     middles = mesh.nodes[mesh.elements].mean(axis=1)
     assert set(found.elements) == set(np.flatnonzero(middles[:, 0] >= 5 - 1e-6))
     assert set(found.nodes) == set(mesh.elements[found.elements].ravel())
+
+
+def test_sharp_triangles_are_warned_of():
+    """Where a mesh has angles below twelve degrees the warning says how many triangles and where."""
+    level = lt.level.thickness(lt.grade.linear([0, 0, 1], {-4: 0.2, 4: 0.4}))
+    solid = gyroid(level, region=lt.region.box(size=[8, 8, 8]))
+    sharp = 0
+    for per_cell in (8, 12, 16):
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            mesh = solid.shell_mesh(per_cell=per_cell)
+        words = [str(w.message) for w in found if "have an angle below 12 degrees" in str(w.message)]
+        least = angles(mesh)
+        if least.min() >= 12:
+            assert not words
+            continue
+        sharp += 1
+        count, of, smallest, place = re.match(
+            r"(\d+) triangles? of (\d+) have .* the least is ([\d.e-]+) at \((.*)\) mm", words[0]
+        ).groups()
+        assert (int(count), int(of)) == ((least < 12).sum(), len(least))
+        assert float(smallest) == pytest.approx(least.min(), rel=0.06)
+        middle = mesh.nodes[mesh.elements[least.argmin(), :3]].mean(axis=0)
+        assert np.allclose([float(v) for v in place.split(",")], middle, atol=1e-3)
+    assert sharp
 
 
 def test_blends_of_sheets_have_shells():

@@ -13,7 +13,7 @@ from .carrier import Carrier
 from .errors import DesignWarning
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws
+from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -187,6 +187,7 @@ class Simulated:
         made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
         if found := made._core.warning:
             warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+        warn_sharp(made)
         return made
 
     def beam_mesh(

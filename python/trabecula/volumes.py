@@ -527,6 +527,24 @@ def _resultant(name: str, value: Sequence[float]) -> list[float]:
     return found
 
 
+def warn_sharp(made: ShellMesh) -> None:
+    """Warns of triangles of a shell with an angle below the least that is usual: how many, and where the worst is."""
+    import numpy as np
+
+    if made.report().min_angle >= SHARP:
+        return
+    corners = made.nodes[made.elements[:, :3]]
+    sides = np.roll(corners, -1, axis=1) - corners
+    back = -np.roll(sides, 1, axis=1)
+    across = np.linalg.norm(np.cross(sides, back), axis=2)
+    least = np.degrees(np.arctan2(across, (sides * back).sum(axis=2))).min(axis=1)
+    worst, few = least.argmin(), int((least < SHARP).sum())
+    place = ", ".join(f"{v:.4g}" for v in corners[worst].mean(axis=0))
+    some = f"{counted(few, 'triangle')} of {len(least)} have an angle below {SHARP} degrees"
+    message = f"{some}, the least is {least[worst]:.2g} at ({place}) mm: bending there is poor; another edge mostly has none"
+    warnings.warn(message, DesignWarning, stacklevel=3)
+
+
 def warn_flaws(made: VolumeMesh, one: bool) -> None:
     """Warns of what was left out, of faces far from the surface, of several components, if there should be ``one``, of surfaces
     that cross, and of badly shaped tetrahedra."""
