@@ -623,8 +623,7 @@ class Solid(Seen, Simulated, Resolution):
         their centres are. Warns where a step that was asked for reaches so far beyond the bounds that the volume may be more
         than 1 % too large.
         """
-        spacing, count = self._voxel_grid(step, per_cell)
-        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
+        spacing, _ = self._voxel_grid(step, per_cell)
         self._warn_thin(spacing, "step")
         made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
         if step is not None or per_cell is not None:
@@ -633,11 +632,13 @@ class Solid(Seen, Simulated, Resolution):
         return made
 
     def _voxel_grid(self, step: float | None, per_cell: float | None) -> tuple[float, int]:
-        """The edge of the voxels (mm), and how many there are."""
+        """The edge of the voxels (mm), and how many there are, if they fit into memory."""
         step = step if step is None else positive("step", step)
         spacing = self.spacing(self._usual if step is None and per_cell is None else step, per_cell)
         low, high = self.bounds
-        return spacing, math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
+        count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
+        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
+        return spacing, count
 
     def save_voxels(
         self,
