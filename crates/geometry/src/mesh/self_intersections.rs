@@ -76,66 +76,27 @@ impl<'a> Near<'a> {
 
     /// What `f` makes of each pair, in an order that is the same for any number of threads, until there is `enough`.
     fn pairs<T: Send>(&self, f: impl Fn(usize, usize) -> Option<T> + Sync, enough: impl Fn() -> bool + Sync) -> Vec<T> {
-        let cancellation = Cancellation::current();
-        let found = (self.tree.order().par_chunks(256)).map(|part| {
-            let mut found = Vec::new();
-            for &i in part {
-                if enough() {
-                    break;
-                }
-                cancellation.enter(checkpoint);
-                let b = &self.boxes[i as usize];
-                self.tree.overlapping(b, |near| {
-                    let near = near.iter().filter(|j| **j > i && b.touches(&self.boxes[**j as usize]));
-                    let apart = near.filter(|j| self.common_fan(i, **j).is_none());
-                    found.extend(apart.filter_map(|j| f(i as usize, *j as usize)));
-                });
-            }
-            found
-        });
-        let mut found: Vec<Vec<T>> = found.collect();
+        let of = |i: u32, j: u32| f(i as usize, j as usize);
+        let apart = |i, j| if self.common_fan(i, j).is_none() { of(i, j) } else { None };
+        let mut found = touching(&self.tree, &self.boxes, &enough, apart);
+        // Triangles at a vertex meet elsewhere only if there is a direction from it that is in both, so that the arcs of their far edges
+        // on the unit sphere meet.
         for (vertex, triangles) in &self.fans {
-            found.extend(self.fan_pairs(*vertex, triangles, &f, &enough, &cancellation));
+            let arcs: Vec<Aabb> = triangles.par_iter().map(|i| self.arc(*vertex, *i)).collect();
+            let tree = Bvh::new(&arcs, (0..triangles.len() as u32).collect(), Split::Median);
+            let here = |a: u32, b: u32| {
+                let (i, j) = (triangles[a as usize], triangles[b as usize]);
+                if self.common_fan(i, j) == Some(*vertex) { of(i, j) } else { None }
+            };
+            found.extend(touching(&tree, &arcs, &enough, here));
         }
-        found.into_iter().flatten().collect()
+        found
     }
 
     /// The first of the vertices of many triangles that two triangles share.
     fn common_fan(&self, i: u32, j: u32) -> Option<u32> {
         let (s, t) = (self.mesh.triangles[i as usize], self.mesh.triangles[j as usize]);
         s.into_iter().filter(|v| self.is_fan[*v as usize] && t.contains(v)).min()
-    }
-
-    /// The pairs of the triangles at a vertex: they meet elsewhere only if there is a direction from it that is in both, so that the arcs of
-    /// their far edges on the unit sphere meet.
-    fn fan_pairs<T: Send>(
-        &self,
-        vertex: u32,
-        triangles: &[u32],
-        f: &(impl Fn(usize, usize) -> Option<T> + Sync),
-        enough: &(impl Fn() -> bool + Sync),
-        cancellation: &Cancellation,
-    ) -> Vec<Vec<T>> {
-        let arcs: Vec<Aabb> = triangles.par_iter().map(|i| self.arc(vertex, *i)).collect();
-        let tree = Bvh::new(&arcs, (0..triangles.len() as u32).collect(), Split::Median);
-        let pairs = |part: &[u32]| {
-            let mut found = Vec::new();
-            for &a in part {
-                if enough() {
-                    break;
-                }
-                cancellation.enter(checkpoint);
-                let i = triangles[a as usize];
-                let b = &arcs[a as usize];
-                tree.overlapping(b, |near| {
-                    let near = near.iter().filter(|c| triangles[**c as usize] > i && b.touches(&arcs[**c as usize]));
-                    let here = near.map(|c| triangles[*c as usize]).filter(|j| self.common_fan(i, *j) == Some(vertex));
-                    found.extend(here.filter_map(|j| f(i as usize, j as usize)));
-                });
-            }
-            found
-        };
-        tree.order().par_chunks(256).map(pairs).collect()
     }
 
     /// The box of the directions from a vertex of a triangle into it: of an arc, which rises above its chord c by 1 − √(1 − c²/4) ≤ c²/4,
@@ -155,6 +116,33 @@ impl<'a> Near<'a> {
             Aabb { min: [-2.0; 3], max: [2.0; 3] }
         }
     }
+}
+
+/// What `f` makes of each pair of items of a tree whose boxes touch, the lower number first, until there is `enough`.
+fn touching<T: Send>(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    enough: &(impl Fn() -> bool + Sync),
+    f: impl Fn(u32, u32) -> Option<T> + Sync,
+) -> Vec<T> {
+    let cancellation = Cancellation::current();
+    let found = tree.order().par_chunks(256).map(|part| {
+        let mut found = Vec::new();
+        for &i in part {
+            if enough() {
+                break;
+            }
+            cancellation.enter(checkpoint);
+            let b = &boxes[i as usize];
+            tree.overlapping(b, |near| {
+                let near = near.iter().filter(|j| **j > i && b.touches(&boxes[**j as usize]));
+                found.extend(near.filter_map(|j| f(i, *j)));
+            });
+        }
+        found
+    });
+    let found: Vec<Vec<T>> = found.collect();
+    found.into_iter().flatten().collect()
 }
 
 pub(super) fn bounds(corners: [Vec3; 3]) -> Aabb {
