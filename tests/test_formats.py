@@ -15,7 +15,7 @@ def test_texts_name_the_formats_of_the_table():
     assert f"({READS};" in lt.Mesh.read.__doc__
     assert f"({READS})" in lt.region.mesh.__doc__
     assert _core.schema().count(f"({READS})") == 3
-    assert f"({READS.upper()})" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"({READS.upper()})" in (ROOT / "docs/reference/features.md").read_text(encoding="utf-8")
     assert f"({READS.upper()};" in (ROOT / "crates/geometry/src/lib.rs").read_text(encoding="utf-8")
     assert re.findall(r"\.(\w+) ", lt.Mesh.write.__doc__.replace(",", " ")) == list(formats.MESH_WRITES)
     assert f"({formats.dotted(formats.TET_WRITES)})" in cli.parser()._subparsers._group_actions[0].choices["tets"].format_help()
