@@ -190,6 +190,7 @@ docs: $(VENV)/.release
 	$(BIN)/python scripts/blend_by_normal_scores.py
 	$(BIN)/python scripts/beam_tables.py
 	$(BIN)/python scripts/gallery.py
+	$(BIN)/python scripts/pictures.py
 	$(BIN)/python scripts/builders.py
 	$(BIN)/python scripts/design_page.py
 	$(BIN)/python scripts/design_reference.py
