@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Writes the pictures of docs/images: of `shown` those that pages show, each made by the command on its page that writes a file of
-that name; of `cells` the cells with a name; and those of the front page and of the page on beams, of examples.
+"""Writes the pictures of docs/images: of `shown` those that pages show, each made by the command on its page that writes a file
+of that name; of `cells` the cells with a name; and those of the front page and of the page on beams, of examples.
 
     python scripts/pictures.py [PAGE ...]
 """
