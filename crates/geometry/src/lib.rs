@@ -68,6 +68,7 @@ pub mod random;
 mod remesh;
 pub mod render;
 pub mod repair;
+pub mod roots;
 pub mod simplify;
 pub mod smooth;
 pub mod spatial_order;

@@ -411,30 +411,6 @@ impl core::ops::Neg for Interval {
     }
 }
 
-/// The root in [a, b] of a function whose signs at a and b differ, which has the sign of `rising` at b: Newton's method from
-/// `x`, kept between the ends. `f` gives value and slope; steps end below `near[0]` + `near[1]` · |x|.
-pub fn root([mut a, mut b]: [f64; 2], mut x: f64, rising: bool, near: [f64; 2], f: impl Fn(f64) -> [f64; 2]) -> f64 {
-    for _ in 0..100 {
-        let [v, slope] = f(x);
-        if v == 0.0 {
-            break;
-        }
-        if (v > 0.0) == rising {
-            b = x;
-        } else {
-            a = x;
-        }
-        let newton = x - v / slope;
-        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
-        let done = (next - x).abs() <= near[0] + near[1] * x.abs();
-        x = next;
-        if done {
-            break;
-        }
-    }
-    x
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,8 @@
 //! principal axes of M, xᵢ = (pᵢ − μbᵢ)/(1 + μmᵢ). Feet that can be closest are found by the sign of 1 + μM; `all_feet`
 //! finds every one. Newton's method refines each to rounding.
 
-use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, scale, sub, transpose, unit};
+use geometry::roots::{Bracket, Tolerance};
 
 use super::hub_quadric::Quadric;
 
@@ -149,9 +150,8 @@ impl PrincipalAxes {
                     None => high = t,
                     Some(true) => low = t,
                     Some(false) => {
-                        let ends = [mu(low).min(mu(t)), mu(low).max(mu(t))];
-                        let min_factor = [0.0, 4.0 * f64::EPSILON];
-                        let at = root(ends, mu(t), true, min_factor, |mu| self.on_curve(p, mu).1);
+                        let bracket = Bracket::of_signs(mu(low).min(mu(t)), mu(low).max(mu(t)));
+                        let at = bracket.newton(mu(t), Tolerance::ROUNDING, |mu| self.on_curve(p, mu).1);
                         out.push(self.foot(p, at));
                         break;
                     }
