@@ -51,6 +51,7 @@
 
 pub mod bvh;
 pub mod cubic_spline;
+pub mod dense;
 pub mod distance;
 pub mod fault;
 pub mod fe_mesh;

@@ -248,8 +248,8 @@ fn times(a: &Modal<f64>, b: &Modal<f64>) -> Modal<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dense::eigenvalues;
     use crate::material::scalar_law;
+    use geometry::dense::eigenvalues;
     use geometry::random::random;
 
     const CUBOID: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.3, 0.0], [0.0, 0.0, 0.8]];
