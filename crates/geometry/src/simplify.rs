@@ -27,6 +27,7 @@ use crate::fault::{Fault, counted, number};
 use crate::measure;
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Stage, Stopped};
+use crate::remesh::edited_mesh::single;
 use crate::remesh::half_edge_mesh::NONE;
 use crate::surface_mesh::SurfaceMesh;
 
@@ -38,7 +39,7 @@ mod error_quadric;
 mod piece;
 
 use blocks::Blocks;
-use collapse::{Simplification, single};
+use collapse::Simplification;
 use piece::{Done, Known, Passing, Piece};
 
 /// Candidates between two reports of progress.
@@ -171,9 +172,9 @@ fn run(
         let half_edges = half_edges.ok_or_else(|| Stopped::Refused(unsound(&state.surface.mesh)))?;
         let mut work = Simplification::new(piece.start(state, half_edges), tolerance);
         let mut tried = 0u64;
-        while work.count > target && work.step().is_some() {
+        while work.state.mesh.count > target && work.step().is_some() {
             tried += 1;
-            let reached = (target > 0).then(|| (all - work.count, all - target));
+            let reached = (target > 0).then(|| (all - work.state.mesh.count, all - target));
             if tried.is_multiple_of(STRIDE) && !step(STRIDE, reached) {
                 return Err(Stopped::Interrupted);
             }

@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::blocks::Blocks;
-use super::collapse::{Simplification, Start, single};
+use super::collapse::{Simplification, Start};
 use super::deviation::Displacements;
 use crate::math::{Aabb, Vec3, add, scale, sub};
 use crate::mesh::{Mesh, degenerate, self_intersections};
+use crate::remesh::edited_mesh::{EditedMesh, single};
 use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE};
 use crate::remesh::{curve_order, kept_edges};
 use crate::surface_mesh::SurfaceMesh;
@@ -143,7 +144,8 @@ impl Piece {
                 (kept, displacements, self.vertices.iter().map(|v| known.kept_moved[*v as usize]).collect())
             }
         };
-        Start { free: self.free(), bounds: self.bounds, positions, half_edges, kept, displacements, kept_moved }
+        let mesh = EditedMesh::new(half_edges, positions, kept);
+        Start { free: self.free(), bounds: self.bounds, mesh, displacements, kept_moved }
     }
 
     /// The vertices all of whose triangles lie strictly in the block.
@@ -161,27 +163,24 @@ impl Piece {
     /// What is left of the triangles whose home is block `b`.
     pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> Done {
         let mut done = Done::default();
-        let start = &work.mesh;
-        let mut seen = vec![false; start.positions.len()];
-        for (t, corners) in start.half_edges.triangles.iter().enumerate() {
+        let state = &work.state;
+        let mesh = &state.mesh;
+        let mut seen = vec![false; mesh.positions.len()];
+        for (t, corners) in mesh.half_edges.triangles.iter().enumerate() {
             if corners[0] == NONE {
                 continue;
             }
-            let [p, q, r] = corners.map(|v| start.positions[v as usize]);
+            let [p, q, r] = mesh.corners(t as u32);
             if blocks.home(scale(add(p, add(q, r)), 1.0 / 3.0)) != b {
                 continue;
             }
             done.triangles.push(corners.map(|v| self.vertices[v as usize]));
             done.cut.push(self.cut[t]);
-            done.kept.push((0..3).fold(0, |bits, k| bits | u8::from(start.kept[3 * t + k]) << k));
-            done.displacements.push(start.displacements[t]);
+            done.kept.push((0..3).fold(0, |bits, k| bits | u8::from(mesh.kept[3 * t + k]) << k));
+            done.displacements.push(state.displacements[t]);
             for v in *corners {
-                if start.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
-                    done.moved.push((
-                        self.vertices[v as usize],
-                        start.positions[v as usize],
-                        start.kept_moved[v as usize],
-                    ));
+                if state.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
+                    done.moved.push((self.vertices[v as usize], mesh.at(v), state.kept_moved[v as usize]));
                 }
             }
         }
