@@ -40,7 +40,7 @@ mod piece;
 
 use blocks::Blocks;
 use collapse::Simplification;
-use piece::{Done, Known, Passing, Piece};
+use piece::{BlockResult, PassState, Piece, Tracked};
 
 /// Candidates between two reports of progress.
 const STRIDE: u64 = 4096;
@@ -108,7 +108,7 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
             "a mesh has more than 1.4e9 triangles, too many to be simplified",
         )));
     }
-    let mut state = Passing { surface: Cow::Borrowed(surface), known: None };
+    let mut state = PassState { surface: Cow::Borrowed(surface), known: None };
     for (pass, (shift, [from, to])) in PASSES.into_iter().enumerate() {
         let all = state.surface.mesh.triangles.len();
         let blocks = match target {
@@ -138,12 +138,12 @@ fn margin(mesh: &Mesh) -> f64 {
 
 /// Simplifies all blocks.
 fn run(
-    state: &Passing,
+    state: &PassState,
     blocks: &Blocks,
     tolerance: f64,
     target: usize,
     progress: &dyn Progress,
-) -> Result<Vec<Done>, Stopped> {
+) -> Result<Vec<BlockResult>, Stopped> {
     let vertices = state.surface.mesh.vertices.len();
     let all = state.surface.mesh.triangles.len();
     // Three candidates a vertex, and six more for each one that goes.
@@ -160,7 +160,7 @@ fn run(
     };
     // Tables of names, one a thread.
     let tables: Mutex<Vec<Vec<u32>>> = Mutex::new(Vec::new());
-    let simplified = |b: usize| -> Result<Done, Stopped> {
+    let simplified = |b: usize| -> Result<BlockResult, Stopped> {
         let table = tables.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut names = table.unwrap_or_else(|| vec![NONE; vertices]);
         let piece = Piece::new(&state.surface, blocks, b, &mut names);
@@ -186,10 +186,10 @@ fn run(
 }
 
 /// The surface that blocks make up, whose vertices were those of `before`.
-fn joined(before: &Mesh, done: Vec<Done>) -> Passing<'static> {
+fn joined(before: &Mesh, done: Vec<BlockResult>) -> PassState<'static> {
     let mut names = vec![NONE; before.vertices.len()];
     let mut surface = SurfaceMesh::default();
-    let mut known = Known::default();
+    let mut known = Tracked::default();
     let mut all_moved = Vec::new();
     for block in done {
         for triangle in &block.triangles {
@@ -213,7 +213,7 @@ fn joined(before: &Mesh, done: Vec<Done>) -> Passing<'static> {
         surface.mesh.vertices[name] = *position;
         known.kept_moved[name] = *kept_moved;
     }
-    Passing { surface: Cow::Owned(surface), known: Some(known) }
+    PassState { surface: Cow::Owned(surface), known: Some(known) }
 }
 
 /// The tolerance and the number of triangles of a goal.

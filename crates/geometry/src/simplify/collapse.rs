@@ -20,7 +20,7 @@ const HOLD: f64 = 10.0;
 const SHORT: f64 = 1e-8;
 
 /// A mesh, how far it has moved and where it may.
-pub struct Start {
+pub struct SimplifiedMesh {
     /// The mesh as it is now.
     pub mesh: EditedMesh,
     /// How far the surface has moved so far, by triangle.
@@ -36,7 +36,7 @@ pub struct Start {
 /// A mesh in the course of being simplified.
 pub struct Simplification {
     /// The mesh and how far it has moved.
-    pub state: Start,
+    pub state: SimplifiedMesh,
     tolerance: f64,
     quadrics: Vec<Quadric>,
     versions: Vec<u32>,
@@ -56,11 +56,11 @@ struct Plan {
 
 impl Simplification {
     /// A simplification that moves no point of the surface by more than `tolerance` (mm) in all.
-    pub fn new(start: Start, tolerance: f64) -> Simplification {
-        let n = start.mesh.positions.len();
+    pub fn new(mesh: SimplifiedMesh, tolerance: f64) -> Simplification {
+        let n = mesh.mesh.positions.len();
         let mut work = Simplification {
-            quadrics: quadrics(&start.mesh),
-            state: start,
+            quadrics: quadrics(&mesh.mesh),
+            state: mesh,
             tolerance,
             versions: vec![0; n],
             queue: Queue::new(),

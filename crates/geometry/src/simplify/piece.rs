@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::blocks::Blocks;
-use super::collapse::{Simplification, Start};
+use super::collapse::{Simplification, SimplifiedMesh};
 use super::deviation::Displacements;
 use crate::math::{Aabb, Vec3, add, scale, sub};
 use crate::mesh::{Mesh, degenerate, self_intersections};
@@ -14,16 +14,16 @@ use crate::remesh::{curve_order, kept_edges};
 use crate::surface_mesh::SurfaceMesh;
 
 /// A surface between two passes.
-pub struct Passing<'a> {
+pub struct PassState<'a> {
     /// The surface as it is now: positions are in single precision from the second pass on.
     pub surface: Cow<'a, SurfaceMesh>,
     /// What is known of it; nothing before the first pass.
-    pub known: Option<Known>,
+    pub known: Option<Tracked>,
 }
 
 /// What a pass hands to the next one.
 #[derive(Default)]
-pub struct Known {
+pub struct Tracked {
     /// For each triangle, which of its edges are kept: bits 0, 1, 2.
     pub kept: Vec<u8>,
     /// How far the surface has moved, by triangle.
@@ -34,14 +34,14 @@ pub struct Known {
 
 /// A block's triangles after a pass.
 #[derive(Default)]
-pub struct Done {
+pub struct BlockResult {
     /// Their corners, vertices of the surface before the pass.
     pub triangles: Vec<[u32; 3]>,
     /// For each, whether it is a cut.
     pub cut: Vec<bool>,
-    /// See [`Known`].
+    /// See [`Tracked`].
     pub kept: Vec<u8>,
-    /// See [`Known`].
+    /// See [`Tracked`].
     pub displacements: Vec<Displacements>,
     /// Vertices that the block alone has: where they are now, and how far their kept edges have moved.
     pub moved: Vec<(u32, Vec3, f32)>,
@@ -122,7 +122,7 @@ impl Piece {
     }
 
     /// What to start from.
-    pub fn start(&self, from: &Passing, half_edges: HalfEdgeMesh) -> Start {
+    pub fn start(&self, from: &PassState, half_edges: HalfEdgeMesh) -> SimplifiedMesh {
         let positions = self.mesh.vertices.clone();
         let (kept, displacements, kept_moved) = match &from.known {
             None => {
@@ -145,7 +145,7 @@ impl Piece {
             }
         };
         let mesh = EditedMesh::new(half_edges, positions, kept);
-        Start { free: self.free(), bounds: self.bounds, mesh, displacements, kept_moved }
+        SimplifiedMesh { free: self.free(), bounds: self.bounds, mesh, displacements, kept_moved }
     }
 
     /// The vertices all of whose triangles lie strictly in the block.
@@ -161,8 +161,8 @@ impl Piece {
     }
 
     /// What is left of the triangles whose home is block `b`.
-    pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> Done {
-        let mut done = Done::default();
+    pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> BlockResult {
+        let mut done = BlockResult::default();
         let state = &work.state;
         let mesh = &state.mesh;
         let mut seen = vec![false; mesh.positions.len()];
