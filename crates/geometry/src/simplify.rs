@@ -170,11 +170,12 @@ fn run(
             Some(_) => piece.linked(),
         };
         let half_edges = half_edges.ok_or_else(|| Stopped::Refused(unsound(&state.surface.mesh)))?;
-        let mut work = Simplification::new(piece.start(state, half_edges), tolerance);
+        let (mesh, motion) = piece.start(state, half_edges);
+        let mut work = Simplification::new(mesh, motion, tolerance);
         let mut tried = 0u64;
-        while work.state.mesh.count > target && work.step().is_some() {
+        while work.mesh.count > target && work.step().is_some() {
             tried += 1;
-            let reached = (target > 0).then(|| (all - work.state.mesh.count, all - target));
+            let reached = (target > 0).then(|| (all - work.mesh.count, all - target));
             if tried.is_multiple_of(STRIDE) && !step(STRIDE, reached) {
                 return Err(Stopped::Interrupted);
             }

@@ -19,10 +19,8 @@ const HOLD: f64 = 10.0;
 /// Among collapses that cost nothing, short edges come first.
 const SHORT: f64 = 1e-8;
 
-/// A mesh, how far it has moved and where it may.
-pub struct SimplifiedMesh {
-    /// The mesh as it is now.
-    pub mesh: EditedMesh,
+/// How far a mesh has moved, and where it may.
+pub struct Motion {
     /// How far the surface has moved so far, by triangle.
     pub displacements: Vec<Displacements>,
     /// How far kept edges have moved so far, by vertex, mm.
@@ -35,8 +33,10 @@ pub struct SimplifiedMesh {
 
 /// A mesh in the course of being simplified.
 pub struct Simplification {
-    /// The mesh and how far it has moved.
-    pub state: SimplifiedMesh,
+    /// The mesh as it is now.
+    pub mesh: EditedMesh,
+    /// How far it has moved.
+    pub motion: Motion,
     tolerance: f64,
     quadrics: Vec<Quadric>,
     versions: Vec<u32>,
@@ -56,11 +56,12 @@ struct Plan {
 
 impl Simplification {
     /// A simplification that moves no point of the surface by more than `tolerance` (mm) in all.
-    pub fn new(mesh: SimplifiedMesh, tolerance: f64) -> Simplification {
-        let n = mesh.mesh.positions.len();
+    pub fn new(mesh: EditedMesh, motion: Motion, tolerance: f64) -> Simplification {
+        let n = mesh.positions.len();
         let mut work = Simplification {
-            quadrics: quadrics(&mesh.mesh),
-            state: mesh,
+            quadrics: quadrics(&mesh),
+            mesh,
+            motion,
             tolerance,
             versions: vec![0; n],
             queue: Queue::new(),
@@ -68,8 +69,8 @@ impl Simplification {
             patch: Patch::default(),
             normals: Vec::new(),
         };
-        for h in 0..3 * work.state.mesh.count as u32 {
-            if work.state.mesh.half_edges.from(h) < work.state.mesh.half_edges.to(h) {
+        for h in 0..3 * work.mesh.count as u32 {
+            if work.mesh.half_edges.from(h) < work.mesh.half_edges.to(h) {
                 work.push(h);
             }
         }
@@ -80,7 +81,7 @@ impl Simplification {
     pub fn step(&mut self) -> Option<bool> {
         let c = self.queue.pop()?;
         let h = c.edge;
-        if !self.state.mesh.half_edges.is_live(h) || self.stamp(h) != c.stamp {
+        if !self.mesh.half_edges.is_live(h) || self.stamp(h) != c.stamp {
             return Some(false);
         }
         let Some(plan) = self.plan(h) else {
@@ -90,18 +91,17 @@ impl Simplification {
     }
 
     fn position(&self, v: u32) -> Vec3 {
-        self.state.mesh.positions[v as usize]
+        self.mesh.at(v)
     }
 
     fn stamp(&self, h: u32) -> u32 {
-        self.versions[self.state.mesh.half_edges.from(h) as usize]
-            .wrapping_add(self.versions[self.state.mesh.half_edges.to(h) as usize])
+        self.versions[self.mesh.half_edges.from(h) as usize]
+            .wrapping_add(self.versions[self.mesh.half_edges.to(h) as usize])
     }
 
     fn push(&mut self, h: u32) {
         if let Some(plan) = self.plan(h) {
-            let edge =
-                sub(self.position(self.state.mesh.half_edges.to(h)), self.position(self.state.mesh.half_edges.from(h)));
+            let edge = sub(self.position(self.mesh.half_edges.to(h)), self.position(self.mesh.half_edges.from(h)));
             let long = dot(edge, edge);
             let stamp = self.stamp(h);
             let cost = plan.cost + SHORT * long * long;
@@ -111,12 +111,12 @@ impl Simplification {
 
     /// The positions that the kept edges at its ends allow the edge, and its cost by the quadrics; `None` where it must stay.
     fn plan(&self, h: u32) -> Option<Plan> {
-        let (u, v) = (self.state.mesh.half_edges.from(h), self.state.mesh.half_edges.to(h));
-        if [u, v].iter().any(|w| !self.state.free[*w as usize]) {
+        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
+        if [u, v].iter().any(|w| !self.motion.free[*w as usize]) {
             return None;
         }
-        let ends = [u, v].map(|w| self.state.mesh.kept_at[w as usize]);
-        let along = self.state.mesh.kept[h as usize];
+        let ends = [u, v].map(|w| self.mesh.kept_at[w as usize]);
+        let along = self.mesh.kept[h as usize];
         let fixed = match ends {
             [0, 0] => None,
             [_, 0] => Some(self.position(u)),
@@ -137,21 +137,18 @@ impl Simplification {
     }
 
     fn joint(&self, h: u32) -> Quadric {
-        self.quadrics[self.state.mesh.half_edges.from(h) as usize]
-            .plus(&self.quadrics[self.state.mesh.half_edges.to(h) as usize])
+        self.quadrics[self.mesh.half_edges.from(h) as usize].plus(&self.quadrics[self.mesh.half_edges.to(h) as usize])
     }
 
     /// The end of the edge that costs less.
     fn better_end(&self, h: u32) -> Vec3 {
         let q = self.joint(h);
-        let (p, r) =
-            (self.position(self.state.mesh.half_edges.from(h)), self.position(self.state.mesh.half_edges.to(h)));
+        let (p, r) = (self.position(self.mesh.half_edges.from(h)), self.position(self.mesh.half_edges.to(h)));
         if q.at(p) <= q.at(r) { p } else { r }
     }
 
     fn middle(&self, h: u32) -> Vec3 {
-        let (p, q) =
-            (self.position(self.state.mesh.half_edges.from(h)), self.position(self.state.mesh.half_edges.to(h)));
+        let (p, q) = (self.position(self.mesh.half_edges.from(h)), self.position(self.mesh.half_edges.to(h)));
         scale(add(p, q), 0.5)
     }
 
@@ -162,7 +159,7 @@ impl Simplification {
         }
         let first = plan.fixed.unwrap_or_else(|| self.balanced(h));
         self.patch.w = single(first);
-        if !self.state.bounds.holds_inside(self.patch.w) {
+        if !self.motion.bounds.holds_inside(self.patch.w) {
             return false;
         }
         let Some(line) = self.kept_edge_moved(h) else {
@@ -183,7 +180,7 @@ impl Simplification {
 
     /// Gathers the patch about the edge; false if the collapse would not leave a closed manifold, or two kept edges would become one.
     fn gather(&mut self, h: u32) -> bool {
-        let (mesh, ring, patch) = (&self.state.mesh, &mut self.ring, &mut self.patch);
+        let (mesh, ring, patch) = (&self.mesh, &mut self.ring, &mut self.patch);
         if mesh.joins_kept(h) || !mesh.ring_of_edge(h, CROWD, ring) {
             return false;
         }
@@ -193,7 +190,7 @@ impl Simplification {
         patch.boundary.extend(ring.ring.iter().map(|r| mesh.at(*r)));
         patch.old.clear();
         let triangles = ring.outer.iter().chain([&h, &g]).map(|e| (e / 3) as usize);
-        patch.old.extend(triangles.map(|t| self.state.displacements[t]));
+        patch.old.extend(triangles.map(|t| self.motion.displacements[t]));
         (patch.u, patch.v) = (mesh.at(mesh.half_edges.from(h)), mesh.at(mesh.half_edges.from(g)));
         true
     }
@@ -229,23 +226,23 @@ impl Simplification {
 
     /// How far the run of kept edges through u and v has then moved in all; `None` if too far.
     fn kept_edge_moved(&self, h: u32) -> Option<f32> {
-        let (u, v) = (self.state.mesh.half_edges.from(h), self.state.mesh.half_edges.to(h));
-        if !self.state.mesh.kept[h as usize] {
-            return Some(self.state.kept_moved[u as usize].max(self.state.kept_moved[v as usize]));
+        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
+        if !self.mesh.kept[h as usize] {
+            return Some(self.motion.kept_moved[u as usize].max(self.motion.kept_moved[v as usize]));
         }
         let w = self.patch.w;
         let mut most = 0.0f64;
         for (a, b) in [(u, v), (v, u)] {
             let p = self.position(a);
-            let beyond = |e: &u32| self.state.mesh.kept[*e as usize] && self.state.mesh.half_edges.to(*e) != b;
+            let beyond = |e: &u32| self.mesh.kept[*e as usize] && self.mesh.half_edges.to(*e) != b;
             let mut off = f64::INFINITY;
-            for e in self.state.mesh.half_edges.leaving(a).filter(beyond) {
-                off = off.min(from_segment(p, w, self.position(self.state.mesh.half_edges.to(e))));
+            for e in self.mesh.half_edges.leaving(a).filter(beyond) {
+                off = off.min(from_segment(p, w, self.position(self.mesh.half_edges.to(e))));
             }
             most = most.max(if p == w { 0.0 } else { off });
         }
         most = most.max(from_segment(w, self.position(u), self.position(v)));
-        let all = f64::from(self.state.kept_moved[u as usize].max(self.state.kept_moved[v as usize])) + most;
+        let all = f64::from(self.motion.kept_moved[u as usize].max(self.motion.kept_moved[v as usize])) + most;
         (all <= self.tolerance).then_some(all as f32)
     }
 
@@ -282,11 +279,11 @@ impl Simplification {
         let mut bend = f64::INFINITY;
         for i in 0..m {
             let e = self.ring.outer[i];
-            if !self.state.mesh.kept[e as usize] {
-                let outer = unit(self.normal(self.state.mesh.half_edges.twin(e) / 3));
+            if !self.mesh.kept[e as usize] {
+                let outer = unit(self.normal(self.mesh.half_edges.twin(e) / 3));
                 bend = bend.min(dot(self.normals[i], outer));
             }
-            if !self.state.mesh.is_kept_spoke(&self.ring, i) {
+            if !self.mesh.is_kept_spoke(&self.ring, i) {
                 let before = self.normals[if i == 0 { m - 1 } else { i - 1 }];
                 bend = bend.min(dot(self.normals[i], before));
             }
@@ -295,7 +292,7 @@ impl Simplification {
     }
 
     fn normal(&self, t: u32) -> Vec3 {
-        let [a, b, c] = self.state.mesh.half_edges.triangles[t as usize].map(|v| self.state.mesh.positions[v as usize]);
+        let [a, b, c] = self.mesh.half_edges.triangles[t as usize].map(|v| self.mesh.positions[v as usize]);
         cross(sub(b, a), sub(c, a))
     }
 
@@ -305,8 +302,8 @@ impl Simplification {
         for e in &self.ring.outer {
             let t = e - e % 3;
             for g in [t, t + 1, t + 2] {
-                if !self.state.mesh.kept[g as usize] {
-                    let other = self.state.mesh.half_edges.twin(g) / 3;
+                if !self.mesh.kept[g as usize] {
+                    let other = self.mesh.half_edges.twin(g) / 3;
                     bend = bend.min(dot(unit(self.normal(t / 3)), unit(self.normal(other))));
                 }
             }
@@ -316,7 +313,7 @@ impl Simplification {
 
     /// Whether the fan meets no triangle outside the patch. Its own triangles are disjoint, being a graph.
     fn is_clear(&mut self, h: u32) -> bool {
-        let (p, ring, mesh) = (&self.patch, &self.ring, &mut self.state.mesh);
+        let (p, ring, mesh) = (&self.patch, &self.ring, &mut self.mesh);
         let (u, g) = (mesh.half_edges.from(h), mesh.half_edges.twin(h));
         let m = ring.ring.len();
         let fan = (0..m).map(|i| {
@@ -328,15 +325,15 @@ impl Simplification {
 
     /// Collapses the edge.
     fn collapse(&mut self, h: u32, line: f32) {
-        let [u, v] = [self.state.mesh.half_edges.from(h), self.state.mesh.half_edges.to(h)].map(|w| w as usize);
-        self.state.mesh.collapse(h, self.patch.w);
-        self.state.kept_moved[u] = line;
+        let [u, v] = [self.mesh.half_edges.from(h), self.mesh.half_edges.to(h)].map(|w| w as usize);
+        self.mesh.collapse(h, self.patch.w);
+        self.motion.kept_moved[u] = line;
         self.quadrics[u] = self.quadrics[u].plus(&self.quadrics[v]);
         self.versions[u] = self.versions[u].max(self.versions[v]) + 1;
         for (e, new) in self.ring.outer.iter().zip(&self.patch.new) {
-            self.state.displacements[(e / 3) as usize] = *new;
+            self.motion.displacements[(e / 3) as usize] = *new;
         }
-        self.state.mesh.refit(self.ring.outer.iter().map(|e| e / 3));
+        self.mesh.refit(self.ring.outer.iter().map(|e| e / 3));
         for i in 0..self.ring.outer.len() {
             // The spoke before the boundary edge of triangle i.
             self.push(prev(self.ring.outer[i]));

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::blocks::Blocks;
-use super::collapse::{Simplification, SimplifiedMesh};
+use super::collapse::{Motion, Simplification};
 use super::deviation::Displacements;
 use crate::math::{Aabb, Vec3, add, scale, sub};
 use crate::mesh::{Mesh, degenerate, self_intersections};
@@ -122,7 +122,7 @@ impl Piece {
     }
 
     /// What to start from.
-    pub fn start(&self, from: &PassState, half_edges: HalfEdgeMesh) -> SimplifiedMesh {
+    pub fn start(&self, from: &PassState, half_edges: HalfEdgeMesh) -> (EditedMesh, Motion) {
         let positions = self.mesh.vertices.clone();
         let (kept, displacements, kept_moved) = match &from.known {
             None => {
@@ -145,7 +145,7 @@ impl Piece {
             }
         };
         let mesh = EditedMesh::new(half_edges, positions, kept);
-        SimplifiedMesh { free: self.free(), bounds: self.bounds, mesh, displacements, kept_moved }
+        (mesh, Motion { displacements, kept_moved, free: self.free(), bounds: self.bounds })
     }
 
     /// The vertices all of whose triangles lie strictly in the block.
@@ -163,8 +163,7 @@ impl Piece {
     /// What is left of the triangles whose home is block `b`.
     pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> BlockResult {
         let mut done = BlockResult::default();
-        let state = &work.state;
-        let mesh = &state.mesh;
+        let (mesh, motion) = (&work.mesh, &work.motion);
         let mut seen = vec![false; mesh.positions.len()];
         for (t, corners) in mesh.half_edges.triangles.iter().enumerate() {
             if corners[0] == NONE {
@@ -177,10 +176,10 @@ impl Piece {
             done.triangles.push(corners.map(|v| self.vertices[v as usize]));
             done.cut.push(self.cut[t]);
             done.kept.push((0..3).fold(0, |bits, k| bits | u8::from(mesh.kept[3 * t + k]) << k));
-            done.displacements.push(state.displacements[t]);
+            done.displacements.push(motion.displacements[t]);
             for v in *corners {
-                if state.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
-                    done.moved.push((self.vertices[v as usize], mesh.at(v), state.kept_moved[v as usize]));
+                if motion.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
+                    done.moved.push((self.vertices[v as usize], mesh.at(v), motion.kept_moved[v as usize]));
                 }
             }
         }
