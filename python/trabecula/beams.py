@@ -32,10 +32,10 @@ def cells() -> list[dict[str, Any]]:
     from . import _core
 
     made = []
-    for name, title, group, aspect, nodes, struts, valences, maxwell, length in _core.beam_cells():
-        it = {"name": name, "title": title, "group": group, "aspect": list(aspect), "nodes": [list(n) for n in nodes]}
-        it["struts"] = [{"ends": list(ends), "shift": list(shift)} for ends, shift in struts]
-        it |= {"valence": dict(sorted(Counter(valences).items())), "maxwell": maxwell, "length": length}
+    for c in _core.beam_cells():
+        it: dict[str, Any] = {"name": c.name, "title": c.title, "group": c.group, "aspect": c.aspect, "nodes": c.nodes}
+        it["struts"] = [{"ends": ends, "shift": shift} for ends, shift in zip(c.ends, c.shifts, strict=True)]
+        it |= {"valence": dict(sorted(Counter(c.valences).items())), "maxwell": c.maxwell, "length": c.length}
         made.append(it)
     return made
 

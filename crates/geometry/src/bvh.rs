@@ -63,6 +63,9 @@ impl Node {
 }
 
 /// The tree: nodes, each before its children, and the items in the order of its leaves.
+///
+/// Any boxes are allowed. One that is empty or has a NaN touches nothing, so that no query asks for its item, which may be given with others
+/// of its leaf; the others are found as if it were not there. Infinite boxes are found; they make neighbours dearer to find.
 #[derive(Debug)]
 pub struct Bvh {
     nodes: Vec<Node>,
@@ -213,7 +216,8 @@ fn divide(boxes: &[Aabb], order: &mut [u32]) -> Option<usize> {
     let spread = order.iter().fold(Aabb::EMPTY, |b, i| b.with(middle(*i)));
     let axis = longest(&spread);
     let step = BINS as f64 / spread.size()[axis];
-    if !step.is_finite() {
+    // One place, none, or so far apart that all would fall into one bin.
+    if !(step.is_finite() && step > 0.0) {
         return None;
     }
     let bin = |i: u32| (((middle(i)[axis] - spread.min[axis]) * step) as usize).min(BINS - 1);
@@ -305,6 +309,54 @@ mod tests {
                 });
                 let want = items.iter().map(|i| boxes[*i as usize].distance(p)).fold(f64::INFINITY, f64::min);
                 assert!((best.sqrt() - want).abs() < 1e-15 || best == want);
+            }
+        }
+    }
+
+    /// Boxes that are empty, infinite or have NaN at some or all ends are found if they touch, and hide no others.
+    #[test]
+    fn boxes_of_any_numbers_hide_no_others() {
+        let special = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300];
+        for (share, n) in [(7, 3000), (2, 3000), (1, 600)] {
+            let mut boxes = boxes(n);
+            for (k, b) in boxes.iter_mut().step_by(share).enumerate() {
+                let value = special[k % 4];
+                match k % 5 {
+                    0 => (b.min[k % 3], b.max[k % 3]) = (value, value),
+                    1 => (b.min, b.max) = ([value; 3], [value; 3]),
+                    2 => b.max[k % 3] = value,
+                    3 => *b = Aabb::EMPTY,
+                    _ => *b = Aabb::ALL,
+                }
+            }
+            for split in [Split::Median, Split::SurfaceArea] {
+                let tree = Bvh::new(&boxes, (0..n as u32).collect(), split);
+                let mut sorted = tree.order().to_vec();
+                sorted.sort_unstable();
+                assert!(sorted.into_iter().eq(0..n as u32));
+                let in_order: Vec<Aabb> = tree.order().iter().map(|i| boxes[*i as usize]).collect();
+                let wide = WideBvh::new(&tree, &in_order);
+                let mut seed = 8;
+                for _ in 0..50 {
+                    let p = [0; 3].map(|_| random(&mut seed));
+                    let query = Aabb::EMPTY.with(p).grown(0.1);
+                    let touches = |i: &u32| boxes[*i as usize].touches(&query);
+                    let mut found: Vec<u32> = Vec::new();
+                    tree.overlapping(&query, |items| found.extend(items.iter().copied().filter(touches)));
+                    found.sort_unstable();
+                    assert!(found.into_iter().eq((0..n as u32).filter(touches)), "{split:?}");
+                    let square = |b: &Aabb| {
+                        let known = !b.is_empty() && b.min.iter().chain(&b.max).all(|v| !v.is_nan());
+                        if known { b.distance(p).powi(2) } else { f64::INFINITY }
+                    };
+                    let mut best = f64::INFINITY;
+                    wide.nearest(p, best, |i| {
+                        best = best.min(square(&in_order[i]));
+                        best
+                    });
+                    let want = boxes.iter().map(square).fold(f64::INFINITY, f64::min);
+                    assert!((best.sqrt() - want.sqrt()).abs() < 1e-15 || best == want, "{split:?} {best} {want}");
+                }
             }
         }
     }

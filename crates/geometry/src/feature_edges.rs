@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::distance::triangle::normal;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
-use crate::repair::half_edges::{ends, halves};
+use crate::mesh::edges::{Edges, ends};
 use crate::union_find;
 
 /// A straight piece of a crease.
@@ -53,19 +53,18 @@ impl About {
 
 /// The creases of a mesh: edges of two triangles whose normals differ.
 pub fn creases(mesh: &Mesh) -> Creases {
-    let halves = halves(mesh);
     let mut creases = Creases::default();
     let mut about: HashMap<u32, About> = HashMap::new();
     // Which creases go on in a straight line.
     let mut straight: Vec<(u32, [u32; 2])> = Vec::new();
-    for edge in halves.chunk_by(|a, b| a.0 == b.0) {
-        let [(_, a), (_, b)] = edge else { continue };
+    for edge in Edges::of(&mesh.triangles).each() {
+        let [a, b] = edge else { continue };
         let [m, n] = [a, b].map(|h| normal(mesh.corners(*h as usize / 3)));
         let turn = norm(cross(m, n)).atan2(dot(m, n));
         if turn < TURN {
             continue;
         }
-        let ends = ends(mesh, *a);
+        let ends = ends(&mesh.triangles, *a);
         let [p, q] = ends.map(|v| mesh.vertices[v as usize]);
         let number = creases.segments.len() as u32;
         let along = sub(q, p);

@@ -37,7 +37,7 @@ pub use element_files::{
 };
 pub use elements::Elements;
 pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};
-pub use indexed::{Aside, Indexed};
+pub use indexed::{ByteSpool, Indexed};
 pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, Stack, Target};
 pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
@@ -89,7 +89,7 @@ enum Write {
     /// One in which each triangle has corners of its own.
     Soup(fn(&Mesh, &mut dyn io::Write) -> io::Result<()>),
     /// One with numbered vertices. What follows numbers that are not known yet is put aside.
-    Indexed(fn(&dyn Indexed, &Metadata, &mut dyn Aside, &mut dyn io::Write) -> io::Result<()>),
+    Indexed(fn(&dyn Indexed, &Metadata, &mut dyn ByteSpool, &mut dyn io::Write) -> io::Result<()>),
 }
 
 /// The mesh formats, in the order in which texts name them.
@@ -230,7 +230,7 @@ pub fn write_indexed(
     mesh: &dyn Indexed,
     suffix: &str,
     meta: &Metadata,
-    aside: &mut dyn Aside,
+    aside: &mut dyn ByteSpool,
     out: &mut dyn io::Write,
 ) -> io::Result<()> {
     match writer(suffix)? {

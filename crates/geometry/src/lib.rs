@@ -51,6 +51,7 @@
 
 pub mod bvh;
 pub mod cubic_spline;
+pub mod dense;
 pub mod distance;
 pub mod fault;
 pub mod fe_mesh;
@@ -68,6 +69,7 @@ pub mod random;
 mod remesh;
 pub mod render;
 pub mod repair;
+pub mod roots;
 pub mod simplify;
 pub mod smooth;
 pub mod spatial_order;

@@ -1,5 +1,7 @@
 //! Three-vectors and 3×3 matrices on plain arrays, boxes and intervals.
 
+use crate::dense::diagonalise;
+
 /// A point or vector in space (mm) or phase (turns).
 pub type Vec3 = [f64; 3];
 /// A 3×3 matrix, row by row.
@@ -92,56 +94,20 @@ pub fn inverse(m: &Mat3) -> Mat3 {
     transpose(&[scale(a, d), scale(b, d), scale(c, d)])
 }
 
-/// The largest singular value of M, from the eigenvalues of MᵀM by Jacobi rotations.
+/// What counts as zero off a diagonal, as a share of it: far below rounding.
+const NEAR: f64 = 1e-18;
+
+/// The largest singular value of M, from the eigenvalues of MᵀM.
 pub fn spectral_norm(m: &Mat3) -> f64 {
     let mut a = product(&transpose(m), m);
-    for _ in 0..32 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            // Far below the rounding of the eigenvalues it changes nothing; convergence is quadratic.
-            if a[p][q].abs() <= 1e-20 * a[p][p].max(a[q][q]) || a[p][q].abs() < 1e-300 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let t = if theta == 0.0 { 1.0 } else { t };
-            let c = 1.0 / t.hypot(1.0);
-            let mut r = IDENTITY;
-            r[p][p] = c;
-            r[q][q] = c;
-            r[p][q] = t * c;
-            r[q][p] = -t * c;
-            a = product(&transpose(&r), &product(&a, &r));
-        }
-    }
+    diagonalise(&mut a, &mut [], NEAR);
     a[0][0].max(a[1][1]).max(a[2][2]).max(0.0).sqrt()
 }
 
-/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
+/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix.
 pub fn eigen(m: &Mat3) -> (Vec3, Mat3) {
-    let mut a = *m;
-    let mut vectors = IDENTITY;
-    for _ in 0..16 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q].abs() <= 1e-18 * (a[p][p].abs() + a[q][q].abs()) {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = if theta < 0.0 { -1.0 } else { 1.0 } / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
-            let s = t * c;
-            // a ← JᵀaJ, rows of `vectors` ← Jᵀ vectors.
-            for k in 0..3 {
-                let (x, y) = (a[k][p], a[k][q]);
-                (a[k][p], a[k][q]) = (c * x - s * y, s * x + c * y);
-            }
-            for k in 0..3 {
-                let (x, y) = (a[p][k], a[q][k]);
-                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
-                let (x, y) = (vectors[p][k], vectors[q][k]);
-                (vectors[p][k], vectors[q][k]) = (c * x - s * y, s * x + c * y);
-            }
-        }
-    }
+    let (mut a, mut vectors) = (*m, IDENTITY);
+    diagonalise(&mut a, &mut vectors, NEAR);
     debug_assert!((norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs()));
     let mut order = [0, 1, 2];
     order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
@@ -409,30 +375,6 @@ impl core::ops::Neg for Interval {
     fn neg(self) -> Interval {
         Interval::new(-self.hi, -self.lo)
     }
-}
-
-/// The root in [a, b] of a function whose signs at a and b differ, which has the sign of `rising` at b: Newton's method from
-/// `x`, kept between the ends. `f` gives value and slope; steps end below `near[0]` + `near[1]` · |x|.
-pub fn root([mut a, mut b]: [f64; 2], mut x: f64, rising: bool, near: [f64; 2], f: impl Fn(f64) -> [f64; 2]) -> f64 {
-    for _ in 0..100 {
-        let [v, slope] = f(x);
-        if v == 0.0 {
-            break;
-        }
-        if (v > 0.0) == rising {
-            b = x;
-        } else {
-            a = x;
-        }
-        let newton = x - v / slope;
-        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
-        let done = (next - x).abs() <= near[0] + near[1] * x.abs();
-        x = next;
-        if done {
-            break;
-        }
-    }
-    x
 }
 
 #[cfg(test)]

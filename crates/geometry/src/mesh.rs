@@ -3,14 +3,14 @@
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 use crate::weld::PointHash;
 
-mod edge_counts;
+pub(crate) mod edges;
 mod embedded;
 pub mod exact;
 pub mod samples;
 mod self_intersections;
 pub mod surface_samples;
 
-pub use edge_counts::EdgeCounts;
+pub use edges::EdgeCounts;
 pub use embedded::is_embedded;
 pub use self_intersections::{meet, near_pairs, self_intersections};
 

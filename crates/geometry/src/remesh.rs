@@ -1,14 +1,16 @@
 //! What changes of a triangle mesh edge by edge share: adjacency, the edges that stay, the triangles near a place.
 
-use crate::math::{Aabb, Vec3};
+use crate::math::Aabb;
 use crate::mesh::Mesh;
 use crate::surface_mesh::SurfaceMesh;
 
+pub mod edited_mesh;
 pub mod half_edge_mesh;
 pub mod kept_edges;
 pub mod refit_tree;
 
-use half_edge_mesh::{HalfEdgeMesh, NONE};
+use edited_mesh::EditedMesh;
+use half_edge_mesh::NONE;
 
 /// Triangles of a mesh along a space-filling curve, so that what is near in space is near in memory.
 pub fn curve_order(mesh: &Mesh, triangles: impl IntoIterator<Item = u32> + Clone) -> Vec<u32> {
@@ -65,10 +67,10 @@ fn spread(x: u64) -> u64 {
 }
 
 /// The triangles that are left.
-pub fn gathered(half_edges: &HalfEdgeMesh, positions: &[Vec3], cut: &[bool]) -> SurfaceMesh {
-    let mut names = vec![NONE; positions.len()];
+pub fn gathered(mesh: &EditedMesh, cut: &[bool]) -> SurfaceMesh {
+    let mut names = vec![NONE; mesh.positions.len()];
     let mut out = SurfaceMesh::default();
-    for (t, corners) in half_edges.triangles.iter().enumerate() {
+    for (t, corners) in mesh.half_edges.triangles.iter().enumerate() {
         if corners[0] == NONE {
             continue;
         }
@@ -76,7 +78,7 @@ pub fn gathered(half_edges: &HalfEdgeMesh, positions: &[Vec3], cut: &[bool]) -> 
             let name = &mut names[v as usize];
             if *name == NONE {
                 *name = out.mesh.vertices.len() as u32;
-                out.mesh.vertices.push(positions[v as usize]);
+                out.mesh.vertices.push(mesh.at(v));
             }
             *name
         });

@@ -7,7 +7,6 @@ use crate::progress::checkpoint;
 
 mod arrangement;
 mod fairing;
-pub(crate) mod half_edges;
 mod holes;
 mod orientation;
 mod stitch;

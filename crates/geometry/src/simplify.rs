@@ -27,6 +27,7 @@ use crate::fault::{Fault, counted, number};
 use crate::measure;
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Stage, Stopped};
+use crate::remesh::edited_mesh::single;
 use crate::remesh::half_edge_mesh::NONE;
 use crate::surface_mesh::SurfaceMesh;
 
@@ -38,8 +39,8 @@ mod error_quadric;
 mod piece;
 
 use blocks::Blocks;
-use collapse::{Simplification, single};
-use piece::{Done, Known, Passing, Piece};
+use collapse::Simplification;
+use piece::{BlockResult, PassState, Piece, Tracked};
 
 /// Candidates between two reports of progress.
 const STRIDE: u64 = 4096;
@@ -107,7 +108,7 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
             "a mesh has more than 1.4e9 triangles, too many to be simplified",
         )));
     }
-    let mut state = Passing { surface: Cow::Borrowed(surface), known: None };
+    let mut state = PassState { surface: Cow::Borrowed(surface), known: None };
     for (pass, (shift, [from, to])) in PASSES.into_iter().enumerate() {
         let all = state.surface.mesh.triangles.len();
         let blocks = match target {
@@ -137,12 +138,12 @@ fn margin(mesh: &Mesh) -> f64 {
 
 /// Simplifies all blocks.
 fn run(
-    state: &Passing,
+    state: &PassState,
     blocks: &Blocks,
     tolerance: f64,
     target: usize,
     progress: &dyn Progress,
-) -> Result<Vec<Done>, Stopped> {
+) -> Result<Vec<BlockResult>, Stopped> {
     let vertices = state.surface.mesh.vertices.len();
     let all = state.surface.mesh.triangles.len();
     // Three candidates a vertex, and six more for each one that goes.
@@ -159,7 +160,7 @@ fn run(
     };
     // Tables of names, one a thread.
     let tables: Mutex<Vec<Vec<u32>>> = Mutex::new(Vec::new());
-    let simplified = |b: usize| -> Result<Done, Stopped> {
+    let simplified = |b: usize| -> Result<BlockResult, Stopped> {
         let table = tables.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut names = table.unwrap_or_else(|| vec![NONE; vertices]);
         let piece = Piece::new(&state.surface, blocks, b, &mut names);
@@ -169,11 +170,12 @@ fn run(
             Some(_) => piece.linked(),
         };
         let half_edges = half_edges.ok_or_else(|| Stopped::Refused(unsound(&state.surface.mesh)))?;
-        let mut work = Simplification::new(piece.start(state, half_edges), tolerance);
+        let (mesh, motion) = piece.start(state, half_edges);
+        let mut work = Simplification::new(mesh, motion, tolerance);
         let mut tried = 0u64;
-        while work.count > target && work.step().is_some() {
+        while work.mesh.count > target && work.step().is_some() {
             tried += 1;
-            let reached = (target > 0).then(|| (all - work.count, all - target));
+            let reached = (target > 0).then(|| (all - work.mesh.count, all - target));
             if tried.is_multiple_of(STRIDE) && !step(STRIDE, reached) {
                 return Err(Stopped::Interrupted);
             }
@@ -185,10 +187,10 @@ fn run(
 }
 
 /// The surface that blocks make up, whose vertices were those of `before`.
-fn joined(before: &Mesh, done: Vec<Done>) -> Passing<'static> {
+fn joined(before: &Mesh, done: Vec<BlockResult>) -> PassState<'static> {
     let mut names = vec![NONE; before.vertices.len()];
     let mut surface = SurfaceMesh::default();
-    let mut known = Known::default();
+    let mut known = Tracked::default();
     let mut all_moved = Vec::new();
     for block in done {
         for triangle in &block.triangles {
@@ -212,7 +214,7 @@ fn joined(before: &Mesh, done: Vec<Done>) -> Passing<'static> {
         surface.mesh.vertices[name] = *position;
         known.kept_moved[name] = *kept_moved;
     }
-    Passing { surface: Cow::Owned(surface), known: Some(known) }
+    PassState { surface: Cow::Owned(surface), known: Some(known) }
 }
 
 /// The tolerance and the number of triangles of a goal.

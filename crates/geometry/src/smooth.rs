@@ -31,6 +31,7 @@ use crate::math::Vec3;
 use crate::measure::{self, Quality};
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Stopped};
+use crate::remesh::edited_mesh::single;
 use crate::remesh::half_edge_mesh::HalfEdgeMesh;
 use crate::remesh::{gathered, in_order};
 use crate::surface_mesh::SurfaceMesh;
@@ -73,7 +74,7 @@ pub struct Report {
 /// A mesh that is empty or not closed and manifold; an interruption.
 pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(SurfaceMesh, Report), Stopped> {
     let ordered = in_order(surface);
-    let positions: Vec<Vec3> = ordered.mesh.vertices.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
+    let positions: Vec<Vec3> = ordered.mesh.vertices.iter().copied().map(single).collect();
     let rounded = Mesh { vertices: positions, triangles: ordered.mesh.triangles };
     let (half_edges, before) = sound(&rounded).map_err(Stopped::Refused)?;
     let volume = rounded.volume();
@@ -88,7 +89,7 @@ pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(Surface
             if t % STRIDE == 0 && !progress.step((round * all + t) as u64, (ROUNDS * all) as u64) {
                 return Err(Stopped::Interrupted);
             }
-            if work.half_edges.is_live(3 * t as u32) && sine(work.corners(t as u32)) < goal {
+            if work.mesh.half_edges.is_live(3 * t as u32) && sine(work.mesh.corners(t as u32)) < goal {
                 improve(&mut work, t as u32, &mut changes);
             }
         }
@@ -98,7 +99,7 @@ pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(Surface
         }
     }
     work.settle();
-    let made = gathered(&work.half_edges, &work.positions, &ordered.cut);
+    let made = gathered(&work.mesh, &ordered.cut);
     let Some(after) = measure::quality(&made.mesh) else { return Ok((made, unchanged(all, before, volume))) };
     let report = Report {
         triangles: [all, made.mesh.triangles.len()],
@@ -115,7 +116,7 @@ fn unchanged(triangles: usize, quality: Quality, volume: f64) -> Report {
 
 /// Makes the first change that improves triangle `t`, and counts it.
 fn improve(work: &mut WorkingMesh, t: u32, changes: &mut [usize; 3]) {
-    let corners = work.corners(t);
+    let corners = work.mesh.corners(t);
     let length = |k: usize| {
         let d = crate::math::sub(corners[(k + 1) % 3], corners[k]);
         crate::math::dot(d, d)
@@ -132,7 +133,7 @@ fn improve(work: &mut WorkingMesh, t: u32, changes: &mut [usize; 3]) {
         return;
     }
     for k in 0..3 {
-        let v = work.half_edges.triangles[t as usize][k];
+        let v = work.mesh.half_edges.triangles[t as usize][k];
         if work.relocate(v) {
             changes[2] += 1;
             return;

@@ -13,8 +13,8 @@ use crate::distance::triangle_bvh::{Nearest, TriangleBvh};
 use crate::feature_edges::{Creases, creases};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edges, ends};
 use crate::progress::checkpoint;
-use crate::repair::half_edges::{ends, halves};
 use crate::tetmesh::FACES;
 use crate::union_find;
 
@@ -57,13 +57,13 @@ struct Adjacent {
 
 /// The edges of a mesh that two triangles share.
 fn feature_edges(mesh: &Mesh) -> Vec<Adjacent> {
-    let halves = halves(mesh);
-    let pairs = halves.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 2);
+    let edges = Edges::of(&mesh.triangles);
+    let pairs = edges.each().filter(|e| e.len() == 2);
     pairs
         .map(|e| {
-            let triangles = [e[0].1 / 3, e[1].1 / 3];
+            let triangles = [e[0] / 3, e[1] / 3];
             let [m, n] = triangles.map(|t| normal(mesh.corners(t as usize)));
-            let [a, b] = ends(mesh, e[0].1).map(|v| mesh.vertices[v as usize]);
+            let [a, b] = ends(&mesh.triangles, e[0]).map(|v| mesh.vertices[v as usize]);
             let turn = norm(cross(m, n)).atan2(dot(m, n));
             Adjacent { triangles, length: norm(sub(a, b)), feature: turn > TURN }
         })
@@ -178,13 +178,12 @@ impl PatchGroup {
     fn new(mesh: &Mesh) -> PatchGroup {
         let faces: Vec<Triangle> = (0..mesh.triangles.len()).map(|i| Triangle::new(mesh.corners(i))).collect();
         let tree = TriangleBvh::new(&faces);
-        let halves = halves(mesh);
-        let edges = || halves.chunk_by(|a, b| a.0 == b.0);
-        let pairs: Vec<[u32; 2]> = edges().filter(|e| e.len() == 2).map(|e| [e[0].1, e[1].1]).collect();
+        let edges = Edges::of(&mesh.triangles);
+        let pairs: Vec<[u32; 2]> = edges.each().filter(|e| e.len() == 2).map(|e| [e[0], e[1]]).collect();
         let normals = Normals::new(mesh, &faces, &pairs, tree.order());
         let mut at_boundary = vec![false; mesh.vertices.len()];
-        for e in edges().filter(|e| e.len() == 1) {
-            ends(mesh, e[0].1).into_iter().for_each(|v| at_boundary[v as usize] = true);
+        for e in edges.each().filter(|e| e.len() == 1) {
+            ends(&mesh.triangles, e[0]).into_iter().for_each(|v| at_boundary[v as usize] = true);
         }
         let of = |i: &u32| mesh.triangles[*i as usize].map(|v| at_boundary[v as usize]);
         let at_boundary = tree.order().iter().map(of).collect();

@@ -7,7 +7,7 @@
 
 use geometry::math::{Mat3, inverse};
 
-use crate::dense::eigenvalues;
+use geometry::dense::eigenvalues;
 
 /// Of a linear law ∇u → flux, per unit volume of the voxel: the law's 3 NC × 3 NC matrix, `c * 3 + d` for ∂u_c/∂x_d.
 pub type Law = [[f64; 9]; 9];

@@ -9,9 +9,9 @@ use geometry::progress::{Progress, Stage, Stopped};
 
 use crate::boltzmann::Nodes;
 use crate::cell::{Homogenised, fill_cyclic};
-use crate::dense::solved;
 use crate::fields::{combine, dot};
 use crate::pore::PoreGrid;
+use geometry::dense::{factorise, substitute};
 
 /// Steps between states that are combined.
 const STRIDE: usize = 8;
@@ -177,7 +177,11 @@ impl<'a> Flow<'a> {
             }
             gram[i][i] += 1e-14;
         }
-        let Some(found) = solved(gram, scale.iter().map(|s| 1.0 / s).collect()) else { return };
+        if factorise(&mut gram, |_, rest| (rest > 0.0).then(|| rest.sqrt())).is_none() {
+            return;
+        }
+        let mut found: Vec<f64> = scale.iter().map(|s| 1.0 / s).collect();
+        substitute(&gram, &mut found);
         let found: Vec<f64> = found.iter().zip(&scale).map(|(c, s)| c / s).collect();
         let total: f64 = found.iter().sum();
         if total.is_nan() || total <= 0.0 {

@@ -6,6 +6,7 @@
 //! Where several interfaces meet in a voxel it is the laminate of both phases: their means along it, the harmonic mean across.
 
 use geometry::math::{Mat3, Vec3, apply, dot};
+use geometry::roots::{Bracket, Tolerance};
 
 use crate::element::Element;
 
@@ -197,28 +198,16 @@ impl Columns {
 /// with the offset in straight pieces, between bounds.
 fn offset_of(each: &[([f64; 2], f64, f64); COLUMNS], rise: f64, share: f64) -> f64 {
     let most = each.iter().fold(0.0f64, |m, c| m.max(c.2.abs())) + rise;
-    let (mut low, mut high) = (-most, most);
-    let mut at = most * (2.0 * share - 1.0);
-    for _ in 0..60 {
+    let off = |at: f64| {
         let (mut found, mut rate) = (0.0, 0.0);
         for (_, weight, value) in each {
             let end = (at - value) / rise;
             found += weight * (0.5 + 0.5 * end.clamp(-1.0, 1.0));
             rate += if end.abs() < 1.0 { 0.5 * weight / rise } else { 0.0 };
         }
-        let off = found - share;
-        if off.abs() <= 1e-14 {
-            break;
-        }
-        if off > 0.0 {
-            high = at
-        } else {
-            low = at
-        }
-        let next = at - off / rate;
-        at = if next > low && next < high { next } else { 0.5 * (low + high) };
-    }
-    at
+        [if (found - share).abs() <= 1e-14 { 0.0 } else { found - share }, rate]
+    };
+    Bracket::of_signs(-most, most).newton(most * (2.0 * share - 1.0), Tolerance::absolute(0.0), off)
 }
 
 /// An upper bound of the eigenvalues of D⁻¹A, with D the diagonal, of a form over the values at the corners; `known` if it is no more than
@@ -259,8 +248,8 @@ fn times(a: &Modal<f64>, b: &Modal<f64>) -> Modal<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dense::eigenvalues;
     use crate::material::scalar_law;
+    use geometry::dense::eigenvalues;
     use geometry::random::random;
 
     const CUBOID: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.3, 0.0], [0.0, 0.0, 0.8]];

@@ -25,7 +25,6 @@
 mod boltzmann;
 mod cell;
 mod cut_voxels;
-mod dense;
 pub mod element;
 mod fields;
 mod flow;
@@ -41,7 +40,6 @@ mod slab;
 mod solve;
 
 pub use cell::{Homogenised, VoxelCell, upper_edges};
-pub use dense::eigen;
 pub use interface::Interface;
 pub use material::{AXES, Material, Voigt, turned, voigt};
 pub use moduli::{Moduli, bounds, conductivity_bounds};

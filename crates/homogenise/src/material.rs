@@ -3,8 +3,8 @@
 use geometry::fault::{Fault, number};
 use geometry::math::Mat3;
 
-use crate::dense::{eigenvalues, inverse6};
 use crate::element::Law;
+use geometry::dense::{eigenvalues, inverse};
 
 /// A symmetric 6 × 6 matrix: a stiffness (stress = C strain, shears are engineering shears 2ε) or a compliance.
 pub type Voigt = [[f64; 6]; 6];
@@ -83,7 +83,7 @@ impl Material {
         }
         let c: Voigt = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (stiffness[i][j] + stiffness[j][i])));
         let least = eigenvalues(c.iter().map(|r| r.to_vec()).collect()).into_iter().fold(f64::INFINITY, f64::min);
-        if least.is_nan() || least <= 0.0 || inverse6(&c).is_none() {
+        if least.is_nan() || least <= 0.0 || inverse(&c).is_none() {
             let message = format!(
                 "its least eigenvalue is {}; a stiffness is positive definite (order 11 22 33 23 13 12, engineering shears)",
                 number(least)

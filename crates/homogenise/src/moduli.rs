@@ -1,7 +1,7 @@
 //! Figures of an effective stiffness: engineering constants, anisotropy, bounds.
 
-use crate::dense::inverse6;
 use crate::material::Voigt;
+use geometry::dense::inverse;
 
 /// Figures of a stiffness, in Voigt's order 11 22 33 23 13 12.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Moduli {
 impl Moduli {
     /// The figures of a stiffness; `None` if it is singular: some strain meets no resistance.
     pub fn of(c: &Voigt) -> Option<Moduli> {
-        let s = inverse6(c)?;
+        let s = inverse(c)?;
         let sum = |m: &Voigt, of: [(usize, usize); 3]| of.iter().map(|(i, j)| m[*i][*j]).sum::<f64>();
         const NORMAL: [(usize, usize); 3] = [(0, 0), (1, 1), (2, 2)];
         const CROSS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];

@@ -3,7 +3,9 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use beams::graph::UnitCell;
 use geometry::formats::{Companions, GRAPH_FORMATS, Indexed};
+use geometry::math::Vec3;
 use geometry::progress::Stopped;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
@@ -16,6 +18,47 @@ use crate::mesh::{Mesh, metadata};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
+
+/// A cell of the catalogue of beams.
+#[pyclass(frozen, get_all, module = "trabecula._core")]
+pub struct BeamCell {
+    name: &'static str,
+    title: &'static str,
+    /// Its space group.
+    group: &'static str,
+    /// Ratios of the cell's edges.
+    aspect: [f64; 3],
+    /// Nodes, in edges.
+    nodes: Vec<Vec3>,
+    /// The nodes of each beam.
+    ends: Vec<[usize; 2]>,
+    /// The cell in which the second node of each beam lies.
+    shifts: Vec<[i32; 3]>,
+    /// The number of beams at each node.
+    valences: Vec<usize>,
+    /// Maxwell's count.
+    maxwell: i64,
+    /// Length of all beams in a cell with edges as `aspect` says.
+    length: f64,
+}
+
+impl BeamCell {
+    pub fn of(cell: &UnitCell) -> PyResult<BeamCell> {
+        let graph = cell.graph().map_err(error::fault)?;
+        Ok(BeamCell {
+            name: cell.name,
+            title: cell.title,
+            group: cell.group,
+            aspect: cell.aspect,
+            ends: graph.beams.iter().map(|b| b.ends).collect(),
+            shifts: graph.beams.iter().map(|b| b.shift).collect(),
+            valences: graph.valences(),
+            maxwell: graph.maxwell(),
+            length: graph.lengths(cell.aspect).iter().sum(),
+            nodes: graph.nodes,
+        })
+    }
+}
 
 /// The formats of graphs, in the order in which texts name them: suffix, what it is, whether it is written.
 #[pyfunction]

@@ -33,25 +33,12 @@ mod voxels;
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
 /// For each part, intervals of the fraction.
 type Connected = Vec<(&'static str, Vec<[f64; 2]>)>;
-/// Name, title, group, aspect; nodes and beams of a cell; its valences; Maxwell's count; length of the beams.
-type BeamCell = (
-    &'static str,
-    &'static str,
-    &'static str,
-    [f64; 3],
-    Vec<[f64; 3]>,
-    Vec<([usize; 2], [i32; 3])>,
-    Vec<usize>,
-    i64,
-    f64,
-);
-
 /// The compiled core of `trabecula`.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
 
-    use crate::{BeamCell, Connected, Operations};
+    use crate::{Connected, Operations};
 
     /// Cells of a grid along a tile's edge, and the most steps and cells of a grid.
     #[pymodule_export]
@@ -67,7 +54,7 @@ mod _core {
     const STL_RECORD: usize = geometry::formats::stl::RECORD;
 
     #[pymodule_export]
-    use crate::beam_files::{graph_formats, read_graph, write_beam_lattice, write_graph};
+    use crate::beam_files::{BeamCell, graph_formats, read_graph, write_beam_lattice, write_graph};
     #[pymodule_export]
     use crate::beam_mesh::BeamElements;
     #[pymodule_export]
@@ -205,18 +192,10 @@ mod _core {
         trabecula::cell::catalogue().iter().map(|n| (n.name, n.title, n.formula, n.group, n.source)).collect()
     }
 
-    /// The cells of beams: name, title, group, aspect, nodes, beams (two nodes and the second one's cell), the valence of
-    /// each node, Maxwell's count, and the length of all beams in a cell with edges as the aspect says.
+    /// The cells of beams.
     #[pyfunction]
     fn beam_cells() -> PyResult<Vec<BeamCell>> {
-        let row = |u: &beams::graph::UnitCell| {
-            let graph = u.graph().map_err(crate::error::fault)?;
-            let beams_of_cell = graph.beams.iter().map(|b| (b.ends, b.shift)).collect();
-            let length = graph.lengths(u.aspect).iter().sum();
-            let (valences, maxwell) = (graph.valences(), graph.maxwell());
-            Ok((u.name, u.title, u.group, u.aspect, graph.nodes, beams_of_cell, valences, maxwell, length))
-        };
-        beams::graph::catalogue().iter().map(row).collect()
+        beams::graph::catalogue().iter().map(BeamCell::of).collect()
     }
 
     /// What a named cell can tell: its range, and for each part the fractions in which it is one piece in space.

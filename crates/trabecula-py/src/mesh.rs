@@ -40,46 +40,119 @@ pub struct Mesh {
     design: String,
 }
 
-/// Lines of a picture: a caption, names, the number of the name and the points (mm) of each line, half their width (mm).
-type NamedLines = (String, Vec<String>, Vec<(usize, Vec<[f64; 3]>)>, f64);
+// Each of these is a tuple in Python.
 
-/// A scale: its title, a number at each vertex, its ends, and the build direction if it is of overhang.
-type Scale = (String, Vec<f64>, [f64; 2], Option<[f64; 3]>);
-
-/// Shares of named parts: what they are, the names, and those at each vertex.
-type NamedShares = (String, Vec<String>, Vec<f64>);
-
-/// The colours of a section: the first point of a grid, its steps and counts, and the numbers or shares at its points.
-type Inside = ([f64; 3], [[f64; 3]; 2], [usize; 2], Vec<f64>);
-
-/// Pixels across and down, azimuth and elevation, whether by parallel rays.
-type Seen = (usize, usize, f64, f64, bool);
-
-fn view((width, height, azimuth, elevation, parallel): Seen) -> View {
-    let projection = if parallel { Projection::Orthographic } else { Projection::Perspective };
-    View { size: [width, height], azimuth, elevation, projection }
+/// Lines of a picture; of each line the number of its name and its points (mm); half their width (mm).
+#[derive(FromPyObject)]
+struct NamedLines {
+    #[pyo3(item(0))]
+    caption: String,
+    #[pyo3(item(1))]
+    names: Vec<String>,
+    #[pyo3(item(2))]
+    lines: Vec<(usize, Vec<Vec3>)>,
+    #[pyo3(item(3))]
+    radius: f64,
 }
 
-/// The normal and the offset of a section; whether there is a scale bar, and axes.
-type Cut = (Option<([f64; 3], f64)>, bool, bool);
+/// A scale: a number at each vertex, and the build direction if it is of overhang.
+#[derive(FromPyObject)]
+struct ScaleColours {
+    #[pyo3(item(0))]
+    title: String,
+    #[pyo3(item(1))]
+    values: Vec<f64>,
+    #[pyo3(item(2))]
+    span: [f64; 2],
+    #[pyo3(item(3))]
+    up: Option<Vec3>,
+}
+
+/// Shares of named parts at each vertex.
+#[derive(FromPyObject)]
+struct NamedShares {
+    #[pyo3(item(0))]
+    title: String,
+    #[pyo3(item(1))]
+    names: Vec<String>,
+    #[pyo3(item(2))]
+    values: Vec<f64>,
+}
+
+/// The colours of a section: numbers or shares at the points of a grid.
+#[derive(FromPyObject)]
+struct GridColours {
+    #[pyo3(item(0))]
+    origin: Vec3,
+    #[pyo3(item(1))]
+    steps: [Vec3; 2],
+    #[pyo3(item(2))]
+    counts: [usize; 2],
+    #[pyo3(item(3))]
+    values: Vec<f64>,
+}
+
+/// The size in pixels, the direction in degrees, and the projection of a picture.
+#[derive(FromPyObject)]
+struct Camera {
+    #[pyo3(item(0))]
+    width: usize,
+    #[pyo3(item(1))]
+    height: usize,
+    #[pyo3(item(2))]
+    azimuth: f64,
+    #[pyo3(item(3))]
+    elevation: f64,
+    #[pyo3(item(4))]
+    orthographic: bool,
+}
+
+/// What is added to a picture: a section by its normal and offset, a scale bar, axes.
+#[derive(FromPyObject)]
+struct Annotations {
+    #[pyo3(item(0))]
+    section: Option<(Vec3, f64)>,
+    #[pyo3(item(1))]
+    scale_bar: bool,
+    #[pyo3(item(2))]
+    axes: bool,
+}
+
+/// The page of a line drawing.
+#[derive(FromPyObject)]
+struct DrawingPage {
+    #[pyo3(item(0))]
+    size: [f64; 2],
+    #[pyo3(item(1))]
+    unit: String,
+    #[pyo3(item(2))]
+    line_width: Option<f64>,
+}
+
+impl Camera {
+    fn view(&self) -> View {
+        let projection = if self.orthographic { Projection::Orthographic } else { Projection::Perspective };
+        View { size: [self.width, self.height], azimuth: self.azimuth, elevation: self.elevation, projection }
+    }
+}
 
 fn look(
-    (section, scale_bar, axes): Cut,
-    tint: Option<Scale>,
+    Annotations { section, scale_bar, axes }: Annotations,
+    tint: Option<ScaleColours>,
     shares: Option<NamedShares>,
     lines: Option<NamedLines>,
-    inside: Option<Inside>,
+    inside: Option<GridColours>,
 ) -> Look {
-    let scale = tint.map(|(title, values, span, up)| {
+    let scale = tint.map(|ScaleColours { title, values, span, up }| {
         let amount = up.map_or_else(|| Amount::AtVertices(values), Amount::Overhang);
         Colours::Scale(Tint { title, amount, span })
     });
-    let parts = shares.map(|(title, names, values)| Colours::Shares(Shares { title, names, values }));
+    let parts = shares.map(|NamedShares { title, names, values }| Colours::Shares(Shares { title, names, values }));
     Look {
         colours: scale.or(parts),
-        lines: lines.map(|(caption, names, lines, radius)| Lines { caption, names, lines, radius }),
+        lines: lines.map(|NamedLines { caption, names, lines, radius }| Lines { caption, names, lines, radius }),
         section: section.map(|(normal, offset)| Section { normal, offset }),
-        section_colours: inside.map(|(origin, steps, counts, values)| SectionColours {
+        section_colours: inside.map(|GridColours { origin, steps, counts, values }| SectionColours {
             grid: PlaneGrid { origin, steps, counts },
             values,
         }),
@@ -406,13 +479,13 @@ impl Mesh {
     fn png<'py>(
         &self,
         py: Python<'py>,
-        seen: Seen,
-        cut: Cut,
+        seen: Camera,
+        cut: Annotations,
         solid: Option<Py<Solid>>,
-        tint: Option<Scale>,
+        tint: Option<ScaleColours>,
         shares: Option<NamedShares>,
         lines: Option<NamedLines>,
-        inside: Option<Inside>,
+        inside: Option<GridColours>,
         background: &str,
         dpi: Option<f64>,
     ) -> PyResult<(Bound<'py, PyBytes>, bool)> {
@@ -421,7 +494,7 @@ impl Mesh {
             "transparent" => Background::Transparent,
             _ => Background::Shaded,
         };
-        let (view, mut look) = (view(seen), Look { background, ..look(cut, tint, shares, lines, inside) });
+        let (view, mut look) = (seen.view(), Look { background, ..look(cut, tint, shares, lines, inside) });
         let bytes = run(py, None, None, |_| {
             look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
             png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi)
@@ -436,19 +509,24 @@ impl Mesh {
     fn svg(
         &self,
         py: Python<'_>,
-        seen: Seen,
-        cut: Cut,
-        page: ([f64; 2], String, Option<f64>),
+        seen: Camera,
+        cut: Annotations,
+        page: DrawingPage,
         solid: Option<Py<Solid>>,
-        tint: Option<Scale>,
+        tint: Option<ScaleColours>,
         shares: Option<NamedShares>,
         lines: Option<NamedLines>,
-        inside: Option<Inside>,
+        inside: Option<GridColours>,
     ) -> PyResult<(String, bool)> {
-        let (view, mut look) = (view(seen), look(cut, tint, shares, lines, inside));
+        let (view, mut look) = (seen.view(), look(cut, tint, shares, lines, inside));
         let text = run(py, None, None, |_| {
             look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
-            line_drawing(&self.surface, &view, &look, &Page { size: page.0, unit: &page.1, line_width: page.2 })
+            line_drawing(
+                &self.surface,
+                &view,
+                &look,
+                &Page { size: page.size, unit: &page.unit, line_width: page.line_width },
+            )
         })?;
         Ok((text, line_drawing_fits(&look, &view)))
     }

@@ -3,6 +3,7 @@
 use geometry::fault::Fault;
 use geometry::fe_mesh::{BeamMesh, FeSet};
 use geometry::math::{Aabb, Vec3, norm};
+use geometry::roots::bisect;
 use geometry::union_find::{labels, singles, unite};
 use rayon::prelude::*;
 
@@ -39,6 +40,8 @@ pub struct Made {
 const USUAL: f64 = 4.0;
 /// Points at which a beam's axis is searched for the region's boundary, for each of its least radius.
 const DENSE: f64 = 2.0;
+/// Halvings of the distance of two such points after which the boundary is known: to 1e-12 of it.
+const HALVINGS: usize = 40;
 /// Most elements.
 const MOST: f64 = 1e8;
 /// A share of the mesh's size within which a node lies on a plane or in a region.
@@ -101,18 +104,9 @@ fn within(quadors: &Quadors, b: usize, region: &Region, near: f64) -> Vec<[f64; 
     region.values(&places.iter().map(|z| at(*z)).collect::<Vec<_>>(), &mut values);
     // An axis in the boundary is in the region, whichever way its values are rounded; one that crosses it ends there.
     let is_in = |v: f64| v <= near;
-    let crossing = |mut inner: f64, mut outer: f64| {
-        if region.value(at(inner)) >= -near {
-            return inner;
-        }
-        while (outer - inner).abs() > 1e-12 * length {
-            let middle = 0.5 * (inner + outer);
-            if middle == inner || middle == outer {
-                break;
-            }
-            *(if region.value(at(middle)) <= 0.0 { &mut inner } else { &mut outer }) = middle;
-        }
-        inner
+    let crossing = |inner: f64, outer: f64| match region.value(at(inner)) >= -near {
+        true => inner,
+        false => bisect([inner, outer], HALVINGS, |z| region.value(at(z)) <= 0.0)[0],
     };
     let mut runs: Vec<[f64; 2]> = Vec::new();
     let mut start = is_in(values[0]).then_some(0.0);

@@ -12,6 +12,7 @@ use geometry::fault::{Fault, counted, number};
 use geometry::fe_mesh::{FeSet, ShellMesh};
 use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub};
 use geometry::progress::{Progress, Stage, Stopped};
+use geometry::roots::{Bracket, Tolerance};
 use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
 use rayon::prelude::*;
@@ -282,31 +283,17 @@ fn way_out(face: &dyn Implicit, p: Vec3, way: Vec3, reach: f64) -> f64 {
     let at = |s: f64| {
         let (mut value, mut gradient) = ([0.0], [[0.0; 3]]);
         face.gradients(&[add(p, scale(way, s))], &mut value, &mut gradient);
-        (value[0], dot(gradient[0], way))
+        [value[0], dot(gradient[0], way)]
     };
     let march = reach / 32.0;
     let mut high = march;
-    while at(high).0 <= 0.0 {
+    while at(high)[0] <= 0.0 {
         high += march;
         if high > reach {
             return reach;
         }
     }
-    let (mut low, mut s) = (high - march, high);
-    for _ in 0..2 * STEPS {
-        let (value, slope) = at(s);
-        if value <= 0.0 {
-            low = s
-        } else {
-            high = s
-        }
-        let next = s - value / slope;
-        if (next - s).abs() <= 1e-13 * reach {
-            return next;
-        }
-        s = if next > low && next < high { next } else { 0.5 * (low + high) };
-    }
-    s
+    Bracket::of_signs(high - march, high).newton(high, Tolerance::absolute(1e-13 * reach), at)
 }
 
 impl Field for MidSurface {

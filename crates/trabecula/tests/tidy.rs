@@ -74,9 +74,32 @@ fn files(of: &str) -> Vec<(PathBuf, String)> {
     paths.into_iter().map(|p| (p.clone(), fs::read_to_string(p).expect("text"))).collect()
 }
 
-/// The part of a file that is compiled into the library: tests stand at its foot.
-fn shipped(text: &str) -> &str {
-    &text[..text.find("\n#[cfg(test)]").unwrap_or(text.len())]
+/// What is compiled into the library of a formatted source: all but its items for tests, wherever they stand. Such an item ends with the
+/// brace in its column, or in a line of its own.
+fn shipped(text: &str) -> String {
+    let mut out = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        let body = line.trim_start();
+        if body != "#[cfg(test)]" {
+            out.push_str(line);
+            out.push('\n');
+            continue;
+        }
+        let closing = format!("{}}}", &line[..line.len() - body.len()]);
+        let mut item = lines.by_ref().skip_while(|l| l.trim_start().starts_with("#["));
+        if item.next().is_some_and(|first| !first.ends_with([';', '}'])) {
+            item.find(|l| *l == closing);
+        }
+    }
+    out
+}
+
+#[test]
+fn what_follows_the_items_for_tests_is_checked_too() {
+    let text = "use a;\n#[cfg(test)]\n#[allow(b)]\nmod tests {\n    fn c() {\n    }\n}\nuse d;\nimpl E {\n    #[cfg(test)]\n    fn f() {\n    }\n    \
+                fn g() {}\n}\n#[cfg(test)]\nmod h;\nuse i;\n";
+    assert_eq!(shipped(text), "use a;\nuse d;\nimpl E {\n    fn g() {}\n}\nuse i;\n");
 }
 
 fn is_test(path: &Path) -> bool {
@@ -102,8 +125,7 @@ fn modules_import_from_lower_layers_only() {
             wrong.insert(format!("module {own} stands in no layer"));
             continue;
         };
-        for (i, _) in shipped(text).match_indices("crate::") {
-            let rest = &text[i + 7..];
+        for rest in shipped(text).split("crate::").skip(1) {
             let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
             let other = &rest[..end];
             match rank.get(other) {

@@ -1,6 +1,7 @@
 //! Sizes of the fillets of a hub: what is asked for, and what fits.
 
 use geometry::math::dot;
+use geometry::roots::bisect;
 
 use super::Fillet;
 use super::hub::Hub;
@@ -75,7 +76,7 @@ impl Pairs {
             if step(1.0) {
                 return;
             }
-            let last = last_allowed([0.0, 1.0], &mut step);
+            let last = bisect([0.0, 1.0], HALVINGS, &mut step)[0];
             step(last);
             let before = moving.len();
             moving = self.free(&moving, to, floor);
@@ -104,15 +105,6 @@ impl Pairs {
             self.advance(self.free(pairs, to, floor), to, floor);
         }
     }
-}
-
-/// The last allowed place of an interval whose start is.
-fn last_allowed([mut lo, mut hi]: [f64; 2], allowed: &mut dyn FnMut(f64) -> bool) -> f64 {
-    for _ in 0..HALVINGS {
-        let mid = (lo + hi) / 2.0;
-        if allowed(mid) { lo = mid } else { hi = mid }
-    }
-    lo
 }
 
 /// The minimum τ of each pair: fillets above it end before the split planes. And the pairs that overlap there.
@@ -222,21 +214,13 @@ fn largest(hub: &Hub, least: &Pairs, floor: f64) -> Pairs {
             return Pairs::new(least.n, |_, _| tau);
         }
     }
-    equal_cylinders(hub, least, last_allowed([radius, radius / factor], &mut |r| allowed(r)))
+    equal_cylinders(hub, least, bisect([radius, radius / factor], HALVINGS, allowed)[0])
 }
 
 /// τ at which the crotch of two half-beams has radius r; the radius decreases as τ increases.
 fn tau_for_radius(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
     let at = |tau: f64| hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1);
-    let (mut lo, mut hi) = (0.0, MAX_TAU);
-    if at(hi) >= r {
-        return hi;
-    }
-    for _ in 0..48 {
-        let mid = (lo + hi) / 2.0;
-        if at(mid) >= r { lo = mid } else { hi = mid }
-    }
-    lo
+    if at(MAX_TAU) >= r { MAX_TAU } else { bisect([0.0, MAX_TAU], 48, |tau| at(tau) >= r)[0] }
 }
 
 /// The fillets of a hub: one in each crotch, where two of its half-beams meet.

@@ -4,7 +4,9 @@
 //! principal axes of M, xᵢ = (pᵢ − μbᵢ)/(1 + μmᵢ). Feet that can be closest are found by the sign of 1 + μM; `all_feet`
 //! finds every one. Newton's method refines each to rounding.
 
-use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
+use geometry::dense::solve;
+use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, scale, sub, transpose, unit};
+use geometry::roots::{Bracket, Tolerance};
 
 use super::hub_quadric::Quadric;
 
@@ -149,9 +151,8 @@ impl PrincipalAxes {
                     None => high = t,
                     Some(true) => low = t,
                     Some(false) => {
-                        let ends = [mu(low).min(mu(t)), mu(low).max(mu(t))];
-                        let min_factor = [0.0, 4.0 * f64::EPSILON];
-                        let at = root(ends, mu(t), true, min_factor, |mu| self.on_curve(p, mu).1);
+                        let bracket = Bracket::of_signs(mu(low).min(mu(t)), mu(low).max(mu(t)));
+                        let at = bracket.newton(mu(t), Tolerance::ROUNDING, |mu| self.on_curve(p, mu).1);
                         out.push(self.foot(p, at));
                         break;
                     }
@@ -199,41 +200,17 @@ impl PrincipalAxes {
                 rows[3][i] = 2.0 * g[i];
             }
             rows[3][4] = -q;
-            let Some(step) = solve(rows) else {
+            if solve(&mut rows, 1e-12).is_none() {
                 // A whole circle is equally close: any of its points serves, once it is on the quadric.
                 let along = scale(g, -q / (2.0 * dot(g, g)));
                 x = add(x, along);
                 continue;
-            };
-            x = add(x, [step[0], step[1], step[2]]);
-            mu += step[3];
+            }
+            x = add(x, [0, 1, 2].map(|i| rows[i][4]));
+            mu += rows[3][4];
         }
         None
     }
-}
-
-/// The solution of four linear equations; `None` if they are dependent within rounding.
-fn solve(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
-    let largest = rows.iter().flat_map(|r| &r[..4]).fold(0.0f64, |a, v| a.max(v.abs()));
-    for c in 0..4 {
-        let best = (c..4).max_by(|&i, &j| rows[i][c].abs().total_cmp(&rows[j][c].abs()))?;
-        rows.swap(c, best);
-        if rows[c][c].abs() <= 1e-12 * largest {
-            return None;
-        }
-        for r in c + 1..4 {
-            let f = rows[r][c] / rows[c][c];
-            for k in c..5 {
-                rows[r][k] -= f * rows[c][k];
-            }
-        }
-    }
-    let mut x = [0.0; 4];
-    for r in (0..4).rev() {
-        let sum: f64 = (r + 1..4).map(|k| rows[r][k] * x[k]).sum();
-        x[r] = (rows[r][4] - sum) / rows[r][r];
-    }
-    Some(x)
 }
 
 /// The direction from a point in the solid to its foot on a crease.

@@ -41,7 +41,7 @@ impl Indexed for Mesh {
 }
 
 /// Bytes put aside until what precedes them is known.
-pub trait Aside {
+pub trait ByteSpool {
     /// Adds bytes at the end.
     ///
     /// # Errors
@@ -55,7 +55,7 @@ pub trait Aside {
     fn copy_to(&mut self, out: &mut dyn io::Write) -> io::Result<()>;
 }
 
-impl Aside for Vec<Vec<u8>> {
+impl ByteSpool for Vec<Vec<u8>> {
     fn put(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.push(bytes);
         Ok(())
@@ -67,7 +67,7 @@ impl Aside for Vec<Vec<u8>> {
 }
 
 /// A file that is written and then read back from its beginning.
-impl Aside for std::fs::File {
+impl ByteSpool for std::fs::File {
     fn put(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.write_all(&bytes)
     }

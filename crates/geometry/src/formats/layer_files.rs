@@ -5,7 +5,7 @@
 use std::io::{self, Seek, Write};
 
 use super::threemf::Piece;
-use super::{Aside, invalid};
+use super::{ByteSpool, invalid};
 use crate::layer::{Layer, Point};
 use crate::math::Aabb;
 
@@ -90,7 +90,7 @@ pub trait LayerWriter {
     fn finish(&mut self) -> io::Result<()>;
 }
 
-type Open = for<'a> fn(&'a Stack, &'a mut dyn Target, &'a mut dyn Aside) -> io::Result<Box<dyn LayerWriter + 'a>>;
+type Open = for<'a> fn(&'a Stack, &'a mut dyn Target, &'a mut dyn ByteSpool) -> io::Result<Box<dyn LayerWriter + 'a>>;
 
 /// A format of files of layers.
 pub struct LayerFormat {

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use super::number::{push_f32, push_u32};
 use super::xml::escaped;
-use super::{Aside, Indexed, Metadata, in_order, invalid};
+use super::{ByteSpool, Indexed, Metadata, in_order, invalid};
 use crate::math::Vec3;
 
 mod beam_lattice;
@@ -36,7 +36,7 @@ const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// Writes 3MF. Coordinates are rounded to single precision, which is what readers of the format hold.
-pub fn write(mesh: &dyn Indexed, meta: &Metadata, aside: &mut dyn Aside, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &dyn Indexed, meta: &Metadata, aside: &mut dyn ByteSpool, out: &mut dyn Write) -> io::Result<()> {
     write_objects(&[("", mesh)], meta, aside, out)
 }
 
@@ -47,7 +47,7 @@ pub fn write(mesh: &dyn Indexed, meta: &Metadata, aside: &mut dyn Aside, out: &m
 pub fn write_objects(
     objects: &[(&str, &dyn Indexed)],
     meta: &Metadata,
-    aside: &mut dyn Aside,
+    aside: &mut dyn ByteSpool,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     if objects.iter().any(|o| o.1.counts().iter().any(|n| *n >= i32::MAX as usize)) {
@@ -75,7 +75,7 @@ pub struct Model<'a>(Entry<'a>);
 
 impl<'a> Model<'a> {
     /// An empty model, whose pieces are put aside.
-    pub fn new(aside: &'a mut dyn Aside) -> Model<'a> {
+    pub fn new(aside: &'a mut dyn ByteSpool) -> Model<'a> {
         Model(Entry::new(MODEL, aside))
     }
 

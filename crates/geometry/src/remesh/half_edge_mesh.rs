@@ -2,6 +2,8 @@
 //!
 //! Half-edge 3t + k runs from corner k of triangle t to the next one.
 
+use crate::mesh::edges::{Edges, ends, rises};
+
 /// No half-edge, no vertex.
 pub const NONE: u32 = u32::MAX;
 
@@ -36,45 +38,22 @@ impl HalfEdgeMesh {
     /// Links the triangles of `n` vertices, of a mesh that may have boundaries; `None` if an edge has more than two triangles,
     /// or two of the same direction.
     pub fn open(triangles: Vec<[u32; 3]>, n: usize) -> Option<HalfEdgeMesh> {
-        let origin = |h: usize| triangles[h / 3][h % 3];
-        // Half-edges by their origin; a twin is found among those that leave its end.
-        let mut start = vec![0u32; n + 1];
-        for &v in triangles.iter().flatten() {
-            start[v as usize + 1] += 1;
-        }
-        for v in 0..n {
-            start[v + 1] += start[v];
-        }
-        let sides = 3 * triangles.len();
-        let mut next_free = start.clone();
-        let mut leaving = vec![0u32; sides];
-        for h in 0..sides {
-            let place = &mut next_free[origin(h) as usize];
-            leaving[*place as usize] = h as u32;
-            *place += 1;
-        }
-        let mut twin = vec![NONE; sides];
-        for h in 0..sides {
-            let (a, b) = (origin(h), origin(next(h as u32) as usize));
-            let from = start[b as usize] as usize..start[b as usize + 1] as usize;
-            let mut back = leaving[from].iter().filter(|g| origin(next(**g) as usize) == a);
-            twin[h] = back.next().copied().unwrap_or(NONE);
-            if a == b || back.next().is_some() {
-                return None;
+        let mut twin = vec![NONE; 3 * triangles.len()];
+        for edge in Edges::of(&triangles).each() {
+            let way = |h: u32| ends(&triangles, h);
+            match *edge {
+                [h] if way(h)[0] != way(h)[1] => {}
+                [g, h] if rises(&triangles, g) != rises(&triangles, h) => {
+                    (twin[g as usize], twin[h as usize]) = (h, g);
+                }
+                _ => return None,
             }
         }
-        // Two half-edges of the same direction: at a boundary they have no twin to tell them apart.
-        let repeated = |h: usize| {
-            let (a, b) = (origin(h), origin(next(h as u32) as usize));
-            let from = start[a as usize] as usize..start[a as usize + 1] as usize;
-            leaving[from].iter().filter(|g| origin(next(**g) as usize) == b).count() > 1
-        };
-        let whole = (0..sides).all(|h| match twin[h] {
-            NONE => !repeated(h),
-            g => twin[g as usize] == h as u32,
-        });
-        let out = (0..n).map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE)).collect();
-        whole.then_some(HalfEdgeMesh { triangles, twin, out })
+        let mut out = vec![NONE; n];
+        for h in (0..twin.len()).rev() {
+            out[triangles[h / 3][h % 3] as usize] = h as u32;
+        }
+        Some(HalfEdgeMesh { triangles, twin, out })
     }
 
     /// The vertex that `h` leaves.

@@ -13,11 +13,11 @@
 
 use rayon::prelude::*;
 
-use super::half_edges::{halves, rises};
 use crate::distance::triangle::Triangle;
 use crate::distance::triangle_bvh::TriangleBvh;
 use crate::distance::winding::Winding;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::mesh::edges::{Edges, rises};
 use crate::mesh::exact::{drop_axis, orient2d, orient3d};
 use crate::mesh::{Mesh, near_pairs};
 use crate::progress::{Cancellation, checkpoint};
@@ -426,11 +426,11 @@ impl Classifier<'_> {
     fn patches(&self, mesh: &Mesh, whole: &impl Fn(usize) -> bool) -> Vec<bool> {
         let n = mesh.triangles.len();
         let mut root = singles(n);
-        for edge in halves(mesh).chunk_by(|a, b| a.0 == b.0) {
+        for edge in Edges::of(&mesh.triangles).each() {
             if let [a, b] = edge
-                && rises(mesh, a.1) != rises(mesh, b.1)
+                && rises(&mesh.triangles, *a) != rises(&mesh.triangles, *b)
             {
-                let (a, b) = (a.1 / 3, b.1 / 3);
+                let (a, b) = (a / 3, b / 3);
                 if whole(a as usize) && whole(b as usize) {
                     unite(&mut root, a, b);
                 }

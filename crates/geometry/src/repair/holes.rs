@@ -9,9 +9,9 @@
 use std::collections::{HashMap, HashSet};
 
 use super::fairing;
-use super::half_edges::{halves, rises};
 use crate::math::{Vec3, cross, dot, norm, sub, unit};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edges, ends, rises};
 use crate::progress::checkpoint;
 
 /// Loops of more vertices are divided by chords first: the search takes the cube of their number.
@@ -66,9 +66,10 @@ pub fn close(mesh: &mut Mesh) -> Caps {
 /// The boundary loops, each as the vertices that its cap must run along in this order, none twice.
 pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     let mut missing: Vec<(u32, u32)> = Vec::new();
-    for edge in halves(mesh).chunk_by(|a, b| a.0 == b.0) {
-        let (low, high) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
-        let ups = edge.iter().filter(|h| rises(mesh, h.1)).count();
+    for edge in Edges::of(&mesh.triangles).each() {
+        let [a, b] = ends(&mesh.triangles, edge[0]);
+        let (low, high) = (a.min(b), a.max(b));
+        let ups = edge.iter().filter(|h| rises(&mesh.triangles, **h)).count();
         let downs = edge.len() - ups;
         missing.extend((downs..ups).map(|_| (high, low)));
         missing.extend((ups..downs).map(|_| (low, high)));

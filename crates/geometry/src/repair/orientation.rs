@@ -1,11 +1,11 @@
 //! Orientation of triangles: alike across edges, components outwards, cavities kept.
 
-use super::half_edges::{self, halves, rises};
 use crate::distance::triangle::Triangle;
 use crate::distance::triangle_bvh::TriangleBvh;
 use crate::distance::winding::{Winding, turn};
 use crate::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edges, components, rises};
 
 /// Triangles of a component at whose centroids it is tested whether another one contains it.
 const SAMPLES: usize = 32;
@@ -15,15 +15,14 @@ const MANY: usize = 256;
 /// Makes the triangles of each patch (joined by edges of two triangles) face alike, as most of its area did; gives
 /// the number of triangles reversed. Where a patch is not orientable (a Möbius band) some edge stays as it was.
 pub fn face_alike(mesh: &mut Mesh) -> usize {
-    let halves = halves(mesh);
     let n = mesh.triangles.len();
     // Per edge of a triangle its neighbour, and whether the two face opposite ways.
     let mut across = vec![(u32::MAX, false); 3 * n];
-    for edge in halves.chunk_by(|a, b| a.0 == b.0) {
-        if let [a, b] = edge {
-            let against = rises(mesh, a.1) == rises(mesh, b.1);
-            across[a.1 as usize] = (b.1 / 3, against);
-            across[b.1 as usize] = (a.1 / 3, against);
+    for edge in Edges::of(&mesh.triangles).each() {
+        if let [a, b] = *edge {
+            let against = rises(&mesh.triangles, a) == rises(&mesh.triangles, b);
+            across[a as usize] = (b / 3, against);
+            across[b as usize] = (a / 3, against);
         }
     }
     let area = |i: usize| {
@@ -94,7 +93,7 @@ impl Component {
 /// Turns components (sets joined by edges) that are inside out. A component within others keeps its sense against them, so
 /// that cavities stay, unless it would bound no solid and no cavity. Gives the number of components turned.
 pub fn face_out(mesh: &mut Mesh) -> usize {
-    let (number, count) = half_edges::components(mesh);
+    let (number, count) = components(mesh);
     let mut components: Vec<Component> =
         (0..count).map(|_| Component { triangles: Vec::new(), bounds: Aabb::EMPTY, volume: 0.0, tree: None }).collect();
     for (i, b) in (0..).zip(&number) {

@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::half_edges::{ends, halves, open};
 use crate::bvh::{Bvh, Split};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edges, ends, open};
 use crate::union_find::{find, singles, unite};
 
 /// Vertices of open edges merge over at most this share of the mesh's diagonal: seams that exporters leave are far
@@ -49,13 +49,9 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         return 0;
     }
     // Distinct triangles at each edge.
-    let distinct = Mesh { vertices: Vec::new(), triangles: all.chunk_by(|a, b| a.0 == b.0).map(|g| g[0].0).collect() };
-    let edges = halves(&distinct);
-    let others = |a: u32, b: u32| {
-        let key = u64::from(a) << 32 | u64::from(b);
-        let first = edges.partition_point(|e| e.0 < key);
-        edges[first..].iter().take_while(|e| e.0 == key).count() - 1
-    };
+    let distinct: Vec<[u32; 3]> = all.chunk_by(|a, b| a.0 == b.0).map(|g| g[0].0).collect();
+    let edges = Edges::of(&distinct);
+    let others = |a: u32, b: u32| edges.between(a, b) - 1;
     // The orientation of most copies, and their number.
     let most = |group: &[([u32; 3], u32)]| {
         let ups = group.iter().filter(|(_, i)| even(mesh.triangles[*i as usize]));
@@ -88,23 +84,22 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
 ///
 /// A patch of them has edges along its boundary with an even number of other triangles where both copies continue, each in
 /// its own component, and with an odd number where a copy just ends. `others`: their number, copies not counted.
-fn of_two_components(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
-    let patches = Mesh { vertices: Vec::new(), triangles: alike };
-    let (sides, mut root) = (halves(&patches), singles(patches.triangles.len()));
-    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+fn of_two_components(patches: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
+    let (edges, mut root) = (Edges::of(&patches), singles(patches.len()));
+    for edge in edges.each() {
         for other in &edge[1..] {
-            unite(&mut root, edge[0].1 / 3, other.1 / 3);
+            unite(&mut root, edge[0] / 3, other / 3);
         }
     }
     // Along each patch's boundary, edges at which both copies continue minus those at which one ends.
-    let mut votes = vec![0i64; patches.triangles.len()];
-    for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
-        let (a, b) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
-        let vote = if others(a, b).is_multiple_of(2) { 1 } else { -1 };
-        votes[find(&mut root, edge[0].1 / 3) as usize] += vote;
+    let mut votes = vec![0i64; patches.len()];
+    for edge in edges.each().filter(|e| e.len() == 1) {
+        let [a, b] = ends(&patches, edge[0]);
+        let vote = if others(a.min(b), a.max(b)).is_multiple_of(2) { 1 } else { -1 };
+        votes[find(&mut root, edge[0] / 3) as usize] += vote;
     }
-    let found = (0..patches.triangles.len()).filter(|i| votes[find(&mut root, *i as u32) as usize] > 0);
-    found.map(|i| patches.triangles[i]).collect()
+    let found = (0..patches.len()).filter(|i| votes[find(&mut root, *i as u32) as usize] > 0);
+    found.map(|i| patches[i]).collect()
 }
 
 /// Merges vertices of open edges that lie close together, at their mean; gives the number of vertices removed.
@@ -124,7 +119,7 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
     }
     let reach = SEAM * norm(mesh.bounds().size());
     let allowed = |v: u32| reach.min(OF_EDGE * shortest[v as usize]);
-    let mut boundary: Vec<u32> = open_before.iter().flat_map(|h| ends(mesh, *h)).collect();
+    let mut boundary: Vec<u32> = open_before.iter().flat_map(|h| ends(&mesh.triangles, *h)).collect();
     boundary.sort_unstable();
     boundary.dedup();
     let boxes: Vec<Aabb> =
@@ -176,7 +171,7 @@ fn near(a: &[Aabb], b: &[Aabb], mut f: impl FnMut(usize, usize)) {
 /// edge meets two short ones, is no hole. Gives the number of splits.
 pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
     let sides = open(mesh);
-    let mut boundary: Vec<u32> = sides.iter().flat_map(|h| ends(mesh, *h)).collect();
+    let mut boundary: Vec<u32> = sides.iter().flat_map(|h| ends(&mesh.triangles, *h)).collect();
     boundary.sort_unstable();
     boundary.dedup();
     let at = |v: u32| mesh.vertices[v as usize];
@@ -184,14 +179,14 @@ pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
     let boxes: Vec<Aabb> = sides
         .iter()
         .map(|h| {
-            let [a, b] = ends(mesh, *h);
+            let [a, b] = ends(&mesh.triangles, *h);
             Aabb::EMPTY.with(at(a)).with(at(b)).grown(tolerance)
         })
         .collect();
     // Half-edge, position along it, vertex.
     let mut found: Vec<(u32, f64, u32)> = Vec::new();
     near(&boxes, &points, |i, j| {
-        let ([a, b], v) = (ends(mesh, sides[i]), boundary[j]);
+        let ([a, b], v) = (ends(&mesh.triangles, sides[i]), boundary[j]);
         if mesh.triangles[sides[i] as usize / 3].contains(&v) {
             return;
         }

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::half_edges::{components, halves, rises};
 use super::stitch::flat;
 use crate::distance::winding::turn;
 use crate::fault::{self, Fault};
 use crate::math::{cross, dot, norm, sub};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edges, components, rises};
 use crate::union_find::{labels, singles, unite};
 
 /// Pairs of half-edges (3 · triangle + corner where the edge begins) that are one edge.
@@ -19,15 +19,14 @@ fn refuse(message: impl Into<String>) -> Fault {
 
 /// The edges of a closed, oriented mesh, or its defects in numbers. The mesh has passed `numbers`.
 pub fn edges(mesh: &Mesh) -> Result<Pairs, String> {
-    let halves = halves(mesh);
-    let forward = |h: u32| rises(mesh, h);
+    let forward = |h: u32| rises(&mesh.triangles, h);
     let (mut open, mut crowded, mut flipped) = (0, 0, 0);
-    let mut pairs = Pairs::with_capacity(halves.len() / 2);
-    for edge in halves.chunk_by(|a, b| a.0 == b.0) {
-        match edge {
+    let mut pairs = Pairs::with_capacity(3 * mesh.triangles.len() / 2);
+    for edge in Edges::of(&mesh.triangles).each() {
+        match *edge {
             [_] => open += 1,
-            [a, b] if forward(a.1) == forward(b.1) => flipped += 1,
-            [a, b] => pairs.push([a.1, b.1]),
+            [a, b] if forward(a) == forward(b) => flipped += 1,
+            [a, b] => pairs.push([a, b]),
             _ => crowded += 1,
         }
     }

@@ -4,9 +4,8 @@ use super::bucket_queue::{Candidate, Queue};
 use super::deviation::{Displacements, Patch};
 use super::error_quadric::Quadric;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
-use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
-use crate::remesh::kept_edges;
-use crate::remesh::refit_tree::{Bounds, Prism, Query, RefitTree};
+use crate::remesh::edited_mesh::{EdgeRing, EditedMesh, single};
+use crate::remesh::half_edge_mesh::prev;
 
 /// Most triangles about a vertex.
 const CROWD: usize = 48;
@@ -20,14 +19,8 @@ const HOLD: f64 = 10.0;
 /// Among collapses that cost nothing, short edges come first.
 const SHORT: f64 = 1e-8;
 
-/// What a simplification starts from.
-pub struct Start {
-    /// Positions: single-precision numbers, so that the file holds what was tested.
-    pub positions: Vec<Vec3>,
-    /// Adjacency.
-    pub half_edges: HalfEdgeMesh,
-    /// For each half-edge, whether its edge is kept.
-    pub kept: Vec<bool>,
+/// How far a mesh has moved, and where it may.
+pub struct Motion {
     /// How far the surface has moved so far, by triangle.
     pub displacements: Vec<Displacements>,
     /// How far kept edges have moved so far, by vertex, mm.
@@ -41,26 +34,17 @@ pub struct Start {
 /// A mesh in the course of being simplified.
 pub struct Simplification {
     /// The mesh as it is now.
-    pub mesh: Start,
-    /// Triangles left.
-    pub count: usize,
+    pub mesh: EditedMesh,
+    /// How far it has moved.
+    pub motion: Motion,
     tolerance: f64,
-    kept_at: Vec<u8>,
     quadrics: Vec<Quadric>,
     versions: Vec<u32>,
     queue: Queue,
-    tree: RefitTree,
-    /// Triangles when the tree was built.
-    indexed: usize,
     // Scratch of one candidate, kept to save allocations.
-    mark: Vec<u32>,
-    marked: u32,
-    boundary: Vec<u32>,
-    boundary_edges: Vec<u32>,
+    ring: EdgeRing,
     patch: Patch,
-    prisms: Vec<Prism>,
     normals: Vec<Vec3>,
-    query: Query,
 }
 
 /// How an edge is to be collapsed.
@@ -72,47 +56,25 @@ struct Plan {
 
 impl Simplification {
     /// A simplification that moves no point of the surface by more than `tolerance` (mm) in all.
-    pub fn new(start: Start, tolerance: f64) -> Simplification {
-        let n = start.positions.len();
-        let count = start.half_edges.triangles.len();
-        let kept_at = kept_edges::count(&start.half_edges, &start.kept, n);
+    pub fn new(mesh: EditedMesh, motion: Motion, tolerance: f64) -> Simplification {
+        let n = mesh.positions.len();
         let mut work = Simplification {
-            quadrics: quadrics(&start),
-            mesh: start,
-            count,
+            quadrics: quadrics(&mesh),
+            mesh,
+            motion,
             tolerance,
-            kept_at,
             versions: vec![0; n],
             queue: Queue::new(),
-            tree: RefitTree::new(0, &[], |_| Bounds::of(&[])),
-            indexed: 0,
-            mark: vec![0; n.max(count)],
-            marked: 0,
-            boundary: Vec::new(),
-            boundary_edges: Vec::new(),
+            ring: EdgeRing::default(),
             patch: Patch::default(),
-            prisms: Vec::new(),
             normals: Vec::new(),
-            query: Query::default(),
         };
-        work.rebuild_tree();
-        for h in 0..3 * count as u32 {
+        for h in 0..3 * work.mesh.count as u32 {
             if work.mesh.half_edges.from(h) < work.mesh.half_edges.to(h) {
                 work.push(h);
             }
         }
         work
-    }
-
-    /// Rebuilds the tree: its boxes have grown and hold collapsed triangles.
-    fn rebuild_tree(&mut self) {
-        let triangles = &self.mesh.half_edges.triangles;
-        let live = (0..triangles.len() as u32).filter(|t| triangles[*t as usize][0] != NONE);
-        let live: Vec<u32> = live.collect();
-        let positions = &self.mesh.positions;
-        self.tree =
-            RefitTree::new(triangles.len(), &live, |t| Bounds::of(&triangles[t].map(|v| positions[v as usize])));
-        self.indexed = live.len();
     }
 
     /// Takes the cheapest candidate and collapses its edge if every condition holds. `None` when no candidate is left.
@@ -129,7 +91,7 @@ impl Simplification {
     }
 
     fn position(&self, v: u32) -> Vec3 {
-        self.mesh.positions[v as usize]
+        self.mesh.at(v)
     }
 
     fn stamp(&self, h: u32) -> u32 {
@@ -150,10 +112,10 @@ impl Simplification {
     /// The positions that the kept edges at its ends allow the edge, and its cost by the quadrics; `None` where it must stay.
     fn plan(&self, h: u32) -> Option<Plan> {
         let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
-        if [u, v].iter().any(|w| !self.mesh.free[*w as usize]) {
+        if [u, v].iter().any(|w| !self.motion.free[*w as usize]) {
             return None;
         }
-        let ends = [u, v].map(|w| self.kept_at[w as usize]);
+        let ends = [u, v].map(|w| self.mesh.kept_at[w as usize]);
         let along = self.mesh.kept[h as usize];
         let fixed = match ends {
             [0, 0] => None,
@@ -197,7 +159,7 @@ impl Simplification {
         }
         let first = plan.fixed.unwrap_or_else(|| self.balanced(h));
         self.patch.w = single(first);
-        if !self.mesh.bounds.holds_inside(self.patch.w) {
+        if !self.motion.bounds.holds_inside(self.patch.w) {
             return false;
         }
         let Some(line) = self.kept_edge_moved(h) else {
@@ -216,45 +178,21 @@ impl Simplification {
         true
     }
 
-    /// Gathers the patch about the edge; false if the collapse would not leave a closed manifold.
+    /// Gathers the patch about the edge; false if the collapse would not leave a closed manifold, or two kept edges would become one.
     fn gather(&mut self, h: u32) -> bool {
-        let g = self.mesh.half_edges.twin(h);
-        // Two kept edges do not become one.
-        let kept = |e: u32| self.mesh.kept[e as usize];
-        if [h, g].iter().any(|e| kept(next(*e)) && kept(prev(*e))) {
+        let (mesh, ring, patch) = (&self.mesh, &mut self.ring, &mut self.patch);
+        if mesh.joins_kept(h) || !mesh.ring_of_edge(h, CROWD, ring) {
             return false;
         }
-        self.marked += 1;
-        let (boundary, edges, patch) = (&mut self.boundary, &mut self.boundary_edges, &mut self.patch);
-        boundary.clear();
-        edges.clear();
+        let g = mesh.half_edges.twin(h);
+        patch.turn = ring.turn;
         patch.boundary.clear();
+        patch.boundary.extend(ring.ring.iter().map(|r| mesh.at(*r)));
         patch.old.clear();
-        for (start, end) in [(h, g), (g, h)] {
-            // About the vertex that `start` leaves, from the corner left of it on.
-            let mut e = self.mesh.half_edges.turned(start);
-            let stop = next(end);
-            while e != stop {
-                let r = self.mesh.half_edges.to(e);
-                if self.mark[r as usize] == self.marked || boundary.len() == CROWD {
-                    return false;
-                }
-                self.mark[r as usize] = self.marked;
-                boundary.push(r);
-                edges.push(next(e));
-                patch.boundary.push(self.mesh.positions[r as usize]);
-                patch.old.push(self.mesh.displacements[(e / 3) as usize]);
-                e = self.mesh.half_edges.turned(e);
-            }
-            if start == h {
-                patch.turn = boundary.len();
-            }
-        }
-        patch.old.push(self.mesh.displacements[(h / 3) as usize]);
-        patch.old.push(self.mesh.displacements[(g / 3) as usize]);
-        patch.u = self.mesh.positions[self.mesh.half_edges.from(h) as usize];
-        patch.v = self.mesh.positions[self.mesh.half_edges.from(g) as usize];
-        boundary.len() >= 3
+        let triangles = ring.outer.iter().chain([&h, &g]).map(|e| (e / 3) as usize);
+        patch.old.extend(triangles.map(|t| self.motion.displacements[t]));
+        (patch.u, patch.v) = (mesh.at(mesh.half_edges.from(h)), mesh.at(mesh.half_edges.from(g)));
+        true
     }
 
     /// The position of least cost among those that keep the volume.
@@ -290,7 +228,7 @@ impl Simplification {
     fn kept_edge_moved(&self, h: u32) -> Option<f32> {
         let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.to(h));
         if !self.mesh.kept[h as usize] {
-            return Some(self.mesh.kept_moved[u as usize].max(self.mesh.kept_moved[v as usize]));
+            return Some(self.motion.kept_moved[u as usize].max(self.motion.kept_moved[v as usize]));
         }
         let w = self.patch.w;
         let mut most = 0.0f64;
@@ -304,7 +242,7 @@ impl Simplification {
             most = most.max(if p == w { 0.0 } else { off });
         }
         most = most.max(from_segment(w, self.position(u), self.position(v)));
-        let all = f64::from(self.mesh.kept_moved[u as usize].max(self.mesh.kept_moved[v as usize])) + most;
+        let all = f64::from(self.motion.kept_moved[u as usize].max(self.motion.kept_moved[v as usize])) + most;
         (all <= self.tolerance).then_some(all as f32)
     }
 
@@ -340,12 +278,12 @@ impl Simplification {
         }
         let mut bend = f64::INFINITY;
         for i in 0..m {
-            let e = self.boundary_edges[i];
+            let e = self.ring.outer[i];
             if !self.mesh.kept[e as usize] {
                 let outer = unit(self.normal(self.mesh.half_edges.twin(e) / 3));
                 bend = bend.min(dot(self.normals[i], outer));
             }
-            if !self.is_kept_spoke(i) {
+            if !self.mesh.is_kept_spoke(&self.ring, i) {
                 let before = self.normals[if i == 0 { m - 1 } else { i - 1 }];
                 bend = bend.min(dot(self.normals[i], before));
             }
@@ -358,18 +296,10 @@ impl Simplification {
         cross(sub(b, a), sub(c, a))
     }
 
-    /// Whether the spoke to the boundary's vertex `i` would be kept.
-    fn is_kept_spoke(&self, i: usize) -> bool {
-        let spoke = prev(self.boundary_edges[i]);
-        // At the two corners opposite the edge, two edges of the patch become one.
-        let other = if i == 0 || i == self.patch.turn { prev(self.mesh.half_edges.twin(spoke)) } else { spoke };
-        self.mesh.kept[spoke as usize] || self.mesh.kept[other as usize]
-    }
-
     /// The cosine of the sharpest turn about the edges of the patch that are not kept.
     fn bend_before(&self) -> f64 {
         let mut bend = 1.0f64;
-        for e in &self.boundary_edges {
+        for e in &self.ring.outer {
             let t = e - e % 3;
             for g in [t, t + 1, t + 2] {
                 if !self.mesh.kept[g as usize] {
@@ -383,81 +313,45 @@ impl Simplification {
 
     /// Whether the fan meets no triangle outside the patch. Its own triangles are disjoint, being a graph.
     fn is_clear(&mut self, h: u32) -> bool {
-        let p = &self.patch;
-        let m = p.boundary.len();
-        let u = self.mesh.half_edges.from(h);
-        self.prisms.clear();
-        for i in 0..m {
+        let (p, ring, mesh) = (&self.patch, &self.ring, &mut self.mesh);
+        let (u, g) = (mesh.half_edges.from(h), mesh.half_edges.twin(h));
+        let m = ring.ring.len();
+        let fan = (0..m).map(|i| {
             let j = if i + 1 == m { 0 } else { i + 1 };
-            self.prisms.push(Prism::new([u, self.boundary[i], self.boundary[j]], [p.w, p.boundary[i], p.boundary[j]]));
-        }
-        let mut all = Bounds::of(&p.boundary);
-        all.grow(&Bounds::of(&[p.w]));
-        self.marked += 1;
-        for e in self.boundary_edges.iter().chain(&[h, self.mesh.half_edges.twin(h)]) {
-            self.mark[(e / 3) as usize] = self.marked;
-        }
-        let stays = |t: u32| self.mark[t as usize] != self.marked;
-        let mesh = (&self.mesh.half_edges.triangles[..], &self.mesh.positions[..]);
-        !self.tree.meets(&self.prisms, &all, mesh, stays, &mut self.query)
+            ([u, ring.ring[i], ring.ring[j]], [p.w, p.boundary[i], p.boundary[j]])
+        });
+        mesh.is_clear(ring.outer.iter().chain([&h, &g]).map(|e| e / 3), fan, true)
     }
 
     /// Collapses the edge.
     fn collapse(&mut self, h: u32, line: f32) {
-        let g = self.mesh.half_edges.twin(h);
-        let (u, v) = (self.mesh.half_edges.from(h), self.mesh.half_edges.from(g));
-        let wings = [self.mesh.half_edges.from(prev(h)), self.mesh.half_edges.from(prev(g))];
-        // Of each of the two collapsed triangles two edges become one, which is kept if one of them was.
-        for e in [h, g] {
-            let (a, b) = (self.mesh.half_edges.twin(next(e)), self.mesh.half_edges.twin(prev(e)));
-            let kept = self.mesh.kept[a as usize] || self.mesh.kept[b as usize];
-            self.mesh.kept[a as usize] = kept;
-            self.mesh.kept[b as usize] = kept;
+        let [u, v] = [self.mesh.half_edges.from(h), self.mesh.half_edges.to(h)].map(|w| w as usize);
+        self.mesh.collapse(h, self.patch.w);
+        self.motion.kept_moved[u] = line;
+        self.quadrics[u] = self.quadrics[u].plus(&self.quadrics[v]);
+        self.versions[u] = self.versions[u].max(self.versions[v]) + 1;
+        for (e, new) in self.ring.outer.iter().zip(&self.patch.new) {
+            self.motion.displacements[(e / 3) as usize] = *new;
         }
-        self.mesh.half_edges.collapse(h);
-        self.count -= 2;
-
-        self.mesh.positions[u as usize] = self.patch.w;
-        self.mesh.kept_moved[u as usize] = line;
-        self.quadrics[u as usize] = self.quadrics[u as usize].plus(&self.quadrics[v as usize]);
-        let version = self.versions[u as usize].max(self.versions[v as usize]);
-        self.versions[u as usize] = version + 1;
-        for w in [u, wings[0], wings[1]] {
-            let kept = self.mesh.half_edges.leaving(w).filter(|e| self.mesh.kept[*e as usize]);
-            self.kept_at[w as usize] = kept.count().min(255) as u8;
-        }
-        for i in 0..self.boundary.len() {
-            let t = (self.boundary_edges[i] / 3) as usize;
-            self.mesh.displacements[t] = self.patch.new[i];
-            self.tree.grow(t, &self.prisms[i].bounds);
-        }
-        if 4 * self.count < 3 * self.indexed {
-            self.rebuild_tree();
-        }
-        for i in 0..self.boundary_edges.len() {
+        self.mesh.refit(self.ring.outer.iter().map(|e| e / 3));
+        for i in 0..self.ring.outer.len() {
             // The spoke before the boundary edge of triangle i.
-            self.push(prev(self.boundary_edges[i]));
+            self.push(prev(self.ring.outer[i]));
         }
     }
 }
 
-/// A position in single precision.
-pub fn single(p: Vec3) -> Vec3 {
-    // Plus zero: −0 is 0.
-    p.map(|x| f64::from(x as f32) + 0.0)
-}
-
 /// The quadric of each vertex: the planes of its triangles, and those that hold its kept edges.
-fn quadrics(start: &Start) -> Vec<Quadric> {
-    let mut quadrics = vec![Quadric::default(); start.positions.len()];
-    for (t, names) in start.half_edges.triangles.iter().enumerate() {
-        let p = names.map(|v| start.positions[v as usize]);
+fn quadrics(mesh: &EditedMesh) -> Vec<Quadric> {
+    let mut quadrics = vec![Quadric::default(); mesh.positions.len()];
+    for (t, names) in mesh.half_edges.triangles.iter().enumerate() {
+        let p = names.map(|v| mesh.positions[v as usize]);
         let own = Quadric::triangle(p);
         let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
         for k in 0..3 {
             let v = names[k] as usize;
             quadrics[v] = quadrics[v].plus(&own);
-            if start.kept[3 * t + k] {
+            if mesh.kept[3 * t + k] {
                 let side = sub(p[(k + 1) % 3], p[k]);
                 let wall = Quadric::plane(unit(cross(side, normal)), p[k], HOLD * dot(side, side));
                 for w in [v, names[(k + 1) % 3] as usize] {

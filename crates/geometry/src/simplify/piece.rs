@@ -4,25 +4,26 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::blocks::Blocks;
-use super::collapse::{Simplification, Start, single};
+use super::collapse::{Motion, Simplification};
 use super::deviation::Displacements;
 use crate::math::{Aabb, Vec3, add, scale, sub};
 use crate::mesh::{Mesh, degenerate, self_intersections};
+use crate::remesh::edited_mesh::{EditedMesh, single};
 use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE};
 use crate::remesh::{curve_order, kept_edges};
 use crate::surface_mesh::SurfaceMesh;
 
 /// A surface between two passes.
-pub struct Passing<'a> {
+pub struct PassState<'a> {
     /// The surface as it is now: positions are in single precision from the second pass on.
     pub surface: Cow<'a, SurfaceMesh>,
     /// What is known of it; nothing before the first pass.
-    pub known: Option<Known>,
+    pub known: Option<Tracked>,
 }
 
 /// What a pass hands to the next one.
 #[derive(Default)]
-pub struct Known {
+pub struct Tracked {
     /// For each triangle, which of its edges are kept: bits 0, 1, 2.
     pub kept: Vec<u8>,
     /// How far the surface has moved, by triangle.
@@ -33,14 +34,14 @@ pub struct Known {
 
 /// A block's triangles after a pass.
 #[derive(Default)]
-pub struct Done {
+pub struct BlockResult {
     /// Their corners, vertices of the surface before the pass.
     pub triangles: Vec<[u32; 3]>,
     /// For each, whether it is a cut.
     pub cut: Vec<bool>,
-    /// See [`Known`].
+    /// See [`Tracked`].
     pub kept: Vec<u8>,
-    /// See [`Known`].
+    /// See [`Tracked`].
     pub displacements: Vec<Displacements>,
     /// Vertices that the block alone has: where they are now, and how far their kept edges have moved.
     pub moved: Vec<(u32, Vec3, f32)>,
@@ -121,7 +122,7 @@ impl Piece {
     }
 
     /// What to start from.
-    pub fn start(&self, from: &Passing, half_edges: HalfEdgeMesh) -> Start {
+    pub fn start(&self, from: &PassState, half_edges: HalfEdgeMesh) -> (EditedMesh, Motion) {
         let positions = self.mesh.vertices.clone();
         let (kept, displacements, kept_moved) = match &from.known {
             None => {
@@ -143,7 +144,8 @@ impl Piece {
                 (kept, displacements, self.vertices.iter().map(|v| known.kept_moved[*v as usize]).collect())
             }
         };
-        Start { free: self.free(), bounds: self.bounds, positions, half_edges, kept, displacements, kept_moved }
+        let mesh = EditedMesh::new(half_edges, positions, kept);
+        (mesh, Motion { displacements, kept_moved, free: self.free(), bounds: self.bounds })
     }
 
     /// The vertices all of whose triangles lie strictly in the block.
@@ -159,29 +161,25 @@ impl Piece {
     }
 
     /// What is left of the triangles whose home is block `b`.
-    pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> Done {
-        let mut done = Done::default();
-        let start = &work.mesh;
-        let mut seen = vec![false; start.positions.len()];
-        for (t, corners) in start.half_edges.triangles.iter().enumerate() {
+    pub fn finish(&self, work: &Simplification, blocks: &Blocks, b: usize) -> BlockResult {
+        let mut done = BlockResult::default();
+        let (mesh, motion) = (&work.mesh, &work.motion);
+        let mut seen = vec![false; mesh.positions.len()];
+        for (t, corners) in mesh.half_edges.triangles.iter().enumerate() {
             if corners[0] == NONE {
                 continue;
             }
-            let [p, q, r] = corners.map(|v| start.positions[v as usize]);
+            let [p, q, r] = mesh.corners(t as u32);
             if blocks.home(scale(add(p, add(q, r)), 1.0 / 3.0)) != b {
                 continue;
             }
             done.triangles.push(corners.map(|v| self.vertices[v as usize]));
             done.cut.push(self.cut[t]);
-            done.kept.push((0..3).fold(0, |bits, k| bits | u8::from(start.kept[3 * t + k]) << k));
-            done.displacements.push(start.displacements[t]);
+            done.kept.push((0..3).fold(0, |bits, k| bits | u8::from(mesh.kept[3 * t + k]) << k));
+            done.displacements.push(motion.displacements[t]);
             for v in *corners {
-                if start.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
-                    done.moved.push((
-                        self.vertices[v as usize],
-                        start.positions[v as usize],
-                        start.kept_moved[v as usize],
-                    ));
+                if motion.free[v as usize] && !std::mem::replace(&mut seen[v as usize], true) {
+                    done.moved.push((self.vertices[v as usize], mesh.at(v), motion.kept_moved[v as usize]));
                 }
             }
         }

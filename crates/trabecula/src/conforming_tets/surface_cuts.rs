@@ -10,6 +10,7 @@ use super::tet_shape::shape;
 use crate::field::Field;
 use geometry::math::{Vec3, add, norm, sub};
 use geometry::progress::{Cancellation, checkpoint};
+use geometry::roots::{Bracket, FalsePosition};
 use geometry::tetmesh::{EDGES, volume};
 use rayon::prelude::*;
 
@@ -396,65 +397,37 @@ pub(crate) fn evaluated(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
     out
 }
 
-/// The fraction of each edge, from its node of negative value, at which a field is zero: false position with halved weights (the
-/// Illinois method), which keeps the root bracketed.
+/// The fraction of each edge, from its node of negative value, at which a field is zero.
 fn roots(field: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]]) -> Vec<f64> {
     const ROUNDS: usize = 40;
     let (mut found, request) = (vec![0.0; edges.len()], Cancellation::current());
     found.par_chunks_mut(BATCH).zip(edges.par_chunks(BATCH)).for_each(|(found, edges)| {
         request.enter(checkpoint);
-        let start = |[a, b]: &[u32; 2]| Bracket {
-            at: [0.0, 1.0],
-            values: [values[*a as usize], values[*b as usize]],
-            scale: values[*a as usize].abs() + values[*b as usize].abs(),
-            last: None,
-        };
-        let mut state: Vec<Bracket> = edges.iter().map(start).collect();
+        let ends = |[a, b]: &[u32; 2]| [values[*a as usize], values[*b as usize]];
+        let start = |e: &[u32; 2]| Bracket { below: [0.0, ends(e)[0]], above: [1.0, ends(e)[1]] };
+        let mut state: Vec<FalsePosition> = edges.iter().map(|e| FalsePosition::new(start(e))).collect();
         let mut open: Vec<usize> = (0..edges.len()).collect();
         let (mut points, mut new) = (Vec::new(), Vec::new());
-        for round in 0..ROUNDS {
+        for _ in 0..ROUNDS {
             points.clear();
             for i in &open {
-                found[*i] = state[*i].guess(round % 8 == 7);
+                found[*i] = state[*i].guess();
                 let [p, q] = edges[*i].map(|n| nodes[n as usize]);
                 points.push(core::array::from_fn::<f64, 3, _>(|k| p[k] + found[*i] * (q[k] - p[k])));
             }
             new.resize(points.len(), 0.0);
             field.values(&points, &mut new);
             let mut v = new.iter();
-            open.retain(|i| v.next().is_some_and(|v| state[*i].narrow(found[*i], *v)));
+            open.retain(|i| {
+                let v = v.next().copied().unwrap_or_default();
+                state[*i].narrow(found[*i], v);
+                let [a, b] = ends(&edges[*i]);
+                v.abs() > 1e-12 * (a.abs() + b.abs()) && state[*i].bracket().width() > 1e-14
+            });
             if open.is_empty() {
                 break;
             }
         }
     });
     found
-}
-
-/// An interval in which a function changes sign.
-struct Bracket {
-    at: [f64; 2],
-    values: [f64; 2],
-    scale: f64,
-    last: Option<usize>,
-}
-
-impl Bracket {
-    /// The next place to evaluate: its middle, or by false position.
-    fn guess(&self, middle: bool) -> f64 {
-        let ([lo, hi], [v, w]) = (self.at, self.values);
-        let t = if middle { 0.5 * (lo + hi) } else { lo + (hi - lo) * v / (v - w) };
-        t.clamp(lo, hi)
-    }
-
-    /// Takes the value at `t`; whether the root is not known well enough yet.
-    fn narrow(&mut self, t: f64, v: f64) -> bool {
-        let side = usize::from(v >= 0.0);
-        (self.at[side], self.values[side]) = (t, v);
-        if self.last == Some(side) {
-            self.values[1 - side] *= 0.5;
-        }
-        self.last = Some(side);
-        v.abs() > 1e-12 * self.scale && self.at[1] - self.at[0] > 1e-14
-    }
 }

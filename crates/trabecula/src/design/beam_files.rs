@@ -11,7 +11,9 @@ use crate::report::BeamsFileReport;
 use crate::truss::Beams;
 use beams::{Fillet, Frusta, Graph, Profile, Quadors};
 use geometry::fault::{Fault, counted};
-use geometry::formats::{Aside, BeamGraph, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph};
+use geometry::formats::{
+    BeamGraph, ByteSpool, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph,
+};
 use geometry::progress::{Stopped, checkpoint};
 
 /// The only beams of a design, and whether its region cuts some.
@@ -146,7 +148,7 @@ impl Built {
         tolerance: Option<f64>,
         meshes: Companions,
         meta: &Metadata,
-        aside: &mut dyn Aside,
+        aside: &mut dyn ByteSpool,
         out: &mut dyn io::Write,
     ) -> Result<BeamsFileReport, Stopped> {
         let written = written(self).map_err(Stopped::Refused)?;

@@ -11,6 +11,7 @@ use crate::grade::Quantity;
 use crate::kind::{DesignError, Key};
 use geometry::fault::number;
 use geometry::math::{Vec3, add, norm, scale, sub};
+use geometry::roots::bisect;
 
 impl BlendSpec {
     /// The names of its lattices, in the order of their weights.
@@ -291,13 +292,12 @@ fn equal(weights: &Weights, points: &[Vec3]) -> Vec<[Vec3; 2]> {
         let near = (1..200).map(|k| (i + k * 7) % points.len()).filter(|j| owner[*j] != owner[i]);
         let distance = |j: &usize| norm(sub(points[*j], points[i]));
         let j = near.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        let (mut a, mut b) = (points[i], points[j]);
-        for _ in 0..50 {
-            let middle = scale(add(a, b), 0.5);
-            weights.values(&[middle], &mut own);
-            if first(&own) == owner[i] { a = middle } else { b = middle }
-        }
-        Some([a, b])
+        let at = |t: f64| add(scale(points[i], 1.0 - t), scale(points[j], t));
+        let ends = bisect([0.0, 1.0], 50, |t| {
+            weights.values(&[at(t)], &mut own);
+            first(&own) == owner[i]
+        });
+        Some(ends.map(at))
     });
     each.collect()
 }

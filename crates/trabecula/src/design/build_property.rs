@@ -18,6 +18,7 @@ use geometry::fault::number;
 use geometry::math::{Vec3, apply, dot, norm, scale, transpose};
 use geometry::monotone_cubic::monotone;
 use geometry::progress::{Silent, Stopped, checkpoint};
+use geometry::roots::{Bracket, FalsePosition};
 use homogenise::{Material, Moduli, turned, upper_edges};
 use std::sync::Arc;
 
@@ -238,27 +239,23 @@ impl Property<'_> {
         }
         let far = |v: f64| (v / asked).ln().clamp(-FAR, FAR);
         let sign = if grows { 1.0 } else { -1.0 };
-        let ([mut a, mut b], [mut fa, mut fb]) = (range.map(f64::ln), ends.map(far));
+        let ([a, b], [fa, fb]) = (range.map(f64::ln), ends.map(far));
         let mut slope = (fb - fa) / (b - a);
         let mut last = [a, fa];
+        let Some(mut search) = Bracket::new([a, fa], [b, fb]).map(FalsePosition::new) else {
+            return Ok((a.exp(), slope));
+        };
         for _ in 0..STEPS[0] {
-            let at = (a - fa * (b - a) / (fb - fa)).clamp(a, b);
+            let at = search.guess();
             let f = far(self.guess(at.exp(), n));
             if at != last[0] && (f - last[1]) / (at - last[0]) * sign > 0.0 {
                 slope = (f - last[1]) / (at - last[0]);
             }
-            if f.abs() < MET[0] || b - a < 1e-7 {
+            if f.abs() < MET[0] || search.bracket().width() < 1e-7 {
                 return Ok((at.exp(), slope));
             }
-            let before = last[1];
             last = [at, f];
-            if f * sign < 0.0 {
-                (a, fa) = (at, f);
-                fb *= if before * f > 0.0 { 0.5 } else { 1.0 };
-            } else {
-                (b, fb) = (at, f);
-                fa *= if before * f > 0.0 { 0.5 } else { 1.0 };
-            }
+            search.narrow(at, f);
         }
         Ok((last[0].exp(), slope))
     }

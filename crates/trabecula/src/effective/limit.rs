@@ -1,7 +1,7 @@
 //! Richardson's extrapolation from up to three grids: of arrays as a whole, and of symmetric tensors mode by mode.
 
 use crate::kind::Warning;
-use homogenise::eigen;
+use geometry::dense::eigen;
 
 /// A limit.
 pub struct Limit {

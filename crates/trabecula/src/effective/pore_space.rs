@@ -3,6 +3,7 @@
 use geometry::fault::Fault;
 use geometry::math::{Mat3, Vec3, apply, determinant, inverse, product, transpose};
 use geometry::progress::{Progress, Stage, Stopped};
+use geometry::roots::{Bracket, FalsePosition};
 use geometry::tetmesh::cut_area;
 use homogenise::{PoreGrid, VELOCITIES, WallLink, upper_edges};
 use rayon::prelude::*;
@@ -179,7 +180,7 @@ fn sampled(solid: &CsgSolid, grid: &CubicGrid, progress: &dyn Progress) -> Resul
     if progress.step(1, 1) { Ok(values) } else { Err(Stopped::Interrupted) }
 }
 
-/// Where the solid begins on each link that leaves its pore: by the method of false position (Illinois).
+/// Where the solid begins on each link that leaves its pore: by the method of false position.
 fn crossings(
     solid: &CsgSolid,
     grid: &CubicGrid,
@@ -192,36 +193,32 @@ fn crossings(
     let each: Vec<Vec<WallLink>> = (0..nz)
         .into_par_iter()
         .map(|z| {
-            let mut links: Vec<(usize, usize, [f64; 4])> = Vec::new();
+            let mut links: Vec<(usize, usize, FalsePosition)> = Vec::new();
             for node in (z * nx * ny..(z + 1) * nx * ny).filter(|i| alone.pore[*i]) {
                 for velocity in 1..VELOCITIES.len() {
                     let (to, _) = alone.neighbour(node, velocity);
                     if !alone.pore[to] {
-                        links.push((node, velocity, [0.0, 1.0, values[node], values[to].min(0.0)]));
+                        let bracket = Bracket { below: [1.0, values[to].min(0.0)], above: [0.0, values[node]] };
+                        links.push((node, velocity, FalsePosition::new(bracket)));
                     }
                 }
             }
             let mut found = vec![0.0; links.len()];
             for _ in 0..STEPS {
-                let guess = |[a, b, f, g]: &[f64; 4]| if *g < 0.0 { a + (b - a) * f / (f - g) } else { 0.5 * (a + b) };
-                let points: Vec<Vec3> = links.iter().map(|(n, q, l)| grid.place(&back, *n, *q, guess(l))).collect();
+                let points: Vec<Vec3> = links.iter().map(|(n, q, l)| grid.place(&back, *n, *q, l.guess())).collect();
                 solid.values(&points, &mut found);
                 let mut open = false;
                 for ((_, _, link), value) in links.iter_mut().zip(&found) {
-                    let at = guess(link);
-                    if *value > 0.0 {
-                        *link = [at, link[1], *value, 0.5 * link[3]];
-                    } else {
-                        *link = [link[0], at, 0.5 * link[2], *value];
-                    }
-                    open |= link[1] - link[0] > 1e-9 && *value != 0.0;
+                    link.narrow(link.guess(), *value);
+                    open |= link.bracket().width() > 1e-9 && *value != 0.0;
                 }
                 if !open {
                     break;
                 }
             }
-            let wall = |(node, velocity, link): (usize, usize, [f64; 4])| {
-                let at = if link[3] == 0.0 { link[1] } else { 0.5 * (link[0] + link[1]) };
+            let wall = |(node, velocity, link): (usize, usize, FalsePosition)| {
+                let bracket = link.bracket();
+                let at = if bracket.below[1] == 0.0 { bracket.below[0] } else { bracket.middle() };
                 WallLink { node, velocity, distance: at.clamp(1e-9, 1.0) }
             };
             links.into_iter().map(wall).collect()

@@ -7,6 +7,7 @@ use super::{BuildGrade, Grade, Quantity, Varying, directed};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
+use geometry::dense::{factorise, substitute};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Interval, Vec3, dot, exp, norm, scale, sub, unit};
 
@@ -135,9 +136,10 @@ impl Rbf {
         };
         let kernel = |a: Vec3, b: Vec3| exp(-dot(sub(a, b), sub(a, b)) / (delta * delta));
         let matrix: Vec<Vec<f64>> = points.iter().map(|a| points.iter().map(|b| kernel(*a, *b)).collect()).collect();
-        let factor = cholesky(&matrix);
-        let condition = factor.as_ref().map_or(f64::INFINITY, |l| condition(&matrix, l));
-        let (Some(factor), true) = (factor, condition < WORST) else {
+        let mut factor = matrix.clone();
+        let root = |i: usize, rest: f64| (rest > f64::EPSILON * matrix[i][i]).then(|| rest.sqrt());
+        let condition = factorise(&mut factor, root).map_or(f64::INFINITY, |()| condition(&matrix, &factor));
+        if condition.is_nan() || condition >= WORST {
             let message = format!(
                 "delta is {} mm: functions that wide are so alike at these points that their equations are singular to working \
                  precision (condition number above 1e12); {} mm would do",
@@ -145,8 +147,9 @@ impl Rbf {
                 number(own)
             );
             return Err(Fault::new("delta", message));
-        };
-        let beta = solve(&factor, values);
+        }
+        let mut beta = values.to_vec();
+        substitute(&factor, &mut beta);
         Ok(Rbf { points, beta, delta, axis, condition })
     }
 
@@ -175,42 +178,6 @@ impl Rbf {
     }
 }
 
-/// The lower factor of a symmetric positive definite matrix, if it is one.
-fn cholesky(m: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-    let n = m.len();
-    let mut l = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        let (above, rest) = l.split_at_mut(i);
-        let row = &mut rest[0];
-        for j in 0..i {
-            let s: f64 = row[..j].iter().zip(&above[j][..j]).map(|(a, b)| a * b).sum();
-            row[j] = (m[i][j] - s) / above[j][j];
-        }
-        let s = m[i][i] - row[..i].iter().map(|v| v * v).sum::<f64>();
-        if s.is_nan() || s <= f64::EPSILON * m[i][i] {
-            return None;
-        }
-        row[i] = s.sqrt();
-    }
-    Some(l)
-}
-
-/// x of L Lᵀ x = b.
-fn solve(l: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
-    let n = l.len();
-    let mut x = b.to_vec();
-    for i in 0..n {
-        let s: f64 = l[i][..i].iter().zip(&x).map(|(a, b)| a * b).sum();
-        x[i] = (x[i] - s) / l[i][i];
-    }
-    for i in (0..n).rev() {
-        x[i] /= l[i][i];
-        let v = x[i];
-        x[..i].iter_mut().zip(&l[i]).for_each(|(x, l)| *x -= l * v);
-    }
-    x
-}
-
 /// The ratio of the greatest and the least eigenvalue, by powers of the matrix and of its inverse.
 fn condition(m: &[Vec<f64>], l: &[Vec<f64>]) -> f64 {
     let powers = |by: &dyn Fn(&[f64]) -> Vec<f64>| {
@@ -227,7 +194,12 @@ fn condition(m: &[Vec<f64>], l: &[Vec<f64>]) -> f64 {
         value
     };
     let times = |x: &[f64]| m.iter().map(|r| r.iter().zip(x).map(|(a, b)| a * b).sum()).collect();
-    powers(&times) * powers(&|x| solve(l, x))
+    let back = |x: &[f64]| {
+        let mut x = x.to_vec();
+        substitute(l, &mut x);
+        x
+    };
+    powers(&times) * powers(&back)
 }
 
 /// Points handled at once; the compiler turns each loop over them into vector instructions.

@@ -6,6 +6,7 @@ use super::plane_grid::{PlaneGrid, lifted};
 use crate::implicit::Surface;
 use geometry::layer::{Point, length};
 use geometry::math::Vec3;
+use geometry::roots::Bracket;
 
 /// Surfaces at a height.
 #[derive(Clone, Copy)]
@@ -48,13 +49,6 @@ impl Evaluated {
 /// Rounds of a bracketed iteration.
 const ROUNDS: usize = 40;
 
-/// A root that is still looked for: where it lies between, from the end where the surface is not positive.
-struct Bracket {
-    root: u32,
-    low: f64,
-    high: f64,
-}
-
 /// Solves for the roots of all surfaces on their sides to `accuracy` (mm): Newton's method within a bracket.
 pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accuracy: f64) {
     let mut order: Vec<u32> = (0..outline.roots.len() as u32).collect();
@@ -66,15 +60,16 @@ pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accur
         .collect::<Vec<_>>()
     {
         let surface = roots[of[0] as usize].surface;
-        let mut open: Vec<Bracket> = of.iter().map(|&root| Bracket { root, low: 0.0, high: 1.0 }).collect();
+        let bracket = |r: &Root| if r.falls { Bracket::of_signs(0.0, 1.0) } else { Bracket::of_signs(1.0, 0.0) };
+        let mut open: Vec<(u32, Bracket)> = of.iter().map(|&r| (r, bracket(&roots[r as usize]))).collect();
         for round in 0..ROUNDS {
-            let found = plane.evaluate(surface, open.iter().map(|b| roots[b.root as usize].position(grid)));
+            let found = plane.evaluate(surface, open.iter().map(|(r, _)| roots[*r as usize].position(grid)));
             let mut i = 0;
-            open.retain_mut(|b| {
+            open.retain_mut(|(r, bracket)| {
                 let (value, gradient, _) = found.at(i);
                 i += 1;
                 // The first evaluation is at a guess, whose gradient is not that of the root.
-                !step(&mut roots[b.root as usize], b, grid, (value, gradient), accuracy) || round == 0
+                !step(&mut roots[*r as usize], bracket, grid, (value, gradient), accuracy) || round == 0
             });
             if open.is_empty() {
                 break;
@@ -84,18 +79,19 @@ pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accur
 }
 
 /// One step for a root; whether it is near enough.
-fn step(root: &mut Root, b: &mut Bracket, grid: &PlaneGrid, (value, gradient): (f64, Point), accuracy: f64) -> bool {
+fn step(
+    root: &mut Root,
+    bracket: &mut Bracket,
+    grid: &PlaneGrid,
+    (value, gradient): (f64, Point),
+    accuracy: f64,
+) -> bool {
     let [p, q] = root.side.map(|n| grid.position(n));
     let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
     let slope = gradient[0] * dx + gradient[1] * dy;
-    if (value <= 0.0) == root.falls {
-        b.low = b.low.max(root.at);
-    } else {
-        b.high = b.high.min(root.at);
-    }
+    bracket.narrow(root.at, value);
     root.gradient = gradient;
-    let newton = root.at - value / slope;
-    let next = if newton > b.low && newton < b.high { newton } else { 0.5 * (b.low + b.high) };
+    let next = bracket.newton_step(root.at, value, slope);
     let moved = (next - root.at).abs() * length([dx, dy]);
     root.at = next;
     moved <= accuracy

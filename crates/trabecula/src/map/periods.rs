@@ -13,6 +13,7 @@ use super::region_holes::Hole;
 use super::solution::Solution;
 use super::spline::Spline;
 use super::winding::Winding;
+use geometry::dense::{factorise, substitute};
 use geometry::fault::position;
 use geometry::math::{Vec3, sub};
 use geometry::progress::checkpoint;
@@ -161,24 +162,17 @@ fn error(form: &[f64], n: &[i64]) -> f64 {
     (0..m * m).map(|i| form[i] * v[i / m] * v[i % m]).sum()
 }
 
-/// Where a quadratic form in (1, n) is least: Gauss' elimination with pivots on the diagonal, zero where nothing counts.
+/// Where a quadratic form in (1, n) is least; zero where nothing counts.
 pub(super) fn least(form: &[f64], holes: usize) -> Vec<f64> {
     let m = holes + 1;
-    let mut a: Vec<Vec<f64>> =
-        (1..m).map(|i| (1..m).map(|j| form[i * m + j]).chain([-form[i * m]]).collect()).collect();
+    let mut a: Vec<Vec<f64>> = (1..m).map(|i| form[i * m + 1..][..holes].to_vec()).collect();
+    let mut least: Vec<f64> = (1..m).map(|i| -form[i * m]).collect();
     let scale = (0..holes).map(|i| a[i][i]).fold(0.0, f64::max);
-    for p in 0..holes {
-        if a[p][p] <= 1e-12 * scale {
-            a[p].fill(0.0);
-            a[p][p] = 1.0;
-        }
-        let row = a[p].clone();
-        for (_, other) in a.iter_mut().enumerate().filter(|(i, _)| *i != p) {
-            let f = other[p] / row[p];
-            other.iter_mut().zip(&row).for_each(|(o, r)| *o -= f * r);
-        }
+    let root = |_, rest: f64| Some(if rest <= 1e-12 * scale { f64::INFINITY } else { rest.sqrt() });
+    if factorise(&mut a, root).is_some() {
+        substitute(&a, &mut least);
     }
-    (0..holes).map(|i| a[i][holes] / a[i][i]).collect()
+    least
 }
 
 /// Whole numbers near the least of a form, the least error first: the rounded ones, improved by single steps, and what single steps and

@@ -6,6 +6,7 @@
 //! inside and, along sides, the angles between its tangent planes and the surface's: two patches that have the surface's
 //! tangent planes along their common side have each other's.
 
+use geometry::dense::{factorise, substitute};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 use super::bezier::{Curve, Patch, basis, coons, on_side, slopes, sum};
@@ -45,31 +46,17 @@ impl<const N: usize> Normal<N> {
         }
     }
 
-    /// The step, damped: Cholesky's method.
+    /// The step, damped.
     fn step(mut self) -> [f64; N] {
         let mean = (0..N).map(|i| self.matrix[i][i]).sum::<f64>() / N as f64;
         let damping = DAMPING * mean + f64::MIN_POSITIVE;
         for i in 0..N {
             self.matrix[i][i] += damping;
         }
-        let m = &mut self.matrix;
-        for i in 0..N {
-            for j in 0..=i {
-                let rest: f64 = (0..j).map(|k| m[i][k] * m[j][k]).sum();
-                m[i][j] =
-                    if i == j { (m[i][i] - rest).max(f64::MIN_POSITIVE).sqrt() } else { (m[i][j] - rest) / m[j][j] };
-            }
+        if factorise(&mut self.matrix, |_, rest| Some(rest.max(f64::MIN_POSITIVE).sqrt())).is_some() {
+            substitute(&self.matrix, &mut self.right);
         }
-        let mut x = self.right;
-        for i in 0..N {
-            let rest: f64 = (0..i).map(|k| m[i][k] * x[k]).sum();
-            x[i] = (x[i] - rest) / m[i][i];
-        }
-        for i in (0..N).rev() {
-            let rest: f64 = (i + 1..N).map(|k| m[k][i] * x[k]).sum();
-            x[i] = (x[i] - rest) / m[i][i];
-        }
-        x
+        self.right
     }
 }
 

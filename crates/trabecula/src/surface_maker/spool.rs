@@ -6,7 +6,7 @@ use std::io::{self, SeekFrom, Write};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use geometry::formats::{Aside, Indexed, Metadata, write_indexed};
+use geometry::formats::{ByteSpool, Indexed, Metadata, write_indexed};
 use geometry::math::Vec3;
 use geometry::progress::{Progress, Stage, Stopped};
 
@@ -220,7 +220,7 @@ impl Indexed for Spooled<'_> {
 /// A file for what a writer puts aside.
 struct AsideFile<'a>(&'a mut dyn Store);
 
-impl Aside for AsideFile<'_> {
+impl ByteSpool for AsideFile<'_> {
     fn put(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.0.write_all(&bytes)
     }

@@ -8,6 +8,7 @@ use core::f64::consts::{PI, TAU};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+use geometry::dense::solve;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 use super::super::bezier::Bezier;
@@ -237,17 +238,8 @@ fn from_values(degree: usize) -> &'static [f64] {
         let unit = |row: usize| (0..n).map(move |k| if k == row { 1.0 } else { 0.0 });
         let mut rows: Vec<Vec<f64>> =
             nodes(degree).enumerate().map(|(k, t)| bernstein(degree, t).chain(unit(k)).collect()).collect();
-        for column in 0..n {
-            let pivot = (column..n).max_by(|a, b| rows[*a][column].abs().total_cmp(&rows[*b][column].abs()));
-            rows.swap(column, pivot.unwrap_or(column));
-            let by = 1.0 / rows[column][column];
-            rows[column].iter_mut().for_each(|v| *v *= by);
-            let pivot = rows[column].clone();
-            for (_, row) in rows.iter_mut().enumerate().filter(|r| r.0 != column) {
-                let by = row[column];
-                row.iter_mut().zip(&pivot).for_each(|(v, p)| *v -= by * p);
-            }
-        }
+        // The polynomials are independent.
+        _ = solve(&mut rows, 0.0);
         rows.into_iter().flat_map(|row| row.into_iter().skip(n)).collect()
     })
 }

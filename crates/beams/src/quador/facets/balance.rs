@@ -9,6 +9,7 @@
 //! centre, so that the triangles still cover the sphere of directions once and do not intersect.
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::roots::secant;
 
 use super::{EdgeCurve, Facets, edge_key, orientation};
 
@@ -45,7 +46,7 @@ impl Facets<'_> {
             };
             let more = volume.map_or(0.0, |volume| {
                 let off = |more: f64| self.volume_below(&at(more)) + below_circles - volume;
-                zero([0.0, 1e-3 * self.chord], off)
+                secant([0.0, 1e-3 * self.chord], off)
             });
             if more.abs() > self.chord {
                 return None;
@@ -134,31 +135,5 @@ impl Facets<'_> {
             }
         }
         most
-    }
-}
-
-/// The zero of a nearly linear function by secants, from two places.
-fn zero([a, b]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
-    let (mut last, mut now) = ([a, f(a)], [b, f(b)]);
-    for _ in 0..8 {
-        let next = now[0] - now[1] * (now[0] - last[0]) / (now[1] - last[1]);
-        if !next.is_finite() || next == now[0] {
-            break;
-        }
-        (last, now) = (now, [next, f(next)]);
-    }
-    now[0]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_nearly_linear_function_has_its_zero_found() {
-        let cubic = |x: f64| x + 0.1 * x * x - 0.01 * x.powi(3) - 1.05;
-        let x = zero([0.0, 0.01], cubic);
-        assert!(cubic(x).abs() < 1e-15, "{x}");
-        assert_eq!(zero([0.0, 1.0], |_| 1.0), 1.0);
     }
 }

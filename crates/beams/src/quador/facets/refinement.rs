@@ -4,8 +4,9 @@
 //! one often follows the surface where the other cuts through it. So triangles become long along straight directions of
 //! the surface.
 
-use geometry::math::{Vec3, add, cross, dot, norm, root, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
+use geometry::roots::{Bracket, Tolerance};
 
 use super::super::complex::Face;
 use super::{EdgeCurve, Facets, edge_key, orientation};
@@ -69,8 +70,7 @@ impl Facets<'_> {
             let (value, slope) = hub.gradient(scale(p, t));
             [value, dot(slope, p)]
         };
-        let near = [0.0, 4.0 * f64::EPSILON];
-        scale(p, root([lo, hi], (lo + hi) / 2.0, true, near, along))
+        scale(p, Bracket::of_signs(lo, hi).newton((lo + hi) / 2.0, Tolerance::ROUNDING, along))
     }
 
     /// Flips or bisects edges, the farthest first, until the quarter points of all edges and the centroids of all

@@ -3,7 +3,8 @@
 //! Q(x(μ)) = 0 is a polynomial of degree six in μ. On an arc X = v + W/D, with W and D quadratic forms of sine and
 //! cosine of the angle, the condition has degree four. All real roots are isolated by the roots of the derivative.
 
-use geometry::math::{Vec3, add, apply, dot, norm, root, scale, sub, transpose};
+use geometry::math::{Vec3, add, apply, dot, norm, scale, sub, transpose};
+use geometry::roots::{Bracket, Tolerance};
 
 use super::super::conic::Conic;
 use super::PrincipalAxes;
@@ -180,12 +181,12 @@ fn roots(c: &[f64]) -> Vec<f64> {
             out.push(x);
         }
         let Some(&y) = stops.get(k + 1) else { break };
-        let rising = value(y) > 0.0;
-        if rising == (value(x) > 0.0) {
+        if (value(y) > 0.0) == (value(x) > 0.0) {
             continue;
         }
-        let near = [0.0, 4.0 * f64::EPSILON];
-        out.push(root([x, y], (x + y) / 2.0, rising, near, |x| [value(x), slope(x)]));
+        let bracket = Bracket::new([x, value(x)], [y, value(y)]);
+        let root = |b: Bracket| b.newton((x + y) / 2.0, Tolerance::ROUNDING, |x| [value(x), slope(x)]);
+        out.extend(bracket.map(root));
     }
     out.sort_by(f64::total_cmp);
     out

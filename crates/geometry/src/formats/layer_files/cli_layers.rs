@@ -8,7 +8,7 @@
 use std::io;
 
 use super::{Encoded, LayerWriter, Plain, Stack, Target};
-use crate::formats::Aside;
+use crate::formats::ByteSpool;
 use crate::formats::number::{push_f32, push_u32};
 use crate::layer::{Layer, signed_area};
 
@@ -21,7 +21,7 @@ const PART: u32 = 1;
 pub fn open<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     let kind = if stack.binary { "BINARY" } else { "ASCII" };
     let (low, high) = (stack.bounds.min.map(|v| v as f32), stack.bounds.max.map(|v| v as f32));

@@ -4,14 +4,14 @@ use std::io;
 
 use super::coverage::coverage;
 use super::{Encoded, LayerWriter, Plain, Stack, Target};
-use crate::formats::Aside;
+use crate::formats::ByteSpool;
 use crate::formats::npy::write_header;
 use crate::layer::Layer;
 
 pub fn open<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     let [x, y] = stack.raster()?.size;
     write_header([x, y, stack.layers()], &mut *out)?;

@@ -12,7 +12,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::coverage::coverage;
 use super::{Encoded, LayerWriter, Stack, Target};
-use crate::formats::Aside;
+use crate::formats::ByteSpool;
 use crate::layer::Layer;
 
 /// Encodes a layer as 8-bit grey PNG.
@@ -51,7 +51,7 @@ struct Pictures<'a> {
 pub fn open_zip<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     open(stack, out, Kind::Manifest)
 }
@@ -59,7 +59,7 @@ pub fn open_zip<'a>(
 pub fn open_sl1<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     open(stack, out, Kind::Sl1)
 }

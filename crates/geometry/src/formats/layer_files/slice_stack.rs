@@ -9,7 +9,7 @@ use super::{Encoded, LayerWriter, Stack, Target, by_size};
 use crate::formats::number::{push_f32, push_u32};
 use crate::formats::threemf::{Model, Piece};
 use crate::formats::xml::escaped;
-use crate::formats::{Aside, invalid};
+use crate::formats::{ByteSpool, invalid};
 use crate::layer::Layer;
 
 const SLICE: &str = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07";
@@ -23,7 +23,7 @@ struct Slices<'a> {
 pub fn open<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    aside: &'a mut dyn Aside,
+    aside: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     let mut model = Model::new(aside);
     let mut head = Model::head(&format!(" xmlns:s=\"{SLICE}\" requiredextensions=\"s\""));

@@ -4,14 +4,14 @@
 use std::io::{self, Write};
 
 use super::{Encoded, LayerWriter, Plain, Stack, Target, by_size};
-use crate::formats::Aside;
+use crate::formats::ByteSpool;
 use crate::formats::number::{push_f32, push_u32};
 use crate::layer::Layer;
 
 pub fn open<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     let ([x, y, _], [w, h, _]) = (stack.bounds.min.map(|v| v as f32), stack.bounds.size().map(|v| v as f32));
     write!(

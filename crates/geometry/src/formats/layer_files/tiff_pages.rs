@@ -11,7 +11,7 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, T
 
 use super::coverage::coverage;
 use super::{Encoded, LayerWriter, Raster, Stack, Target};
-use crate::formats::{Aside, invalid};
+use crate::formats::{ByteSpool, invalid};
 use crate::layer::Layer;
 
 /// Bytes that offsets of a plain TIFF reach; more pages need a BigTIFF.
@@ -35,7 +35,7 @@ struct Pages<'a, K: TiffKind> {
 pub fn open<'a>(
     stack: &'a Stack,
     out: &'a mut dyn Target,
-    _: &'a mut dyn Aside,
+    _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
     let [width, height] = stack.raster()?.size;
     if u32::try_from(width).is_err() || u32::try_from(height).is_err() {

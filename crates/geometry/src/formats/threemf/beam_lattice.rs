@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use super::{Model, Piece, push_mesh, quoted};
 use crate::formats::number::{push_f32, push_u32};
-use crate::formats::{Aside, Indexed, Metadata, in_order, invalid};
+use crate::formats::{ByteSpool, Indexed, Metadata, in_order, invalid};
 use crate::math::Vec3;
 
 /// Namespaces of the extension and of its balls.
@@ -85,7 +85,7 @@ pub fn write_beam_lattice(
     lattice: &BeamLattice,
     meshes: Companions,
     meta: &Metadata,
-    aside: &mut dyn Aside,
+    aside: &mut dyn ByteSpool,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     if lattice.nodes.len().max(lattice.beams.len()) >= i32::MAX as usize {

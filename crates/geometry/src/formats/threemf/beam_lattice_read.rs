@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 use quick_xml::events::BytesStart;
 
 use super::beam_lattice::{Cap, Frustum};
-use super::read::{Model, Object, Placed, Source, Which, place_all};
+use super::read::{Model, Object, PlacedObject, Source, Which, place_all};
 use crate::fault::{Fault, counted};
 use crate::formats::graphs::BeamGraph;
 use crate::formats::text::shown;
@@ -211,7 +211,7 @@ pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
 fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
     let mut graph = BeamGraph { in_mm: true, ..BeamGraph::default() };
     let (mut short, mut clipped, mut triangles) = (0, 0, 0);
-    place_all(bytes, which, &mut |placed: &Placed| {
+    place_all(bytes, which, &mut |placed: &PlacedObject| {
         let Some(lattice) = &placed.object.lattice else { return Ok(()) };
         let factor = similarity(&placed.matrix).ok_or_else(|| {
             Fault::new("", "a beam lattice is placed with a transform that is no similarity: round beams would be oval")

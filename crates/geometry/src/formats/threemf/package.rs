@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use crc32fast::Hasher;
 
-use super::Aside;
+use super::ByteSpool;
 
 /// Sizes from here on are written in 64 bits.
 pub const LIMIT: u64 = u32::MAX as u64;
@@ -48,7 +48,7 @@ impl Piece {
 /// A file inside the archive.
 pub struct Entry<'a> {
     name: &'static str,
-    pieces: &'a mut dyn Aside,
+    pieces: &'a mut dyn ByteSpool,
     crc: Hasher,
     size: u64,
     /// Bytes in the archive: the pieces and the two that end the stream.
@@ -57,7 +57,7 @@ pub struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     /// An empty file, whose pieces are put aside in `pieces`.
-    pub fn new(name: &'static str, pieces: &'a mut dyn Aside) -> Self {
+    pub fn new(name: &'static str, pieces: &'a mut dyn ByteSpool) -> Self {
         Entry { name, pieces, crc: Hasher::new(), size: 0, packed: FINAL.len() as u64 }
     }
 

@@ -83,7 +83,7 @@ pub(super) struct Model {
 }
 
 /// An object where the build has it.
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedObject<'a> {
     pub object: &'a Object,
     /// The linear part of its placement.
     pub matrix: Mat3,
@@ -216,7 +216,7 @@ pub(super) enum Which<'a> {
 }
 
 /// Numbers of what a file holds.
-pub(super) struct Held {
+pub(super) struct Contents {
     /// Objects of the main model.
     objects: usize,
     /// Uses of them by the build.
@@ -229,8 +229,8 @@ pub(super) struct Held {
 pub(super) fn place_all(
     bytes: &[u8],
     which: Which,
-    take: &mut dyn FnMut(&Placed) -> Result<(), Fault>,
-) -> Result<Held, Fault> {
+    take: &mut dyn FnMut(&PlacedObject) -> Result<(), Fault>,
+) -> Result<Contents, Fault> {
     let mut package = Package::open(bytes)?;
     let root = root_of(&mut package);
     let mut main = package.file(&root, model)?;
@@ -263,11 +263,11 @@ pub(super) fn place_all(
     }
     // Instances multiply what the file holds; a small file that asks for billions is refused.
     let held: usize = files.values().flat_map(|f| f.objects.values()).map(Object::size).sum();
-    let mut placing = Placing { files: &files, unit, take, left: 10_000_000 + 64 * held, uses: 0 };
+    let mut traversal = BuildTraversal { files: &files, unit, take, left: 10_000_000 + 64 * held, uses: 0 };
     for i in 0..items {
-        placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
+        traversal.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
-    Ok(Held { objects, items, lattices: files.values().map(beam_lattice_read::count).sum() })
+    Ok(Contents { objects, items, lattices: files.values().map(beam_lattice_read::count).sum() })
 }
 
 /// The name of the main model.
@@ -299,15 +299,16 @@ fn outside(model: &Model) -> impl Iterator<Item = String> {
     uses.filter(|u| !u.path.is_empty()).map(|u| u.path.clone())
 }
 
-struct Placing<'a> {
+/// The objects of a build as they are reached through their components, and what may yet come of them.
+struct BuildTraversal<'a> {
     files: &'a HashMap<String, Model>,
     unit: f64,
-    take: &'a mut dyn FnMut(&Placed) -> Result<(), Fault>,
+    take: &'a mut dyn FnMut(&PlacedObject) -> Result<(), Fault>,
     left: usize,
     uses: usize,
 }
 
-impl Placing<'_> {
+impl BuildTraversal<'_> {
     fn place(&mut self, path: &str, of: &Use, outer: &Placement, depth: usize) -> Result<(), Fault> {
         let path = if of.path.is_empty() { path } else { &of.path };
         let files = self.files;
@@ -331,14 +332,14 @@ impl Placing<'_> {
         if vertices.iter().flatten().any(|x| !x.is_finite()) {
             return Err(Fault::new("", format!("object {} is placed at coordinates that are not finite", of.id)));
         }
-        (self.take)(&Placed { object, matrix: placement.m, vertices, unit: self.unit })?;
+        (self.take)(&PlacedObject { object, matrix: placement.m, vertices, unit: self.unit })?;
         object.components.iter().try_for_each(|c| self.place(path, c, &placement, depth + 1))
     }
 }
 
 /// A model file as it is read.
 #[derive(Default)]
-struct Parsing {
+struct ModelParser {
     model: Model,
     /// What stands before the core's element names: empty, or "c:" and the like. Extensions have another.
     prefix: Option<String>,
@@ -350,23 +351,23 @@ pub(super) type Source<'a> = Scanner<&'a mut dyn BufRead>;
 /// Parses one model file.
 fn model(text: &mut dyn BufRead) -> Result<Model, Fault> {
     let (mut buffer, mut s) = (Vec::new(), Scanner::new(text, "3MF model"));
-    let mut parsing = Parsing::default();
+    let mut parser = ModelParser::default();
     loop {
         match s.next(&mut buffer)? {
-            Event::Start(tag) => parsing.start(&s, &tag)?,
+            Event::Start(tag) => parser.start(&s, &tag)?,
             Event::Empty(tag) => {
-                parsing.start(&s, &tag)?;
-                parsing.end(&s, tag.name().into_inner())?;
+                parser.start(&s, &tag)?;
+                parser.end(&s, tag.name().into_inner())?;
             }
-            Event::End(tag) => parsing.end(&s, tag.name().into_inner())?,
-            Event::Eof if parsing.prefix.is_none() => return Err(s.fault("no XML: truncated or not 3MF")),
-            Event::Eof => return Ok(parsing.model),
+            Event::End(tag) => parser.end(&s, tag.name().into_inner())?,
+            Event::Eof if parser.prefix.is_none() => return Err(s.fault("no XML: truncated or not 3MF")),
+            Event::Eof => return Ok(parser.model),
             _ => {}
         }
     }
 }
 
-impl Parsing {
+impl ModelParser {
     fn start(&mut self, s: &Source, tag: &BytesStart) -> Result<(), Fault> {
         let name = tag.name().into_inner();
         let Some(prefix) = &self.prefix else {

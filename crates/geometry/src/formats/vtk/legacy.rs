@@ -469,6 +469,8 @@ mod tests {
     fn names_of_more_components_than_the_file_has_lines_end_with_it() {
         let layout = "DATASET STRUCTURED_POINTS\nDIMENSIONS 0 0 0\nSPACING 1 1 1\nORIGIN 0 0 0\nPOINT_DATA 0\n\
             SCALARS S double 18446744073709551615\nLOOKUP_TABLE default\nMETADATA\nCOMPONENT_NAMES\nx\n";
-        drop(read(&file("5.1", false, layout)));
+        let data = read(&file("5.1", false, layout)).unwrap();
+        let [array] = &data.arrays[..] else { panic!("{:?}", data.arrays) };
+        assert_eq!((array.name.as_str(), array.components, array.values.len()), ("S", usize::MAX, 0));
     }
 }

@@ -3,6 +3,7 @@
 use super::subdivision::{Nodes, Subdivision};
 use super::{Part, TetCell};
 use geometry::math::Interval;
+use geometry::roots::bisect;
 
 /// Steps along the edge of the tetrahedron, coarse and fine: their two fractions give one of fourth order (Richardson).
 const STEPS: [usize; 2] = [40, 80];
@@ -155,17 +156,9 @@ impl Table {
             Part::Sheet => Interval::new(0.0, self.range.lo.abs().max(self.range.hi.abs())),
             _ => self.range,
         };
-        let (mut lo, mut hi) = (lo, hi);
         let falls = part == Part::Upper;
         // The table is monotone; 60 halvings leave nothing.
-        for _ in 0..60 {
-            let mid = 0.5 * (lo + hi);
-            if (self.fraction(part, mid) < fraction) != falls {
-                lo = mid;
-            } else {
-                hi = mid;
-            }
-        }
+        let [lo, hi] = bisect([lo, hi], 60, |t| (self.fraction(part, t) < fraction) != falls);
         0.5 * (lo + hi)
     }
 }

@@ -17,6 +17,7 @@ use ::beams::graph::{GivenRadii, Graph, PeriodicGraph, Radii, Wireframe, with_ra
 use ::beams::quador::{PeriodicCell, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Mat3, inverse, transpose};
+use geometry::roots::{Bracket, FalsePosition, try_bisect};
 
 /// Greatest number of positions at which the cells of a map are taken.
 const CELLS: usize = 32;
@@ -64,38 +65,27 @@ fn solve(
             break;
         }
     }
-    let Some(mut high) = high else {
+    let Some(high) = high else {
         return match (low[0] > 0.0, last) {
             (false, Some(fault)) => Err(fault),
             _ => Ok(Err(Found { radius: low[0], fraction: low[1] + asked })),
         };
     };
-    // The method of Illinois: the secant, and half the value at an end that stays.
-    let mut side = 0;
+    let mut search = FalsePosition::new(Bracket { below: low, above: high });
     for _ in 0..TRIALS {
-        let [[a, va], [b, vb]] = [low, high];
-        let x = (a * vb - b * va) / (vb - va);
-        if b - a <= WIDTH * b || !(x > a && x < b) {
+        let (x, bracket) = (search.guess(), *search.bracket());
+        if bracket.width() <= WIDTH * bracket.above[0] || !bracket.holds(x) {
             break;
         }
-        let v = match value(x)? {
-            Some(v) => v - asked,
-            None => return Ok(Err(Found { radius: a, fraction: va + asked })),
-        };
-        if v.abs() <= near {
+        let [radius, off] = bracket.below;
+        let Some(v) = value(x)? else { return Ok(Err(Found { radius, fraction: off + asked })) };
+        if (v - asked).abs() <= near {
             return Ok(Ok(x));
         }
-        if v < 0.0 {
-            low = [x, v];
-            high[1] *= if side < 0 { 0.5 } else { 1.0 };
-            side = -1;
-        } else {
-            high = [x, v];
-            low[1] *= if side > 0 { 0.5 } else { 1.0 };
-            side = 1;
-        }
+        search.narrow(x, v - asked);
     }
-    Ok(Ok(if low[1].abs() < high[1].abs() { low[0] } else { high[0] }))
+    let Bracket { below, above } = search.bracket();
+    Ok(Ok(if below[1].abs() < above[1].abs() { below[0] } else { above[0] }))
 }
 
 /// Refuses a fraction that no radius gives.
@@ -170,12 +160,8 @@ fn clear_of_others(cells: &[PeriodicCell], radius: f64) -> Result<Option<f64>, F
     if !collide(radius)? {
         return Ok(None);
     }
-    let [mut free, mut touching] = [0.0, radius];
-    while touching - free > 1e-6 * radius {
-        let middle = 0.5 * (free + touching);
-        if collide(middle)? { touching = middle } else { free = middle }
-    }
-    Ok(Some(free))
+    // To a millionth.
+    Ok(Some(try_bisect([0.0, radius], 20, |radius| collide(radius).map(|c| !c))?[0]))
 }
 
 /// The radius of the beams of a frame.

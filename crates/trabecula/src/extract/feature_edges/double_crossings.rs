@@ -2,11 +2,12 @@
 
 use super::{EdgeStore, SurfaceContext};
 use geometry::math::Vec3;
+use geometry::roots::Bracket;
 
 /// Two crossings nearer to each other than this many times the least distance of points from nodes are left out. Beyond the
 /// feature edge a face is then cut off straight, by more than what is left out.
 const CLOSE: f64 = 2.0;
-/// Iterations of root finding. Each at least halves the interval.
+/// Most intervals that are searched for a point on the other side of the surface.
 const ROUNDS: usize = 40;
 
 impl EdgeStore {
@@ -65,8 +66,9 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
         let height = |t: f64| self.height(node, axis, t);
         let margin = self.grid.margin;
         let (t, low) = deepest(&height, (a, 1.0 - b), CLOSE * margin)?;
-        let p = root(&height, (0.0, a.max(1e-12)), (t, low)).max(margin);
-        let q = root(&height, (1.0, b.max(1e-12)), (t, low)).min(1.0 - margin);
+        let root = |end: [f64; 2]| Bracket::new([t, low], end).map(|b| b.false_position(1e-12, 1e-12, height));
+        let p = root([0.0, a.max(1e-12)])?.max(margin);
+        let q = root([1.0, b.max(1e-12)])?.min(1.0 - margin);
         (q - p >= CLOSE * margin).then(|| [p, q].map(|t| self.along(node, axis, t)))
     }
 
@@ -139,26 +141,4 @@ fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Optio
         open.extend([(a, t - h), (t + h, b)].into_iter().filter(|w| w.0 < w.1));
     }
     None
-}
-
-/// A root between a point where a function is positive and one where it is not, by false position with a bisection in every
-/// third step.
-fn root(height: &impl Fn(f64) -> f64, positive: (f64, f64), other: (f64, f64)) -> f64 {
-    let (mut p, mut q) = (positive, other);
-    for round in 0..ROUNDS {
-        if (p.0 - q.0).abs() < 1e-12 || q.1 == 0.0 {
-            break;
-        }
-        let t = if round % 3 == 2 { (p.0 + q.0) / 2.0 } else { p.0 + (q.0 - p.0) * p.1 / (p.1 - q.1) };
-        let h = height(t);
-        if h > 0.0 {
-            p = (t, h);
-        } else {
-            q = (t, h);
-        }
-        if h.abs() < 1e-12 {
-            return t;
-        }
-    }
-    q.0
 }

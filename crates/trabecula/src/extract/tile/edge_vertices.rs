@@ -8,6 +8,7 @@ use super::{BATCH, Nodes, Numbers, Scratch, Vertex};
 use crate::extract::sign_words::{Signs, below};
 use crate::field::Field;
 use geometry::math::unit;
+use geometry::roots::Bracket;
 
 /// Lists the vertices of plain cells, surface by surface.
 pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
@@ -69,12 +70,11 @@ fn list_surface(
     }
 }
 
-/// A bracket of a root along an edge: positions and values at its solid and void end, and the next guess.
+/// A root along an edge: its bracket, below which is solid, and the next guess.
 #[derive(Clone, Copy)]
 struct Root {
     vertex: u32,
-    solid: (f64, f64),
-    void: (f64, f64),
+    bracket: Bracket,
     t: f64,
 }
 
@@ -86,15 +86,14 @@ impl Root {
         if value == 0.0 {
             return 0.0;
         }
-        *(if value <= 0.0 { &mut self.solid } else { &mut self.void }) = (self.t, value);
-        let ((lo, a), (hi, b)) = (self.solid, self.void);
+        self.bracket.narrow(self.t, value);
         let newton = self.t - value / slope;
         let next = if halve {
-            0.5 * (lo + hi)
-        } else if newton >= lo && newton <= hi {
+            self.bracket.middle()
+        } else if newton >= self.bracket.below[0] && newton <= self.bracket.above[0] {
             newton
         } else {
-            lo - (hi - lo) * a / (b - a)
+            self.bracket.chord()
         };
         let step = next - self.t;
         self.t = next;
@@ -123,7 +122,8 @@ pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, surface: usiz
             let high = low + nodes.stride[usize::from(v.axis)];
             let (a, b) = if v.up { (low, high) } else { (high, low) };
             let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
-            roots.push(Root { vertex: i as u32, solid: (0.0, a), void: (1.0, b), t: -a / (b - a) });
+            let bracket = Bracket { below: [0.0, a], above: [1.0, b] };
+            roots.push(Root { vertex: i as u32, bracket, t: bracket.chord() });
         }
         for round in 0..ROUNDS {
             points.clear();

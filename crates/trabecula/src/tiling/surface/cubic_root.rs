@@ -1,6 +1,6 @@
 //! The first root of a cubic in [0, 1] that it crosses upwards.
 
-use geometry::math::root;
+use geometry::roots::{Bracket, Tolerance};
 
 /// The first position in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
 pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
@@ -29,7 +29,7 @@ pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
         let (l, h) = (value(lo), value(hi));
         // The chord's guess.
         let start = if h > l { lo - l * (hi - lo) / (h - l) } else { lo };
-        return root([lo, hi], start, true, [1e-13, 0.0], |s| [value(s), slope(s)]);
+        return Bracket::of_signs(lo, hi).newton(start, Tolerance::absolute(1e-13), |s| [value(s), slope(s)]);
     }
     1.0
 }
