@@ -165,6 +165,7 @@ impl Cuts {
             checkpoint();
             partition.cut(s, cube);
         }
+        partition.join_planes();
         let (shaping, dropped) = prepared(partition, true);
         shaped(shaping, cube, dropped, layers)
     }

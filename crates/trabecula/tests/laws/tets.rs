@@ -316,6 +316,54 @@ fn flat_faces_balance_about_curved_surfaces() {
     }
 }
 
+/// Boxes that have planes in common, as the legs of an L or a U, next to each other or overlapping, and a pocket flush with a face.
+fn boxes_with_common_planes(kind: usize, some: &mut Random) -> (Region, f64, f64) {
+    let [w, d, h] = [0; 3].map(|_| some.between(15.0, 50.0));
+    let t = some.between(2.0, 5.0);
+    let joined = |parts: Vec<Region>| -> Region { Arc::new(Union::new(parts).expect("union")) };
+    let floor = cuboid([0.0; 3], [w, d, t]);
+    match kind {
+        0 => {
+            let other = t * some.between(0.7, 1.3);
+            (joined(vec![floor, cuboid([0.0; 3], [other, d, h])]), t, w * d * t + other * d * (h - t))
+        }
+        1 => {
+            let walls = [cuboid([0.0; 3], [w, t, h]), cuboid([0.0, d - t, 0.0], [w, d, h])];
+            (joined([floor].into_iter().chain(walls).collect()), t, w * d * t + 2.0 * w * t * (h - t))
+        }
+        2 => {
+            let walls = [cuboid([0.0, 0.0, t], [w, t, h]), cuboid([0.0, d - t, t], [w, d, h])];
+            (joined([floor].into_iter().chain(walls).collect()), t, w * d * t + 2.0 * w * t * (h - t))
+        }
+        _ => {
+            let pocket = cuboid([0.0, t, t], [w, d - t, h]);
+            let parts = vec![cuboid([0.0; 3], [w, d, h]), pocket];
+            (Arc::new(Difference::new(parts).expect("difference")), t, w * (d * h - (d - 2.0 * t) * (h - t)))
+        }
+    }
+}
+
+/// Nodes on a plane that two boxes have move along it as along any other: angles are fair, and flat faces stay where they are.
+#[test]
+fn boxes_with_common_planes_have_fair_angles() {
+    let mut some = Random(41);
+    let mut worst = [180.0f64, 0.0];
+    for i in 0..cases(16) as usize {
+        let (space, t, volume) = boxes_with_common_planes(i % 4, &mut some);
+        let bounds = space.bounds();
+        let size = t * some.between(0.8, 2.0);
+        let made = background(&space, &bounds, &Grade::Constant(size), &inside(&*space, &bounds), None).expect("mesh");
+        let what = format!("{i}: thickness {t}, size {size}");
+        sound(&what, &made.mesh);
+        let [least, greatest] = angles(&what, &made.mesh);
+        worst = [worst[0].min(least), worst[1].max(greatest)];
+        assert!(least > 14.0 && greatest < 160.0, "{what}: {least} to {greatest}");
+        assert!((made.mesh.volume() / volume - 1.0).abs() < 1e-12, "{what}");
+        assert!(made.balanced == made.mesh.nodes && made.left_out == 0.0, "{what}");
+    }
+    println!("boxes with common planes: {:.1} to {:.1}", worst[0], worst[1]);
+}
+
 #[test]
 fn graded_meshes_of_random_regions_keep_their_shapes() {
     let mut some = Random(23);
