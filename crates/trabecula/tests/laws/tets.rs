@@ -247,6 +247,27 @@ fn edges_and_corners_of_a_mesh_are_met() {
     }
 }
 
+/// A channel of triangles with walls thinner than a size, inner corners of which lie on edges of the lattice.
+#[test]
+fn inner_corners_of_a_thin_channel_are_met() {
+    let outline =
+        [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [18.5, 20.0], [18.5, 1.5], [1.5, 1.5], [1.5, 20.0], [0.0, 20.0]];
+    let vertices = [0.0, 40.0].iter().flat_map(|z| outline.map(|[x, y]| [x, y, *z])).collect();
+    let end = [[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4], [0, 5, 6], [0, 6, 7]];
+    let ends = end.iter().flat_map(|[a, b, c]| [[*a, *c, *b], [a + 8, b + 8, c + 8]]);
+    let walls = (0..8u32).flat_map(|i| {
+        let j = (i + 1) % 8;
+        [[i, j, j + 8], [i, j + 8, i + 8]]
+    });
+    let triangles = Mesh { vertices, triangles: ends.chain(walls).collect() };
+    let region: Region = Arc::new(MeshRegion::new(triangles, Repair::Refuse).expect("region"));
+    let (mesh, fit) = mesh(&region, &Grade::Constant(2.0));
+    sound("channel", &mesh);
+    angles("channel", &mesh);
+    assert!(fit.to_part.max < 1e-9 && fit.from_part.max < 1e-9 && fit.lost.is_empty(), "{fit:?}");
+    assert!((mesh.volume() - 3420.0).abs() < 1e-9 * 3420.0, "{}", mesh.volume());
+}
+
 /// A plate with holes of a radius of half the size: finer tetrahedra around them, nothing filled.
 #[test]
 fn holes_are_kept_by_finer_tetrahedra() {
