@@ -36,8 +36,11 @@ const STRETCH: [f64; 2] = [0.67, 1.5];
 /// A mesh that was made.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
-    /// The tetrahedra.
+    /// The tetrahedra, with the nodes of the boundary on the region's surface.
     pub mesh: TetMesh,
+    /// The nodes of the same tetrahedra shifted so that the volume between their flat faces and the surface balances; not shifted where there
+    /// are layers.
+    pub balanced: Vec<Vec3>,
     /// The volume (mm³) left out where the boundary would be non-manifold, of flat tetrahedra at it, and of small detached fragments.
     pub left_out: f64,
     /// The layers of prisms, if any.
@@ -162,6 +165,7 @@ impl Cuts {
             checkpoint();
             partition.cut(s, cube);
         }
+        partition.join_planes();
         let (shaping, dropped) = prepared(partition, true);
         shaped(shaping, cube, dropped, layers)
     }
@@ -181,9 +185,14 @@ fn shaped(mut shaping: Shaping, cube: f64, dropped: f64, layers: Option<&PrismLa
     // What leaves nothing has no triangle to choose: other ways may.
     let layers = layers.filter(|_| shaping.tets.iter().any(|t| *t != GONE));
     let made = layers.map(|layers| shaping.layered(layers, MOST)).transpose()?;
-    let tets = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
-    let mesh = TetMesh { nodes: shaping.nodes, tets, zones: Vec::new() }.compact();
-    Ok(Background { mesh, left_out: dropped + shelled, layers: made })
+    let tets: Vec<[u32; 4]> = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
+    let of = |nodes: &[Vec3]| TetMesh { nodes: nodes.to_vec(), tets: tets.clone(), zones: Vec::new() }.compact();
+    let mesh = of(&shaping.nodes);
+    // Flat tetrahedra leave the nodes of layers no room: some would move and others not.
+    if made.is_none() {
+        shaping.balance(true);
+    }
+    Ok(Background { mesh, balanced: of(&shaping.nodes).nodes, left_out: dropped + shelled, layers: made })
 }
 
 /// The edges of the lattice's cubes, near the requested one, for which the region's bounding planes are planes of the lattice: of corners

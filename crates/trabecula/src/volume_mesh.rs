@@ -142,7 +142,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     let loose = if options.largest && one { keep_largest(&mut shaping) } else { 0.0 };
     if options.order == 1 {
-        shaping.balance();
+        shaping.balance(false);
     }
     let mut made = assembled(shaping, &domains, (&planes, &bounds), named, options).map_err(Stopped::Refused)?;
     (made.dropped, made.loose, made.step) = (dropped, loose, cubes.step());

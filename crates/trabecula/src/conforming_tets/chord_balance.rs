@@ -74,9 +74,10 @@ struct Chords {
 
 impl Shaping<'_> {
     /// Shifts nodes on curved surfaces so that the volume of each domain is right to higher order than its chords: the distances that are left
-    /// are balanced again, and nothing is shifted to where sheets that nearly touch would cross.
-    pub fn balance(&mut self) {
-        let (chords, before) = (self.chords(), self.nodes.clone());
+    /// are balanced again, and nothing is shifted to where sheets that nearly touch would cross. Faces as `coarse` as the facets of a mesh,
+    /// a region's, lie across its creases and balance too.
+    pub fn balance(&mut self, coarse: bool) {
+        let (chords, before) = (self.chords(coarse), self.nodes.clone());
         for _ in 0..PASSES {
             let by = self.shifts(&chords, &before);
             self.shift(by);
@@ -87,13 +88,13 @@ impl Shaping<'_> {
         self.shapes = self.tets.par_iter().map(shape_of).collect();
     }
 
-    fn chords(&self) -> Chords {
+    fn chords(&self, coarse: bool) -> Chords {
         let faces = interfaces(&self.tets, &self.domain, &|n| self.on[n as usize] != 0);
         // (surface, edge) of each face on a curved surface.
         let of = |f: &[u32; 3]| {
             let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
-            // Between the creases of a mesh, a region's, it is flat, and across them a chord tells nothing.
-            let flat = |s: &Surface| s.plane.is_some() || s.cut && !s.creases.segments.is_empty();
+            // Between the creases of a mesh, a region's, it is flat, and a single chord across them tells nothing.
+            let flat = |s: &Surface| s.plane.is_some() || !coarse && s.cut && !s.creases.segments.is_empty();
             let smooth = |s: usize| !flat(&self.surfaces[s]);
             members(set).next().filter(|_| members(set).all(smooth))
         };

@@ -29,6 +29,13 @@ pub(crate) fn members(mut set: SurfaceSet) -> impl Iterator<Item = usize> {
     })
 }
 
+/// A set without planes that are the same as an earlier one: those of boxes that touch or overlap.
+pub(crate) fn distinct(surfaces: &[Surface], set: SurfaceSet) -> SurfaceSet {
+    let plane = |i: usize| surfaces[i].plane.map(|p| (p.axis, p.at));
+    let again = |i: usize, kept| plane(i).is_some_and(|p| members(kept).any(|j| plane(j) == Some(p)));
+    members(set).fold(set & HELD, |kept, i| if again(i, kept) { kept } else { kept | only(i) })
+}
+
 /// Values and gradients of the surfaces of a set, at most three, at a point. Of a plane normal to an axis they are exact.
 fn sampled(surfaces: &[Surface], set: SurfaceSet, p: Vec3) -> ([(f64, Vec3); 3], usize) {
     let (mut out, mut count) = ([(0.0, [0.0; 3]); 3], 0);
@@ -95,6 +102,7 @@ fn exact(surfaces: &[Surface], set: SurfaceSet, mut p: Vec3) -> Vec3 {
 /// The position on all surfaces of a set near `p`, by Newton's method with shortest steps; `None` if it is farther than
 /// `reach` (mm) from `p`, or there are more than three surfaces.
 pub(crate) fn onto(surfaces: &[Surface], set: SurfaceSet, p: Vec3, reach: f64) -> Option<Vec3> {
+    let set = distinct(surfaces, set);
     if set.count_ones() > 3 || set & HELD != 0 {
         return None;
     }
@@ -161,7 +169,7 @@ impl Tangent {
 
 /// The displacement of a node on a set of surfaces by given distances (mm) along their gradients; nothing along those without.
 pub(crate) fn balanced(surfaces: &[Surface], set: SurfaceSet, p: Vec3, wanted: &[(usize, f64)]) -> Option<Vec3> {
-    if set & HELD != 0 {
+    if set & HELD != 0 || set.count_ones() > 3 {
         return None;
     }
     let (mut of, n) = sampled(surfaces, set, p);

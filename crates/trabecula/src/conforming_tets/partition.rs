@@ -1,6 +1,6 @@
 //! A background of tetrahedra that is cut along the surfaces of a solid, one after another.
 
-use super::node_surfaces::{SurfaceSet, members};
+use super::node_surfaces::{SurfaceSet, members, only};
 use super::patch_cuts::Patched;
 use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
@@ -89,6 +89,16 @@ impl Partition<'_> {
     pub fn domains(&self) -> Vec<u8> {
         let of = |t: &Tet| self.trees.iter().position(|tree| t.may_be_in(tree)).unwrap_or(0) as u8;
         by_sides(&self.tets, of)
+    }
+
+    /// Puts nodes on the first of surfaces that are the same plane, as of boxes that touch or overlap: on two, they would count as nodes on
+    /// an edge and stay where they are.
+    pub fn join_planes(&mut self) {
+        let plane = |i: usize| self.surfaces[i].plane.map(|p| (p.axis, p.at));
+        let first = |i: usize| (0..i).find(|j| plane(*j).is_some() && plane(*j) == plane(i)).unwrap_or(i);
+        let firsts: Vec<usize> = (0..self.surfaces.len()).map(first).collect();
+        let joined = |set: SurfaceSet| members(set).fold(0, |all, i| all | only(firsts[i]));
+        self.on.iter_mut().for_each(|set| *set = joined(*set));
     }
 
     /// The corners of a tetrahedron.

@@ -97,6 +97,11 @@ impl Partition<'_> {
         for g in patched.groups() {
             let dependent = self.met(patched, g);
             self.cut_where(g, &dependent, step);
+            // Nodes that moved onto the group have drawn others to it.
+            let drawn = self.drawn_to(patched, g);
+            if drawn.contains(&true) {
+                self.cut_where(g, &drawn, step);
+            }
         }
         self.settle(patched, step);
     }
@@ -121,6 +126,18 @@ impl Partition<'_> {
     /// Which tetrahedra depend on a mesh and meet a group of its patches.
     fn met(&self, patched: &Patched, group: usize) -> Vec<bool> {
         let of = |t: &Tet| t.depends_on(patched.mesh, self.trees) && patched.meets(group, &self.corners(t));
+        self.tets.par_iter().map(of).collect()
+    }
+
+    /// Which tetrahedra that depend on a mesh and have a node on a group of its patches meet that, and have not been cut along it.
+    fn drawn_to(&self, patched: &Patched, group: usize) -> Vec<bool> {
+        let bit = only(group);
+        let of = |t: &Tet| {
+            (t.negative | t.positive) & bit == 0
+                && t.nodes.iter().any(|n| self.on[*n as usize] & bit != 0)
+                && t.depends_on(patched.mesh, self.trees)
+                && patched.meets(group, &self.corners(t))
+        };
         self.tets.par_iter().map(of).collect()
     }
 

@@ -40,6 +40,8 @@ const NAMED: usize = 3;
 pub struct Tets {
     /// The mesh, checked.
     pub mesh: TetMesh,
+    /// Its nodes with those of the boundary on the region's surface, where it was made for one: between them, its flat faces balance about that.
+    pub on_surface: Option<Vec<Vec3>>,
     /// Numbers of zones with names, from its file.
     pub names: ZoneNames,
     /// Its figures.
@@ -188,7 +190,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let bounds = environment.region.bounds();
     let mut names = Vec::new();
-    let mut layers = None;
+    let (mut layers, mut balanced) = (None, None);
     let (mut mesh, mended, checked, mesher) = match spec {
         TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
@@ -198,6 +200,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
                 let made = background(environment.region, &bounds, &size, &inside, wanted.as_ref()).map_err(wrong)?;
                 layers = made.layers;
                 let Background { mesh, left_out, .. } = made;
+                balanced = Some(made.balanced);
                 (mesh, left_out, Checked::default(), "background".to_string())
             } else {
                 if made.layers.is_some() {
@@ -224,6 +227,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
         mesh.zones =
             zones(&mesh, made, &environment.path, environment.loader, Some(environment.region), environment.notes)?;
     }
+    let on_surface = balanced.map(|nodes| core::mem::replace(&mut mesh.nodes, nodes));
     let own = environment.region.volume().unwrap_or_else(|| {
         let (_, share) = sample::inside(environment.region, 25 * sample::COUNT);
         share * bounds.size().iter().product::<f64>()
@@ -237,7 +241,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     made.report.region_volume = Some(own);
     made.report.layers = layers;
     made.warnings.extend(layers.and_then(|l| lowered(&l, &environment.path)));
-    made.names = names;
+    (made.names, made.on_surface) = (names, on_surface);
     Ok(made)
 }
 
@@ -363,7 +367,7 @@ fn checked_mesh(
     };
     let report = TetReport { mesher, quality, fit, region_volume: None, layers: None };
     let warnings = warnings(&report, checked, path, is_made);
-    Ok(Tets { mesh, names: Vec::new(), report, warnings })
+    Ok(Tets { mesh, on_surface: None, names: Vec::new(), report, warnings })
 }
 
 /// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the

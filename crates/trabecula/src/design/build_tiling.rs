@@ -143,7 +143,7 @@ pub(super) fn domain<'a>(
         TetsKind::Made(m) => m.joined.clone(),
         TetsKind::File(f) => f.joined.clone(),
     };
-    let (made, filled) = match soup {
+    let (mut made, filled) = match soup {
         Some(made) => (made, Some(region.clone())),
         None => {
             let (mut points, _) = sample::inside(region, sample::COUNT);
@@ -153,6 +153,10 @@ pub(super) fn domain<'a>(
         }
     };
     notes.borrow_mut().warnings.extend(made.warnings);
+    // A lattice ends on the surface itself.
+    if let Some(nodes) = made.on_surface {
+        made.mesh.nodes = nodes;
+    }
     let wrong = |f| DesignError::fault(&path, f);
     let (map, region, fit) = match filled {
         Some(region) => (Tets::new(&made.mesh, joined.overlap).map_err(wrong)?, region, MeshFit::Whole),

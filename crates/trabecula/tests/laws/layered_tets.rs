@@ -6,7 +6,7 @@ use geometry::math::Vec3;
 use geometry::tetmesh::TetMesh;
 use trabecula::grade::Grade;
 use trabecula::mesher::{Background, PrismLayers, background};
-use trabecula::region::{Cylinder, Difference, Region};
+use trabecula::region::{Cylinder, Difference, Region, Union};
 
 use crate::common::{Random, cases, cuboid, fault, region, within};
 
@@ -157,25 +157,43 @@ fn with_edges(kind: usize, some: &mut Random) -> (Region, f64) {
 
 /// At sharp edges columns are tilted and shortened until their tetrahedra have fair angles: no less than 0.4 of those of right prisms as high
 /// as layers are asked to be, or of 15 degrees if these are less, and none above 172 degrees.
+fn fair_layers(what: &str, space: &Region, size: f64, some: &mut Random) {
+    let count = 1 + (some.share() * 3.0) as u32;
+    let asked = layers(count, size * some.between(0.2, 0.6) / f64::from(count), some.between(1.0, 1.2), None);
+    let height = asked.ends[0];
+    let what = format!("{what}, size {size}, {count} layers of {height}");
+    let plain = made(space, size, None).mesh;
+    let layered = made(space, size, Some(asked));
+    sound(&what, &layered.mesh);
+    assert!((layered.mesh.volume() / plain.volume() - 1.0).abs() < 1e-12, "{what}");
+    let found = layered.layers.expect("layers");
+    assert_eq!(found.prisms, count as usize * plain.boundary().triangles.len(), "{what}: {found:?}");
+    assert!(found.mean > 0.6 && found.mean <= 1.0 && found.least <= found.mean, "{what}: {found:?}");
+    let angles = layered.mesh.quality().expect("tetrahedra").dihedral;
+    let right = (height / size).atan().to_degrees().min(15.0);
+    assert!(angles.min > 0.4 * right && angles.max < 172.0, "{what}: {} to {}", angles.min, angles.max);
+}
+
 #[test]
 fn layers_of_parts_with_edges_have_no_flat_tetrahedra() {
     let mut some = Random(31);
     for i in 0..cases(8) as usize {
         let (space, thick) = with_edges(i % 4, &mut some);
         let size = thick * some.between(0.35, 0.5);
-        let count = 1 + (some.share() * 3.0) as u32;
-        let asked = layers(count, size * some.between(0.2, 0.6) / f64::from(count), some.between(1.0, 1.2), None);
-        let height = asked.ends[0];
-        let what = format!("kind {}, size {size}, {count} layers of {height}", i % 4);
-        let plain = made(&space, size, None).mesh;
-        let layered = made(&space, size, Some(asked));
-        sound(&what, &layered.mesh);
-        assert!((layered.mesh.volume() / plain.volume() - 1.0).abs() < 1e-12, "{what}");
-        let found = layered.layers.expect("layers");
-        assert_eq!(found.prisms, count as usize * plain.boundary().triangles.len(), "{what}: {found:?}");
-        assert!(found.mean > 0.6 && found.mean <= 1.0 && found.least <= found.mean, "{what}: {found:?}");
-        let angles = layered.mesh.quality().expect("tetrahedra").dihedral;
-        let right = (height / size).atan().to_degrees().min(15.0);
-        assert!(angles.min > 0.4 * right && angles.max < 172.0, "{what}: {} to {}", angles.min, angles.max);
+        fair_layers(&format!("kind {}", i % 4), &space, size, &mut some);
+    }
+}
+
+/// Brackets of two boxes that have planes in common, on which nodes move as on any other.
+#[test]
+fn layers_of_brackets_have_no_flat_tetrahedra() {
+    let mut some = Random(37);
+    for _ in 0..cases(6) {
+        let [thick, other] = [0; 2].map(|_| some.between(4.0, 8.0));
+        let [w, d, h] = [0; 3].map(|_| some.between(15.0, 40.0));
+        let legs = vec![cuboid([0.0; 3], [w, d, thick]), cuboid([0.0; 3], [other, d, h])];
+        let space: Region = Arc::new(Union::new(legs).expect("union"));
+        let size = thick * some.between(0.6, 1.2);
+        fair_layers(&format!("{w} x {d} x {h}, {thick} and {other} thick"), &space, size, &mut some);
     }
 }

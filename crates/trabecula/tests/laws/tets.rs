@@ -247,6 +247,27 @@ fn edges_and_corners_of_a_mesh_are_met() {
     }
 }
 
+/// A channel of triangles with walls thinner than a size, inner corners of which lie on edges of the lattice.
+#[test]
+fn inner_corners_of_a_thin_channel_are_met() {
+    let outline =
+        [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [18.5, 20.0], [18.5, 1.5], [1.5, 1.5], [1.5, 20.0], [0.0, 20.0]];
+    let vertices = [0.0, 40.0].iter().flat_map(|z| outline.map(|[x, y]| [x, y, *z])).collect();
+    let end = [[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4], [0, 5, 6], [0, 6, 7]];
+    let ends = end.iter().flat_map(|[a, b, c]| [[*a, *c, *b], [a + 8, b + 8, c + 8]]);
+    let walls = (0..8u32).flat_map(|i| {
+        let j = (i + 1) % 8;
+        [[i, j, j + 8], [i, j + 8, i + 8]]
+    });
+    let triangles = Mesh { vertices, triangles: ends.chain(walls).collect() };
+    let region: Region = Arc::new(MeshRegion::new(triangles, Repair::Refuse).expect("region"));
+    let (mesh, fit) = mesh(&region, &Grade::Constant(2.0));
+    sound("channel", &mesh);
+    angles("channel", &mesh);
+    assert!(fit.to_part.max < 1e-9 && fit.from_part.max < 1e-9 && fit.lost.is_empty(), "{fit:?}");
+    assert!((mesh.volume() - 3420.0).abs() < 1e-9 * 3420.0, "{}", mesh.volume());
+}
+
 /// A plate with holes of a radius of half the size: finer tetrahedra around them, nothing filled.
 #[test]
 fn holes_are_kept_by_finer_tetrahedra() {
@@ -267,6 +288,101 @@ fn holes_are_kept_by_finer_tetrahedra() {
     assert!(fit.mended == 0.0 && mesh.pieces().0 == 1, "{fit:?}");
     // A ball with three holes.
     assert_eq!(euler_number(&mesh), 2 - 2 * 3);
+}
+
+/// Parts with round holes and curved walls, and their volumes.
+fn round_parts() -> Vec<(&'static str, Region, f64)> {
+    let rod = |base: Vec3, axis: Vec3, radius: f64, height: f64| -> Region {
+        Arc::new(Cylinder::new(base, axis, radius, height).expect("cylinder"))
+    };
+    let less = |parts: Vec<Region>| -> Region { Arc::new(Difference::new(parts).expect("difference")) };
+    let z = [0.0, 0.0, 1.0];
+    let plate = |at: &[[f64; 2]], radius: f64| {
+        let holes = at.iter().map(|[x, y]| rod([*x, *y, -1.0], z, radius, 10.0));
+        less([cuboid([0.0; 3], [60.0, 40.0, 8.0])].into_iter().chain(holes).collect())
+    };
+    let pi = std::f64::consts::PI;
+    vec![
+        (
+            "plate with bolt holes",
+            plate(&[[8.0, 8.0], [52.0, 8.0], [8.0, 32.0], [52.0, 32.0]], 4.0),
+            19200.0 - 512.0 * pi,
+        ),
+        ("plate with wide holes", plate(&[[18.0, 20.0], [44.0, 20.0]], 9.0), 19200.0 - 1296.0 * pi),
+        ("slanted rod", rod([0.0; 3], [0.3, 0.2, 1.0], 6.0, 60.0), 2160.0 * pi),
+        ("tube", less(vec![rod([0.0; 3], z, 15.0, 60.0), rod([0.0, 0.0, -1.0], z, 10.0, 62.0)]), 7500.0 * pi),
+        ("ball", ball([0.1, 0.2, 0.3], 20.0), 32000.0 / 3.0 * pi),
+        ("cup", less(vec![rod([0.0; 3], z, 15.0, 40.0), rod([0.0, 0.0, 4.0], z, 11.0, 40.0)]), 4644.0 * pi),
+    ]
+}
+
+/// Nodes shifted so that flat faces balance about the surface: the part's volume to a part in two thousand at a fifteenth of its longest
+/// side, where that of chords is up to a twentieth off, and the part nearer to the mesh.
+#[test]
+fn flat_faces_balance_about_curved_surfaces() {
+    for (what, space, volume) in round_parts() {
+        let bounds = space.bounds();
+        let size = bounds.size().into_iter().fold(0.0, f64::max) / 15.0;
+        let made = background(&space, &bounds, &Grade::Constant(size), &inside(&*space, &bounds), None).expect("mesh");
+        let balanced = TetMesh { nodes: made.balanced, ..made.mesh.clone() };
+        sound(what, &balanced);
+        angles(what, &balanced);
+        let off = |mesh: &TetMesh| (mesh.volume() / volume - 1.0).abs();
+        let [by_chords, by_faces] = [&made.mesh, &balanced].map(off);
+        assert!(by_faces < 5e-4 && by_faces < by_chords, "{what}: {by_faces} of {by_chords}");
+        let [chords, faces] = [&made.mesh, &balanced].map(|m| fit_of(m, &space, made.left_out).from_part);
+        assert!(faces.p99 < size / 15.0, "{what}: {faces:?}");
+        assert!(faces.p99 < 0.7 * chords.p99 && faces.max < 0.85 * chords.max, "{what}: {faces:?} of {chords:?}");
+        println!("{what}: volume off {by_faces:.1e} of {by_chords:.1e}, p99 {:.3} of {:.3}", faces.p99, chords.p99);
+    }
+}
+
+/// Boxes that have planes in common, as the legs of an L or a U, next to each other or overlapping, and a pocket flush with a face.
+fn boxes_with_common_planes(kind: usize, some: &mut Random) -> (Region, f64, f64) {
+    let [w, d, h] = [0; 3].map(|_| some.between(15.0, 50.0));
+    let t = some.between(2.0, 5.0);
+    let joined = |parts: Vec<Region>| -> Region { Arc::new(Union::new(parts).expect("union")) };
+    let floor = cuboid([0.0; 3], [w, d, t]);
+    match kind {
+        0 => {
+            let other = t * some.between(0.7, 1.3);
+            (joined(vec![floor, cuboid([0.0; 3], [other, d, h])]), t, w * d * t + other * d * (h - t))
+        }
+        1 => {
+            let walls = [cuboid([0.0; 3], [w, t, h]), cuboid([0.0, d - t, 0.0], [w, d, h])];
+            (joined([floor].into_iter().chain(walls).collect()), t, w * d * t + 2.0 * w * t * (h - t))
+        }
+        2 => {
+            let walls = [cuboid([0.0, 0.0, t], [w, t, h]), cuboid([0.0, d - t, t], [w, d, h])];
+            (joined([floor].into_iter().chain(walls).collect()), t, w * d * t + 2.0 * w * t * (h - t))
+        }
+        _ => {
+            let pocket = cuboid([0.0, t, t], [w, d - t, h]);
+            let parts = vec![cuboid([0.0; 3], [w, d, h]), pocket];
+            (Arc::new(Difference::new(parts).expect("difference")), t, w * (d * h - (d - 2.0 * t) * (h - t)))
+        }
+    }
+}
+
+/// Nodes on a plane that two boxes have move along it as along any other: angles are fair, and flat faces stay where they are.
+#[test]
+fn boxes_with_common_planes_have_fair_angles() {
+    let mut some = Random(41);
+    let mut worst = [180.0f64, 0.0];
+    for i in 0..cases(16) as usize {
+        let (space, t, volume) = boxes_with_common_planes(i % 4, &mut some);
+        let bounds = space.bounds();
+        let size = t * some.between(0.8, 2.0);
+        let made = background(&space, &bounds, &Grade::Constant(size), &inside(&*space, &bounds), None).expect("mesh");
+        let what = format!("{i}: thickness {t}, size {size}");
+        sound(&what, &made.mesh);
+        let [least, greatest] = angles(&what, &made.mesh);
+        worst = [worst[0].min(least), worst[1].max(greatest)];
+        assert!(least > 14.0 && greatest < 160.0, "{what}: {least} to {greatest}");
+        assert!((made.mesh.volume() / volume - 1.0).abs() < 1e-12, "{what}");
+        assert!(made.balanced == made.mesh.nodes && made.left_out == 0.0, "{what}");
+    }
+    println!("boxes with common planes: {:.1} to {:.1}", worst[0], worst[1]);
 }
 
 #[test]
