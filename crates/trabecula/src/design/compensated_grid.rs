@@ -29,8 +29,8 @@ const GUESSED: i32 = 3;
 /// the level is known within a tenth.
 const NEAR: f64 = 2e-4;
 const SURE: f64 = 4e-3;
-/// The most moves, and the farthest that the level is moved: a share of the range of the cell's function.
-const ROUNDS: usize = 3;
+/// The most measurements, and the farthest that the level is moved: a share of the range of the cell's function.
+const ROUNDS: usize = 5;
 const FARTHEST: f64 = 0.1;
 /// The change of level, as a share of that range, from which its rate is taken.
 const NUDGE: f64 = 0.005;
@@ -131,7 +131,14 @@ fn found(
         let options = Options { resolution: step, islands: Islands::Keep };
         let made = match GridSurface(&solid).measure(&options, &stage(round + 1)) {
             Ok(made) => made.figures.size.volume,
-            Err(Stopped::Refused(_)) => break,
+            // Half as far: no mesh was made there.
+            Err(Stopped::Refused(_)) => match last {
+                Some([b, _]) => {
+                    by = 0.5 * (by + b);
+                    continue;
+                }
+                None => break,
+            },
             Err(stopped) => return Err(stopped),
         };
         let missing = aim * all - made;
