@@ -122,43 +122,67 @@ fn found(
         solid / flat
     };
     let nudge = NUDGE * width;
-    let mut rate = all * (share_at(nudge) - share_at(-nudge)) / (2.0 * nudge);
-    let move_by = |by: f64, rate: f64| Move { by, share: (by * rate / (aim * all)).abs() };
-    let (mut by, mut last): (f64, Option<[f64; 2]>) = (guess, None);
-    let mut best = (f64::INFINITY, 0.0);
-    for round in 0..ROUNDS {
+    let rate = all * (share_at(nudge) - share_at(-nudge)) / (2.0 * nudge);
+    let search = Search { aim: aim * all, near: (NEAR * aim).max(off) * all, rate, farthest: FARTHEST * width };
+    let mut rounds = 1..;
+    let (by, rate) = search.solve(guess, |by| {
         let solid = at(built, tiled, by);
         let options = Options { resolution: step, islands: Islands::Keep };
-        let made = match GridSurface(&solid).measure(&options, &stage(round + 1)) {
-            Ok(made) => made.figures.size.volume,
-            // Half as far: no mesh was made there.
-            Err(Stopped::Refused(_)) => match last {
-                Some([b, _]) => {
-                    by = 0.5 * (by + b);
-                    continue;
-                }
-                None => break,
-            },
-            Err(stopped) => return Err(stopped),
-        };
-        let missing = aim * all - made;
-        if missing.abs() < best.0 {
-            best = (missing.abs(), by);
+        match GridSurface(&solid).measure(&options, &stage(rounds.next().unwrap_or(ROUNDS))) {
+            Ok(made) => Ok(Some(made.figures.size.volume)),
+            Err(Stopped::Refused(_)) => Ok(None),
+            Err(stopped) => Err(stopped),
         }
-        if missing.abs() < (NEAR * aim).max(off) * all || rate <= 0.0 {
-            break;
+    })?;
+    Ok(Move { by, share: (by * rate / (aim * all)).abs() })
+}
+
+/// What a move of the level is sought for.
+struct Search {
+    /// The volume to be enclosed, and how far from it is near enough, mm³.
+    aim: f64,
+    near: f64,
+    /// How fast the volume grows with the level.
+    rate: f64,
+    /// The farthest move.
+    farthest: f64,
+}
+
+impl Search {
+    /// The move, from a guess on, and the rate of the volume there; `measure` has the volume at a move, if a surface can be made there.
+    fn solve(
+        &self,
+        guess: f64,
+        mut measure: impl FnMut(f64) -> Result<Option<f64>, Stopped>,
+    ) -> Result<(f64, f64), Stopped> {
+        let (mut by, mut rate, mut last): (f64, f64, Option<[f64; 2]>) = (guess, self.rate, None);
+        let mut best = (f64::INFINITY, 0.0);
+        for _ in 0..ROUNDS {
+            let Some(made) = measure(by)? else {
+                // Half as far: there may be a surface.
+                let Some([from, _]) = last else { break };
+                by = 0.5 * (by + from);
+                continue;
+            };
+            let missing = self.aim - made;
+            if missing.abs() < best.0 {
+                best = (missing.abs(), by);
+            }
+            if missing.abs() < self.near || rate <= 0.0 {
+                break;
+            }
+            if let Some([b, v]) = last {
+                let secant = (made - v) / (by - b);
+                rate = if secant > 0.2 * rate && secant < 5.0 * rate { secant } else { rate };
+            }
+            last = Some([by, made]);
+            by = (by + missing / rate).clamp(-self.farthest, self.farthest);
+            if missing.abs() < SURE * self.aim {
+                return Ok((by, rate));
+            }
         }
-        if let Some([b, v]) = last {
-            let secant = (made - v) / (by - b);
-            rate = if secant > 0.2 * rate && secant < 5.0 * rate { secant } else { rate };
-        }
-        last = Some([by, made]);
-        by = (by + missing / rate).clamp(-FARTHEST * width, FARTHEST * width);
-        if missing.abs() < SURE * aim * all {
-            return Ok(move_by(by, rate));
-        }
+        Ok((best.1, rate))
     }
-    Ok(move_by(best.1, rate))
 }
 
 impl CompensatedGrid<'_> {
@@ -187,5 +211,27 @@ impl SurfaceMaker for CompensatedGrid<'_> {
 
     fn estimate(&self, resolution: f64) -> Result<Estimate, Fault> {
         GridSurface(&self.0.solid).estimate(resolution)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A volume that grows by 23.4 mm³ a unit of the level, of which 20 are expected.
+    fn volume(by: f64) -> f64 {
+        27.2 + 23.4 * by + 4.0 * by * by
+    }
+
+    #[test]
+    fn a_level_at_which_there_is_no_surface_is_stepped_back_from() {
+        let search = Search { aim: 20.2, near: 0.004, rate: 20.0, farthest: 0.8 };
+        for refused in [-1.0, -0.35] {
+            let (by, rate) = search.solve(0.0, |by| Ok((by > refused).then(|| volume(by)))).expect("not stopped");
+            assert!((volume(by) - search.aim).abs() < SURE * search.aim, "{by}");
+            assert!((rate - 22.0).abs() < 2.0, "{rate}");
+        }
+        // Nowhere a surface: no move.
+        assert_eq!(search.solve(0.1, |_| Ok(None)).expect("not stopped").0, 0.0);
     }
 }
