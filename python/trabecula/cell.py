@@ -14,10 +14,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from .given import named, plain, settings
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .given import Vector
+    from .names import CellName, Component, TetName
+
 __all__ = ["file", "group", "names", "series", "term", "tet", "tet_facts", "tet_names"]
 
 
-def names() -> list[str]:
+def names() -> list[CellName]:
     """The names of the ready cells; each is a function of this module."""
     from . import _core
 
@@ -25,7 +32,7 @@ def names() -> list[str]:
 
 
 @named
-def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, component: str = "re") -> dict:
+def term(hkl: Sequence[int] | NDArray, amplitude: float = 1.0, phase: float = 0.0, component: Component = "re") -> dict:
     """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``.
 
     In a series with a group it is the real or imaginary part of amplitude · e^{2πi phase} Σ e^{2πi h·(R u + t)}, the sum
@@ -60,8 +67,8 @@ def file(
     path: str | os.PathLike[str],
     terms: int | None = None,
     threshold: float | None = None,
-    step: float | Sequence[float] | None = None,
-    period: float | Sequence[float] | None = None,
+    step: float | Vector | None = None,
+    period: float | Vector | None = None,
 ) -> dict:
     """A cell from a file: numbers over one period (npy), grey pictures one above the other (png, tif; "scan/*.png" or the
     folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves.
@@ -77,7 +84,7 @@ def file(
     return {"file": {"path": os.fspath(path), **more}}
 
 
-def tet_names() -> list[str]:
+def tet_names() -> list[TetName]:
     """The names of the ready tetrahedral cells."""
     from . import _core
 
@@ -96,14 +103,14 @@ def tet_facts(name: str) -> dict:
 
 @named
 def tet(
-    name: str | None = None,
+    name: TetName | None = None,
     *,
     group: int | str | None = None,
     terms: Iterable[dict] | None = None,
-    site: Sequence[float] | None = None,
+    site: Vector | None = None,
     dual: bool | None = None,
     edge: float | None = None,
-    zones: Mapping[int | str, str] | None = None,
+    zones: Mapping[int, str] | Mapping[str, str] | None = None,
 ) -> dict:
     """A tetrahedral cell, for ``map.tets``: a ready one by its name, your own, or a ready one for each of the mesh's ``zones``,
     by their numbers or their names in the mesh's file.
@@ -132,7 +139,7 @@ def group(symbol: int | str) -> dict:
     return {"number": number, "name": name, "operations": parts}
 
 
-def __getattr__(name: str) -> Callable[[], str]:
+def __getattr__(name: str) -> Callable[[], CellName]:
     known = [] if name.startswith("_") else names()
     if name not in known:
         from difflib import get_close_matches

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,6 +15,8 @@ from .files import extension, read_text, write_text
 from .given import copied, named, settings, three
 
 if TYPE_CHECKING:
+    from .given import Vector
+    from .names import BeamName, CellName, Dangling, Fit, PartName, Side, Trim, Unit
     from .solid import Solid
 
 #: Keys whose text names a file.
@@ -32,8 +34,8 @@ class Lattice:
     (f ≤ t) or "upper" (f ≥ t).
     """
 
-    cell: str | dict
-    part: str
+    cell: CellName | dict
+    part: PartName
     map: dict
     level: dict
 
@@ -63,7 +65,7 @@ class Beams:
     factor on them.
     """
 
-    cell: str | None = None
+    cell: BeamName | None = None
     map: dict | None = None
     radius: float | dict | None = None
     hub: float | dict | None = None
@@ -71,13 +73,13 @@ class Beams:
     struts: Any = None
     profile: str | dict | None = None
     fillet: str | dict | None = None
-    trim: str | None = None
-    dangling: str | None = None
+    trim: Trim | None = None
+    dangling: Dangling | None = None
     merge: float | None = None
     pattern: dict | None = None
     fraction: float | None = None
     path: str | os.PathLike[str] | None = None
-    unit: str | None = None
+    unit: Unit | None = None
     scale: float | None = None
 
     def __post_init__(self) -> None:
@@ -89,7 +91,7 @@ class Beams:
 
 
 @named
-def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
+def skin(thickness: float | dict, open: Side | dict | Iterable[Side | dict] | None = None) -> dict:
     """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
 
     ``open`` names what it leaves open: flat faces of the region, as sides of its bounds such as "-z" or by the planes of
@@ -260,11 +262,11 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
 @named
 def spartan(
     name: Literal["diamond", "gyroid"],
-    wavelength: float | Sequence[float] = (4, 4, 4),
-    rotate: Sequence[float] = (0, 0, 0),
+    wavelength: float | Vector = (4, 4, 4),
+    rotate: Vector = (0, 0, 0),
     porosity: float | dict = 0.7,
     region: dict | None = None,
-    fit: Literal["table", "spartan"] = "table",
+    fit: Fit = "table",
 ) -> Design:
     """The seven variables of "Equations for SPARTAN Gyroids and Diamonds" in one call.
 

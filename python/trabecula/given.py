@@ -19,12 +19,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    #: Numbers in order.
+    Vector = Sequence[float] | NDArray[Any]
+    #: Positions and the values taken there: {position: value}, or pairs.
+    Stops = Mapping[int, float] | Mapping[float, float] | Iterable[Vector]
+    #: Points [x, y, z], or the path of a table of them.
+    Points = Iterable[Vector] | str | os.PathLike[str]
+
     Builder = TypeVar("Builder", bound=Callable[..., Any])
 
 __all__ = [
     "QUEUES",
-    "Points",
-    "Stops",
     "check_keywords",
     "cluster_name",
     "control",
@@ -45,13 +50,6 @@ __all__ = [
     "three",
     "whole",
 ]
-
-#: Positions and the values taken there: {position: value}, or pairs.
-Stops = Mapping[float, float] | Iterable[Sequence[float]]
-
-#: Points [x, y, z], or the path of a table of them.
-Points = Iterable[Sequence[float]] | str | os.PathLike[str]
-
 
 #: How deep a design may nest; the core has the same limit.
 DEPTH = 64

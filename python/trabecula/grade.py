@@ -4,16 +4,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import Literal
 
-from .given import Points, Stops, control, named, pairs, settings
+from .given import control, named, pairs, settings
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .given import Points, Stops, Vector
 
 __all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
 
 
 @named
-def linear(along: Sequence[float], stops: Stops) -> dict:
+def linear(along: Vector, stops: Stops) -> dict:
     """Along a direction: piecewise linear in s = along · x, constant beyond the ends.
 
     along: The direction [x, y, z]; s is measured in multiples of its length.
@@ -23,7 +26,7 @@ def linear(along: Sequence[float], stops: Stops) -> dict:
 
 
 @named
-def steps(along: Sequence[float], stops: Stops) -> dict:
+def steps(along: Vector, stops: Stops) -> dict:
     """In steps along a direction: piecewise constant in s = along · x, the value of the last stop at or below s; before
     the first stop its value. Its gradient is 0 everywhere.
 
@@ -43,7 +46,7 @@ def depth(stops: Stops) -> dict:
 
 
 @named
-def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+def radial(stops: Stops, center: Vector | None = None, axis: Vector | None = None) -> dict:
     """By the distance from a point or a line: piecewise linear, constant beyond the ends.
 
     stops: Pairs [distance in mm, value], distance rising.
@@ -62,8 +65,8 @@ def formula(text: str) -> dict:
 @named
 def grid(
     path: str | os.PathLike[str],
-    origin: Sequence[float] | None = None,
-    step: float | Sequence[float] | None = None,
+    origin: Vector | None = None,
+    step: float | Vector | None = None,
     array: str | None = None,
     remap: Stops | None = None,
 ) -> dict:
@@ -155,12 +158,7 @@ def region(of: dict, width: float, remap: Stops | None = None) -> dict:
 
 
 @named
-def distance(
-    points: Points,
-    closed: bool | None = None,
-    axis: Sequence[float] | None = None,
-    sharpness: float | None = None,
-) -> dict:
+def distance(points: Points, closed: bool | None = None, axis: Vector | None = None, sharpness: float | None = None) -> dict:
     """Distance to a chain of straight segments through control points.
 
     points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]
@@ -174,12 +172,7 @@ def distance(
 
 
 @named
-def rbf(
-    points: Points,
-    values: Sequence[float] | None = None,
-    delta: float | None = None,
-    axis: Sequence[float] | None = None,
-) -> dict:
+def rbf(points: Points, values: Vector | None = None, delta: float | None = None, axis: Vector | None = None) -> dict:
     """Gaussian radial basis functions through control points: the sum of β exp(−r²/δ²).
 
     points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]

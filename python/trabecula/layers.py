@@ -17,7 +17,7 @@ from .outlines import outlines_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, overload
 
     import numpy as np
     from numpy.typing import NDArray
@@ -68,7 +68,7 @@ class Layer:
         return f"<trabecula.Layer at z = {self.z:g} mm: {len(self.loops)} contours, {self.area:.6g} mm²>"
 
 
-class Layers(Sequence):
+class Layers(Sequence["Layer"]):
     """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
 
     def __init__(self, solid: Solid, plan: dict[str, Any], threads: int | None):
@@ -86,7 +86,14 @@ class Layers(Sequence):
     def __len__(self) -> int:
         return len(self.heights) - 1
 
-    def __getitem__(self, index):
+    if TYPE_CHECKING:
+
+        @overload
+        def __getitem__(self, index: int) -> Layer: ...
+        @overload
+        def __getitem__(self, index: slice) -> list[Layer]: ...
+
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         try:

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
+    import meshio
     import numpy as np
+    import pyvista
+    import trimesh
     from numpy.typing import ArrayLike, NDArray
 
     from .reports import (
@@ -120,17 +123,18 @@ class Mesh(Drawn, Transformed):
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
-    def to_trimesh(self) -> Any:
+    def to_trimesh(self) -> trimesh.Trimesh:
         """The mesh as a ``trimesh.Trimesh``: the same vertices and triangles, not processed, with ``cut`` as an attribute of
         faces. An ImportError without trimesh.
         """
         from .bridges import package
 
         attributes = {"cut": self.cut.copy()}
-        trimesh = package("trimesh")
-        return trimesh.Trimesh(self.vertices.copy(), self.triangles.copy(), process=False, face_attributes=attributes)
+        return package("trimesh").Trimesh(
+            self.vertices.copy(), self.triangles.copy(), process=False, face_attributes=attributes
+        )
 
-    def to_pyvista(self) -> Any:
+    def to_pyvista(self) -> pyvista.PolyData:
         """The mesh as a ``pyvista.PolyData``, with ``cut`` as data of cells. An ImportError without pyvista."""
         import numpy as np
 
@@ -141,7 +145,7 @@ class Mesh(Drawn, Transformed):
         made.cell_data["cut"] = self.cut.astype(np.uint8)
         return made
 
-    def to_meshio(self) -> Any:
+    def to_meshio(self) -> meshio.Mesh:
         """The mesh as a ``meshio.Mesh`` of triangles, with ``cut`` as data of cells (0 or 1). An ImportError without meshio."""
         import numpy as np
 

@@ -9,6 +9,12 @@ from typing import Literal
 
 from .given import named, settings
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .given import Vector
+
 __all__ = [
     "box",
     "capsule",
@@ -27,11 +33,11 @@ __all__ = [
 
 @named
 def box(
-    size: Sequence[float] | None = None,
-    center: Sequence[float] | None = None,
+    size: Vector | None = None,
+    center: Vector | None = None,
     *,
-    min: Sequence[float] | None = None,
-    max: Sequence[float] | None = None,
+    min: Vector | None = None,
+    max: Vector | None = None,
 ) -> dict:
     """An axis-aligned box, by its size and centre, or by two corners.
 
@@ -44,7 +50,7 @@ def box(
 
 
 @named
-def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence[float] | None = None) -> dict:
+def cylinder(base: Vector, radius: float, height: float, axis: Vector | None = None) -> dict:
     """A straight round cylinder.
 
     base: Middle of the lower face. [mm]
@@ -56,7 +62,7 @@ def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence
 
 
 @named
-def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
+def sphere(radius: float, center: Vector | None = None) -> dict:
     """A ball.
 
     radius: Radius. [mm, above 0]
@@ -66,7 +72,7 @@ def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
 
 
 @named
-def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict:
+def capsule(start: Vector, end: Vector, radius: float) -> dict:
     """A capsule: all points within a distance of a straight segment.
 
     start: One end of the segment, the centre of a hemisphere. [mm]
@@ -77,7 +83,7 @@ def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict
 
 
 @named
-def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = None) -> dict:
+def tetrahedron(corners: Sequence[Vector] | NDArray, sharpness: float | None = None) -> dict:
     """A tetrahedron.
 
     corners: Its four corners, in any order. [mm]
@@ -89,7 +95,7 @@ def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = No
 
 
 @named
-def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
+def halfspace(point: Vector, normal: Vector) -> dict:
     """One side of a plane; it bounds nothing alone, so combine it.
 
     point: A point on the plane. [mm]
