@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
-from .errors import DesignError, DesignWarning
+from .errors import DesignError, warn_caller
 from .files import extension, read_text, write_text
 from .given import copied, named, settings, three
 
@@ -182,7 +181,7 @@ class Design:
         folder = self.folder or os.getcwd()
         made = Solid(self._checked().build(folder), folder)
         for warning in made.warnings:
-            warnings.warn(DesignWarning(warning["message"], warning["path"]), stacklevel=2)
+            warn_caller(warning["message"], warning["path"])
         return made
 
     def files(self) -> list[str]:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from functools import cached_property
 
 from . import _core
 from .drawn import Drawn
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, positive, thread_count, whole
@@ -279,11 +278,9 @@ class Mesh(Drawn, Transformed):
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         wall = 2 * self.volume / self.area
         if wanted is not None and wanted > wall / 2:
-            warnings.warn(
+            warn_caller(
                 f"step {wanted:g} mm is more than half the mean wall, {wall:.3g} mm (2 V / A): what is found is the size of "
                 f"voxels; use {wall / 8:.2g} mm or less",
-                DesignWarning,
-                stacklevel=2,
             )
         return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 

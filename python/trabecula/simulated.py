@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Callable
 from functools import cached_property
 
 from . import _core
 from .carrier import Carrier
-from .errors import DesignWarning
+from .errors import warn_caller
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
@@ -109,11 +108,9 @@ class Simulated:
             usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
             used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
             if used > size:
-                warnings.warn(
+                warn_caller(
                     f"an edge of {used:g} mm is used: two edges through the thinnest wall ({size:.3g} mm) would make about "
                     f"{count:.2g} tetrahedra; give an edge to have them",
-                    DesignWarning,
-                    stacklevel=2,
                 )
                 size, count = used, count * (size / used) ** 3
         if count > 3e8:
@@ -138,7 +135,7 @@ class Simulated:
         order = _order(order)
         made = Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
         if left := self._core.bodies:
-            warnings.warn(f"{', '.join(left)}: no part of the carrier, which is the lattice alone", DesignWarning, stacklevel=2)
+            warn_caller(f"{', '.join(left)}: no part of the carrier, which is the lattice alone")
         return made
 
     def voxel_elements(
@@ -186,7 +183,7 @@ class Simulated:
         size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
         made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
         if found := made._core.warning:
-            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+            warn_caller(f"{found[0]}: {found[1]}")
         warn_sharp(made)
         return made
 
@@ -216,14 +213,12 @@ class Simulated:
         if pieces > 1 and islands == "error":
             raise ValueError(f"the beams have {pieces} components that do not touch; drop or keep those other than the longest")
         if pieces > 1:
-            warnings.warn(
+            warn_caller(
                 f"the beams have {pieces} components that do not touch: loose ones are not held by supports on another; "
                 'islands = "drop" (--islands drop) leaves all but the longest out',
-                DesignWarning,
-                stacklevel=2,
             )
         if found := made._core.warning:
-            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+            warn_caller(f"{found[0]}: {found[1]}")
         return made
 
     def _thinnest_wall(self) -> tuple[str, float]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import math
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
 from .beam_files import save_beams
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
 from .given import flag, number, positions, positive, shard_bytes, thread_count
@@ -493,11 +492,9 @@ class Solid(Seen, Simulated, Resolution):
             made = self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
             meant = sum(of.pieces or 1 for of in self.report().beams.values())  # of beams, those that do not touch by design
             if made.solids > max(meant, 1):
-                warnings.warn(
+                warn_caller(
                     f"the file has {made.solids} solids that do not touch: a STEP file keeps all components, of which meshes "
                     "drop the small ones",
-                    DesignWarning,
-                    stacklevel=2,
                 )
             return made
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
 from .design import Design
 from .drawn import Picture
-from .errors import DesignError, DesignWarning
+from .errors import DesignError, warn_caller
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
 from .given import fixed, thread_count
@@ -165,5 +164,5 @@ def made_of(core: _core.TetMesh) -> TetMesh:
     """The mesh; its warnings are raised."""
     made = TetMesh(core)
     for path, message in core.warnings:
-        warnings.warn(DesignWarning(message, path), stacklevel=3)
+        warn_caller(message, path)
     return made

@@ -7,7 +7,6 @@ import math
 import os
 import re
 import tempfile
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -15,7 +14,7 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 from . import _core
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive
@@ -542,7 +541,7 @@ def warn_sharp(made: ShellMesh) -> None:
     place = ", ".join(f"{v:.4g}" for v in corners[worst].mean(axis=0))
     some = f"{counted(few, 'triangle')} of {len(least)} have an angle below {SHARP} degrees"
     message = f"{some}, the least is {least[worst]:.2g} at ({place}) mm: bending there is poor; another edge mostly has none"
-    warnings.warn(message, DesignWarning, stacklevel=3)
+    warn_caller(message)
 
 
 def warn_flaws(made: VolumeMesh, one: bool) -> None:
@@ -565,4 +564,4 @@ def warn_flaws(made: VolumeMesh, one: bool) -> None:
         angles = f"{figures.min_angle:.1f} to {figures.max_angle:.1f}"
         found += [f"dihedral angles run from {angles} degrees; a smaller edge mostly brings them to {SHARP} to {FLAT}"]
     for message in found:
-        warnings.warn(message, DesignWarning, stacklevel=3)
+        warn_caller(message)
