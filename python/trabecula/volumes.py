@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple
 
 from . import _core
 from .errors import warn_caller
+from .exchanged import LINES, TRIANGLES, Exchanged
 from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive
@@ -59,7 +60,7 @@ class VolumeSet(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-class FiniteElements:
+class FiniteElements(Exchanged):
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
     #: What a set needs that is held or loaded.
@@ -68,6 +69,7 @@ class FiniteElements:
     _writes: ClassVar[tuple[str, ...]]
     #: Those with fields.
     _with_fields: tuple[str, ...] = ("vtu", "xdmf")
+    elements: NDArray[np.uint32]
     sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
 
@@ -168,9 +170,11 @@ class FiniteElements:
             if np.isin(self.forces(name, force)[0], fast).all():
                 raise ValueError(f"all nodes of {name}, which is loaded, are held by {', '.join(held)}: the force does nothing")
 
-    def _of_elements(self) -> dict[str, NDArray]:
-        """What each element has."""
-        return {}
+    def _connected(self) -> NDArray[np.uint32]:
+        return self.elements
+
+    def _members(self) -> dict[str, tuple[NDArray, NDArray]]:
+        return {name: (of.nodes, of.elements) for name, of in self.sets.items()}
 
     def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
         """Young's modulus (MPa) and Poisson's ratio in a file: of all domains."""
@@ -297,6 +301,9 @@ class VolumeMesh(FiniteElements):
     def _of_elements(self) -> dict[str, NDArray]:
         return {"domain": self.domain}
 
+    def _names_of_domains(self) -> list[str]:
+        return self.domains
+
     def _check_loads(self) -> None:
         if self._figures.pairs:
             raise ValueError("a periodic mesh has steps of its own; leave out hold and load")
@@ -383,6 +390,7 @@ class ShellMesh(FiniteElements):
     """
 
     _writes = SHELL_WRITES
+    _kinds = TRIANGLES
     _of_sets = "edges on the border"
 
     def __init__(self, core: _core.Shells):
@@ -417,6 +425,9 @@ class ShellMesh(FiniteElements):
         """
         return self._named_sets()
 
+    def _of_nodes(self) -> dict[str, NDArray]:
+        return {"thickness": self.thickness}
+
     def report(self) -> ShellReport:
         """The figures: numbers of triangles and nodes, area, volume, thickness, angles, sets."""
         return copy.deepcopy(self._figures)
@@ -426,6 +437,7 @@ class BeamMesh(FiniteElements):
     """Beams as line elements along their axes, each with a circular section. Made by ``Solid.beam_mesh``."""
 
     _of_sets = "ends of elements"
+    _kinds = LINES
 
     def __init__(self, core: _core.BeamElements):
         self._core = core
@@ -456,6 +468,9 @@ class BeamMesh(FiniteElements):
         that come to them from elsewhere: an element, and 0 or 1.
         """
         return self._named_sets()
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return {"radius": self.radii}
 
     def report(self) -> BeamMeshReport:
         """The figures: numbers of elements, nodes and beams, length, volume, radii, sets."""
