@@ -116,9 +116,8 @@ class Simulated:
         if count > 3e8:
             raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
         fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
-        largest = islands == "drop"
-        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, largest, thread_count(threads), progress)
-        made = VolumeMesh(core, self._core.design)
+        plan = {"edge": size, "of": of, "order": order, "periodic": periodic, "largest": islands == "drop"}
+        made = VolumeMesh(self, plan, threads=thread_count(threads), progress=progress)
         if islands == "error" and (pieces := made.report().pieces) > 1:
             raise ValueError(f"the mesh has {pieces} components that do not touch; drop or keep those other than the largest")
         warn_flaws(made, one=one)
@@ -133,7 +132,7 @@ class Simulated:
         empty set, and for more than 256 domains.
         """
         order = _order(order)
-        made = Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
+        made = Carrier(self, {"order": order}, threads=thread_count(threads))
         if left := self._core.bodies:
             warn_caller(f"{', '.join(left)}: no part of the carrier, which is the lattice alone")
         return made
@@ -158,7 +157,8 @@ class Simulated:
         low, high = self.bounds
         count = math.prod((b - a) / size + 1 for a, b in zip(low, high, strict=True))
         fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
-        return VoxelElements(_core.VoxelElements.make(self._core, size, share, thread_count(threads), progress))
+        plan = {"step": size, "least": share}
+        return VoxelElements(self, plan, threads=thread_count(threads), progress=progress)
 
     def shell_mesh(
         self,
@@ -181,7 +181,8 @@ class Simulated:
         """
         order = _order(order, "triangles")
         size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
-        made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
+        plan = {"edge": size, "quadratic": order == 2}
+        made = ShellMesh(self, plan, threads=thread_count(threads), progress=progress)
         if found := made._core.warning:
             warn_caller(f"{found[0]}: {found[1]}")
         warn_sharp(made)
@@ -208,7 +209,8 @@ class Simulated:
         if islands not in ("keep", "drop", "error"):
             raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
         size = None if edge is None else positive("edge", edge)
-        made = BeamMesh(_core.BeamElements.make(self._core, size, order == 2, islands == "drop", thread_count(threads)))
+        plan = {"edge": size, "quadratic": order == 2, "largest": islands == "drop"}
+        made = BeamMesh(self, plan, threads=thread_count(threads))
         pieces = made.report().pieces
         if pieces > 1 and islands == "error":
             raise ValueError(f"the beams have {pieces} components that do not touch; drop or keep those other than the longest")

@@ -135,7 +135,7 @@ class Solid(Seen, Simulated, Resolution):
             if len(names) != 1:
                 raise ValueError(f"name one of the beams: {', '.join(names)}" if names else "the design has no beams")
             name = names[0]
-        return Quadors(self._core.quadors(name), self._core.whole_beams(name))
+        return Quadors(self, {"name": name})
 
     def report(self) -> DesignReport:
         """The figures without meshing: level, fraction and thickness of each lattice, lengths and counts of beams, the region,
@@ -622,7 +622,7 @@ class Solid(Seen, Simulated, Resolution):
         """
         spacing, _ = self._voxel_grid(step, per_cell)
         self._warn_thin(spacing, "step")
-        made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
+        made = Voxels(self, {"step": spacing}, threads=thread_count(threads), progress=progress)
         if step is not None or per_cell is not None:
             self._warn_beyond(spacing)
         self._warn_coarse(made.volume, spacing, "step")
@@ -725,7 +725,7 @@ class Solid(Seen, Simulated, Resolution):
         elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
         plan = {"layer": thick, "tolerance": within, "step": spacing, "begin": begin, "end": end, "adaptive": cusp}
-        return Layers(self, plan, thread_count(threads))
+        return Layers(self, plan, threads=thread_count(threads))
 
     def thickness(
         self,

@@ -20,6 +20,7 @@ from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive
 from .mesh import Mesh
+from .remade import Remade
 from .texts import counted
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -60,7 +61,7 @@ class VolumeSet(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-class FiniteElements(Exchanged):
+class FiniteElements(Remade, Exchanged):
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
     #: What a set needs that is held or loaded.
@@ -208,11 +209,9 @@ class FiniteElements(Exchanged):
 class VolumeMesh(FiniteElements):
     """Tetrahedra that conform to a solid's surfaces, edges and corners. Made by ``Solid.volume_mesh``."""
 
+    _make = staticmethod(_core.VolumeMesh.make)
     _with_fields = ("vtu", "xdmf", "msh")
-
-    def __init__(self, core: _core.VolumeMesh, design: str = ""):
-        self._core = core
-        self._design = design
+    _core: _core.VolumeMesh
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -342,10 +341,9 @@ class VoxelElements(FiniteElements):
     modulus in each set is ``E`` (MPa) times its mean fraction.
     """
 
+    _make = staticmethod(_core.VoxelElements.make)
     _writes = VOXEL_ELEMENT_WRITES
-
-    def __init__(self, core: _core.VoxelElements):
-        self._core = core
+    _core: _core.VoxelElements
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -389,12 +387,11 @@ class ShellMesh(FiniteElements):
     each resultant is that of a uniform traction on the wall's faces at the border. ``fields`` are for .vtu.
     """
 
+    _make = staticmethod(_core.Shells.make)
     _writes = SHELL_WRITES
     _kinds = TRIANGLES
     _of_sets = "edges on the border"
-
-    def __init__(self, core: _core.Shells):
-        self._core = core
+    _core: _core.Shells
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -436,11 +433,10 @@ class ShellMesh(FiniteElements):
 class BeamMesh(FiniteElements):
     """Beams as line elements along their axes, each with a circular section. Made by ``Solid.beam_mesh``."""
 
+    _make = staticmethod(_core.BeamElements.make)
     _of_sets = "ends of elements"
     _kinds = LINES
-
-    def __init__(self, core: _core.BeamElements):
-        self._core = core
+    _core: _core.BeamElements
 
     def __repr__(self) -> str:
         figures = self._figures
