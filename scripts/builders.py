@@ -88,7 +88,15 @@ CONTROL = {
 }
 
 
-def converted(name, schema, required):
+#: Kinds whose file may be given as data in memory: their type, what makes a file of them, and how they are given.
+HELD = {
+    "grid": ("ArrayLike", "grid", "Or the numbers themselves, an array (nx, ny, nz), with origin and step."),
+    "points": ("ArrayLike", "cloud", "Or the rows themselves, an array (n, 4) or a data frame."),
+    "mesh": ("MeshLike", "mesh", "Or a mesh in memory: ours, of trimesh, pyvista or meshio, or (vertices, triangles)."),
+}
+
+
+def converted(name, schema, required, kind_of_table):
     """The Python type of an argument, and the item of the table that it becomes."""
     of = resolved(schema)
     optional = "" if required else " | None = None"
@@ -99,6 +107,9 @@ def converted(name, schema, required):
         return f"Stops{optional}", f"{name}=pairs({name})"
     if "propertyNames" in of:
         return f"Mapping[int, {annotation(of['additionalProperties'])}]{optional}", f"{name}={name}"
+    if name == "path" and kind_of_table in HELD:
+        hint, maker, _ = HELD[kind_of_table]
+        return f"{PATH} | {hint}{optional}", f"path=held.path_of(path, held.{maker})"
     if name == "path":
         form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
         return f"{PATH}{optional}", f"path={form}"
@@ -143,9 +154,10 @@ def builder(name, schema):
         if keyword and not starred:
             signature.append("*")
             starred = True
-        kind, item = converted(key, value, required)
+        kind, item = converted(key, value, required, name)
         signature.append(f"{key}: {kind}")
-        rows.append(sentence(key, value, required))
+        more = f" {HELD[name][2]}" if key == "path" and name in HELD else ""
+        rows.append(sentence(key, value, required) + more)
         given.append(item)
     head = wrapped(f"def {name}(", signature, ") -> dict:")
     text = docstring(schema["description"], rows)
@@ -165,10 +177,12 @@ def module(definition, text):
     used += [f"from collections.abc import {generic}"] * bool(generic)
     used += ["from typing import Literal"] * ("Literal[" in body)
     given = ["named", *(n for n in ("control", "pairs", "settings") if f"{n}(" in body)]
-    lines += [*used, "", f"from .given import {', '.join(sorted(given))}", ""]
-    hinted = [n for n in ("Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
+    used_here = ["from . import held"] * ("held." in body)
+    lines += [*used, "", *used_here, f"from .given import {', '.join(sorted(given))}", ""]
+    hinted = [n for n in ("MeshLike", "Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
     lines += ["TYPE_CHECKING = False  # as type checkers know it, without the import", "if TYPE_CHECKING:"]
-    lines += ["    from numpy.typing import NDArray", ""] * ("NDArray" in body)
+    arrays = [n for n in ("ArrayLike", "NDArray") if n in body]
+    lines += [f"    from numpy.typing import {', '.join(arrays)}", ""] * bool(arrays)
     lines += [f"    from .given import {', '.join(hinted)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")
     for _, function in parts:

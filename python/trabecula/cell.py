@@ -12,11 +12,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from . import held
 from .given import named, plain, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from .given import Vector
     from .names import CellName, Component, TetName
@@ -64,14 +65,14 @@ def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
 
 @named
 def file(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | ArrayLike,
     terms: int | None = None,
     threshold: float | None = None,
     step: float | Vector | None = None,
     period: float | Vector | None = None,
 ) -> dict:
     """A cell from a file: numbers over one period (npy), grey pictures one above the other (png, tif; "scan/*.png" or the
-    folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves.
+    folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves. Or the numbers themselves, an array.
 
     Of a mesh the function is the signed periodic distance, positive inside and in edges of the cell, so ``part="upper"`` with
     ``iso`` 0 is the solid itself, but for what the waves leave out: ``truncation`` in a solid's report. ``period`` (mm, one
@@ -81,7 +82,7 @@ def file(
     ``step`` (mm, one or three) apart; without it the function is the numbers.
     """
     more = settings(terms=terms, threshold=threshold, step=step, period=period)
-    return {"file": {"path": os.fspath(path), **more}}
+    return {"file": {"path": held.path_of(path, held.grid), **more}}
 
 
 def tet_names() -> list[TetName]:

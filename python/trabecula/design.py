@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from .errors import DesignError, warn_caller
-from .files import extension, read_text, write_text
+from .files import extension, read_text, write_bytes, write_text
 from .given import copied, named, settings, three
+from .held import HELD, Held, content, file_name
 
 if TYPE_CHECKING:
     from .given import Vector
@@ -155,7 +156,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data = _moved(data, lambda path: os.path.abspath(os.path.join(folder, path)))
+        data = _moved(data, lambda path: path if path.startswith(HELD) else os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -179,7 +180,7 @@ class Design:
         from .solid import Solid
 
         folder = self.folder or os.getcwd()
-        made = Solid(self._checked().build(folder), folder)
+        made = Solid(self._checked().build(folder), folder, held_in(self.to_dict()))
         for warning in made.warnings:
             warn_caller(warning["message"], warning["path"])
         return made
@@ -187,19 +188,23 @@ class Design:
     def files(self) -> list[str]:
         """The files that the design reads, as absolute paths."""
         folder = self.folder or os.getcwd()
-        return [os.path.join(folder, name) for name in files_in(self.to_dict())]
+        return [os.path.join(folder, name) for name in files_in(self.to_dict()) if not name.startswith(HELD)]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right.
+        """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right; arrays, tables and
+        meshes in memory are written next to it, under names made of their SHA-256.
 
         Raises DesignError for a design that cannot be built: nothing else is written.
         """
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data = _moved(data, lambda path: _relative(os.path.join(old, path), new))
+        data = _moved(data, lambda path: path if path.startswith(HELD) else _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
+        for name in {name for name in files_in(data) if name.startswith(HELD)}:
+            write_bytes(os.path.join(new, file_name(name)), content(name))
+        checked = _core.Design.from_data(_moved(data, file_name))
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
         write_text(path, text)
 
@@ -208,7 +213,7 @@ def _keep(data: Any) -> None:
     """Copies what a frozen data class was given: it does not follow what becomes of that."""
     for name in (f.name for f in fields(data)):
         value = getattr(data, name)
-        if hasattr(value, "tolist") or isinstance(value, (Mapping, list, tuple, range)):
+        if not isinstance(value, (str, Lattice, Beams)):
             value = copied(value)
         if isinstance(value, dict):
             value = {k: replace(v) if isinstance(v, (Lattice, Beams)) else v for k, v in value.items()}
@@ -289,6 +294,11 @@ def spartan(
     )
     box = {"box": {"size": [4 * w for w in waves]}} if region is None else region
     return Design(region=box, lattice={name: lattice})
+
+
+def held_in(data: Any) -> list[Held]:
+    """The data in memory that plain data name."""
+    return [name for name in files_in(data) if isinstance(name, Held)]
 
 
 def files_in(data: Any) -> list[str]:

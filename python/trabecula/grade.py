@@ -6,10 +6,13 @@ from __future__ import annotations
 import os
 from typing import Literal
 
+from . import held
 from .given import control, named, pairs, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from .given import Points, Stops, Vector
 
 __all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
@@ -64,7 +67,7 @@ def formula(text: str) -> dict:
 
 @named
 def grid(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | ArrayLike,
     origin: Vector | None = None,
     step: float | Vector | None = None,
     array: str | None = None,
@@ -74,26 +77,28 @@ def grid(
 
     path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
         tif, DICOM): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns
-        run along x, rows along y, pictures along z; DICOM as its axes say.
+        run along x, rows along y, pictures along z; DICOM as its axes say. Or the numbers themselves, an array (nx, ny,
+        nz), with origin and step.
     origin: Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain
         it. [mm, optional]
     step: Distance between numbers, one or three. VTI, VTK and DICOM files contain it. [mm, optional]
     array: Name of the array, where a file has several. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"grid": settings(path=os.fspath(path), origin=origin, step=step, array=array, remap=pairs(remap))}
+    return {"grid": settings(path=held.path_of(path, held.grid), origin=origin, step=step, array=array, remap=pairs(remap))}
 
 
 @named
-def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: Stops | None = None) -> dict:
+def points(path: str | os.PathLike[str] | ArrayLike, neighbours: int | None = None, remap: Stops | None = None) -> dict:
     """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
     distance.
 
-    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file.
+    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file. Or the rows themselves, an array
+        (n, 4) or a data frame.
     neighbours: Number of nearest points that count. [from 1 to 64, default 8]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
+    return {"points": settings(path=held.path_of(path, held.cloud), neighbours=neighbours, remap=pairs(remap))}
 
 
 @named

@@ -7,13 +7,14 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
+from . import held
 from .given import named, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .given import Vector
+    from .given import MeshLike, Vector
 
 __all__ = [
     "box",
@@ -106,7 +107,7 @@ def halfspace(point: Vector, normal: Vector) -> dict:
 
 @named
 def mesh(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | MeshLike,
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
@@ -117,7 +118,8 @@ def mesh(
 ) -> dict:
     """A triangle mesh from a file (stl, 3mf, ply, obj, off), or the solids of a part from a CAD system (step, iges).
 
-    path: Path of the file, relative to the design file.
+    path: Path of the file, relative to the design file. Or a mesh in memory: ours, of trimesh, pyvista or meshio, or
+        (vertices, triangles).
     unit: Unit of the file's coordinates (mm unless given); 3MF, STEP and IGES files name their own. [optional]
     scale: Factor on all coordinates, after the unit. [above 0, default 1.0]
     repair: Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
@@ -131,7 +133,7 @@ def mesh(
     solid: Of a STEP or IGES file: name of the solid that is read (all of them unless given). [optional]
     """
     given = settings(
-        path=os.fspath(path),
+        path=held.path_of(path, held.mesh),
         unit=unit,
         scale=scale,
         repair=repair,

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .held import Held
     from .islands import Islands
     from .reports import (
         BeamsFileReport,
@@ -75,9 +76,11 @@ class Solid(Seen, Simulated, Resolution):
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
     """
 
-    def __init__(self, core: _core.Solid, folder: str = ""):
+    def __init__(self, core: _core.Solid, folder: str = "", held: Sequence[Held] = ()):
         self._core = core
         self._folder = folder
+        #: Data in memory that its design names, which are there as long as this.
+        self._held = held
 
     def __copy__(self) -> Solid:
         return self
@@ -86,7 +89,7 @@ class Solid(Seen, Simulated, Resolution):
         return self
 
     def __reduce__(self) -> tuple:
-        return _rebuilt, (self._core.design, self._folder)
+        return _rebuilt, (self._core.design, self._folder, self._held)
 
     def __repr__(self) -> str:
         (a, b, c), (d, e, f) = self.bounds
@@ -755,6 +758,6 @@ def _shards_in(name: str) -> str:
     return folder
 
 
-def _rebuilt(design: str, folder: str) -> Solid:
+def _rebuilt(design: str, folder: str, held: Sequence[Held] = ()) -> Solid:
     """A solid that was pickled."""
-    return Solid(_core.Design.from_text(design).build(folder), folder)
+    return Solid(_core.Design.from_text(design).build(folder), folder, held)
