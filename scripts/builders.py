@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Writes the Python builders of kinds, python/trabecula/region.py, from schema/design.json.
+"""Writes the Python builders of kinds, python/trabecula/region.py and its like, and the words of a design as types,
+python/trabecula/names.py, from schema/design.json.
 
 Keys, types, units, ranges, defaults and texts are declared once, in the core. What a signature adds to them is here: how values
 that Python has other forms for are converted, by the type that the schema names.
 """
 
 import json
+import re
 import sys
 import textwrap
 
@@ -29,15 +31,28 @@ def annotation(schema):
     if "type" not in of and "anyOf" in of:
         return " | ".join(dict.fromkeys(annotation(s) for s in of["anyOf"]))
     names = {"number": "float", "integer": "int", "boolean": "bool", "string": "str", "object": "dict"}
-    items = f"Sequence[{annotation(of['items'])}]" if "items" in of else ""
+    items = several(annotation(of["items"])) if "items" in of else ""
     return " | ".join(names.get(kind, items) for kind in types(of))
+
+
+def several(item):
+    """The Python type of a list of values; numbers may stand in an array too."""
+    return {
+        "float": "Vector",
+        "Vector": "Sequence[Vector] | NDArray",
+        "float | dict": "Sequence[float | dict] | Vector",
+    }.get(item, f"Sequence[{item}]")
 
 
 def literal(schema):
     """The annotation, with words as a Literal."""
     of = resolved(schema)
-    known = words(of)
-    return "Literal[" + ", ".join(f'"{w}"' for w in known) + "]" if known else annotation(of)
+    return choice(words(of)) if words(of) else annotation(of)
+
+
+def choice(known):
+    """The Python type of one of these words."""
+    return "Literal[" + ", ".join(f'"{w}"' for w in known) + "]"
 
 
 def sentence(name, schema, required):
@@ -73,7 +88,15 @@ CONTROL = {
 }
 
 
-def converted(name, schema, required):
+#: Kinds whose file may be given as data in memory: their type, what makes a file of them, and how they are given.
+HELD = {
+    "grid": ("ArrayLike", "grid", "Or the numbers themselves, an array (nx, ny, nz), with origin and step."),
+    "points": ("ArrayLike", "cloud", "Or the rows themselves, an array (n, 4) or a data frame."),
+    "mesh": ("MeshLike", "mesh", "Or a mesh in memory: ours, of trimesh, pyvista or meshio, or (vertices, triangles)."),
+}
+
+
+def converted(name, schema, required, kind_of_table):
     """The Python type of an argument, and the item of the table that it becomes."""
     of = resolved(schema)
     optional = "" if required else " | None = None"
@@ -84,6 +107,9 @@ def converted(name, schema, required):
         return f"Stops{optional}", f"{name}=pairs({name})"
     if "propertyNames" in of:
         return f"Mapping[int, {annotation(of['additionalProperties'])}]{optional}", f"{name}={name}"
+    if name == "path" and kind_of_table in HELD:
+        hint, maker, _ = HELD[kind_of_table]
+        return f"{PATH} | {hint}{optional}", f"path=held.path_of(path, held.{maker})"
     if name == "path":
         form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
         return f"{PATH}{optional}", f"path={form}"
@@ -128,9 +154,10 @@ def builder(name, schema):
         if keyword and not starred:
             signature.append("*")
             starred = True
-        kind, item = converted(key, value, required)
+        kind, item = converted(key, value, required, name)
         signature.append(f"{key}: {kind}")
-        rows.append(sentence(key, value, required))
+        more = f" {HELD[name][2]}" if key == "path" and name in HELD else ""
+        rows.append(sentence(key, value, required) + more)
         given.append(item)
     head = wrapped(f"def {name}(", signature, ") -> dict:")
     text = docstring(schema["description"], rows)
@@ -146,23 +173,57 @@ def module(definition, text):
     body = "\n".join(line for _, lines in parts for line in lines)
     lines = [STAMP, f'"""{text}"""', "", "from __future__ import annotations", ""]
     used = ["import os"] * ("os." in body)
-    used.append("from collections.abc import " + ", ".join(n for n in ("Mapping", "Sequence") if f"{n}[" in body))
+    generic = ", ".join(n for n in ("Mapping", "Sequence") if f"{n}[" in body)
+    used += [f"from collections.abc import {generic}"] * bool(generic)
     used += ["from typing import Literal"] * ("Literal[" in body)
-    helpers = ["Points", "Stops", "control", "pairs", "settings"]
-    given = sorted(["named", *(n for n in helpers if (f": {n}" if n[0].isupper() else f"{n}(") in body)])
-    lines += [*used, "", f"from .given import {', '.join(given)}", ""]
+    given = ["named", *(n for n in ("control", "pairs", "settings") if f"{n}(" in body)]
+    used_here = ["from . import held"] * ("held." in body)
+    lines += [*used, "", *used_here, f"from .given import {', '.join(sorted(given))}", ""]
+    hinted = [n for n in ("MeshLike", "Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
+    lines += ["TYPE_CHECKING = False  # as type checkers know it, without the import", "if TYPE_CHECKING:"]
+    arrays = [n for n in ("ArrayLike", "NDArray") if n in body]
+    lines += [f"    from numpy.typing import {', '.join(arrays)}", ""] * bool(arrays)
+    lines += [f"    from .given import {', '.join(hinted)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")
     for _, function in parts:
         lines += ["", "", "@named", *function]
     return "\n".join(lines) + "\n"
 
 
+#: Words of a design that are types of arguments: of each the definition, or the definition and the key.
+WORDS = {
+    "BeamName": ("Beams", "cell"),
+    "CellName": ("Lattice", "cell"),
+    "Component": ("Component",),
+    "Dangling": ("Dangling",),
+    "Fit": ("Fit",),
+    "Of": ("Of",),
+    "PartName": ("Part",),
+    "Side": ("Side",),
+    "TetName": ("TetCell", "name"),
+    "Trim": ("Trim",),
+    "Unit": ("Unit",),
+}
+
+
+def names():
+    """The module of words as types."""
+    lines = [STAMP, '"""Words of a design, as types."""', "", "from typing import Literal", ""]
+    lines += [*wrapped("__all__ = [", [f'"{name}"' for name in WORDS], "]"), ""]
+    for name, (definition, *key) in WORDS.items():
+        of = SCHEMA["$defs"][definition]
+        for part in key:
+            of = of["properties"][part]
+        lines += wrapped(f"{name} = Literal[", [f'"{w}"' for w in words(of) or resolved(of)["then"]["enum"]], "]")
+    return "\n".join(lines) + "\n"
+
+
 def main():
     """Write the modules, or with --check say which are stale."""
     stale = []
-    for name, (definition, text) in FAMILIES.items():
+    modules = {name: module(*family) for name, family in FAMILIES.items()} | {"names": names()}
+    for name, made in modules.items():
         path = ROOT / "python" / "trabecula" / f"{name}.py"
-        made = module(definition, text)
         if "--check" in sys.argv[1:]:
             stale += [name] * (path.read_text(encoding="utf-8") != made)
         else:

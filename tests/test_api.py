@@ -146,6 +146,32 @@ def test_pickles_and_copies():
     assert rebuilt.report() == solid.report() and pickle.loads(pickle.dumps(design)) == design
 
 
+#: What is made of a solid or of beams, and the arrays and figures of it.
+PLANNED = {
+    "Layers": (lambda of: of.layers(layer=1.0), lambda it: [it.heights, *([at.z, at.area, *at.loops] for at in it)]),
+    "ShellMesh": (lambda of: of.shell_mesh(edge=0.5), lambda it: [it.nodes, it.elements, it.thickness, it.report()]),
+    "VolumeMesh": (lambda of: of.volume_mesh(edge=0.35, of="all"), lambda it: [it.nodes, it.elements, it.domain, it.report()]),
+    "VoxelElements": (lambda of: of.voxel_elements(step=0.5), lambda it: [it.nodes, it.elements, it.fraction, it.report()]),
+    "Voxels": (lambda of: of.voxels(step=0.25).moved((1, 2, 3)).scaled(0.7), lambda it: [it.origin, it.step, it.solid]),
+    "BeamMesh": (lambda of: of.beam_mesh(), lambda it: [it.nodes, it.elements, it.radii, it.report()]),
+    "Quadors": (lambda of: of.quadors(), lambda it: [it.volume(), it.whole, *it.fillets().values()]),
+    "Slice": (lambda of: of.quadors().slice(z=0.1), lambda it: [it.area, it.hubs, *it.polygons(0.01)]),
+}
+
+
+@pytest.mark.filterwarnings("ignore::trabecula.DesignWarning")
+@pytest.mark.parametrize("kind", PLANNED)
+def test_what_solids_make_is_pickled_and_copied(kind):
+    """Once and again, the same in every array and figure."""
+    beams = lt.Design(region=lt.region.box(size=[6] * 3), beams=lt.Beams("bcc", lt.map.affine(wavelength=3), radius=0.2))
+    make, parts = PLANNED[kind]
+    made = make((beams if kind in ("BeamMesh", "Quadors", "Slice") else cube()).build())
+    again = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(made))))
+    assert type(made) is type(again) and type(made).__name__ == kind and copy.deepcopy(made) is made is copy.copy(made)
+    assert repr(again) == repr(made)
+    np.testing.assert_equal(parts(again), parts(made))
+
+
 def test_corners_that_single_precision_parts_are_one(tmp_path):
     """Triangles of an STL whose corners differ in the last place are read as neighbours."""
     mesh = cube().build().mesh(edge=1.0)

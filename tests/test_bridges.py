@@ -71,3 +71,52 @@ def test_a_missing_package_is_named(ball: lt.Mesh, monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(__import__("sys").modules, "pyvista", None)
     with pytest.raises(ImportError, match="pyvista is not installed: pip install pyvista"):
         ball.to_pyvista()
+
+
+def elements_of(kind: str):
+    """A mesh of elements of each class."""
+    if kind == "TetMesh":
+        return lt.TetMesh.of({"region": region.box(size=[4, 4, 4]), "lattice": {"core": {"map": map.tets(size=2)}}})
+    box = region.box(size=[6, 6, 6])
+    if kind == "BeamMesh":
+        beams = lt.Beams("bcc", map.affine(wavelength=3), radius=0.2)
+        return lt.Design(box, beams=beams, set={"foot": region.box(size=[6, 6, 1], center=[0, 0, -3])}).build().beam_mesh()
+    core = lt.Lattice("gyroid", "sheet", map.affine(wavelength=3), level.fraction(0.4))
+    solid = lt.Design(box, core, skin=None if kind == "ShellMesh" else lt.skin(0.5)).build()
+    made = {
+        "VolumeMesh": lambda: solid.volume_mesh(edge=0.35, order=2, of="all"),
+        "ShellMesh": lambda: solid.shell_mesh(edge=0.4, order=2),
+        # meshio 5.3 confuses arrays of other sizes, such as steps of 0.5 mm make.
+        "VoxelElements": lambda: solid.voxel_elements(step=0.6),
+    }
+    return made[kind]()
+
+
+@pytest.mark.filterwarnings("ignore::trabecula.DesignWarning")
+@pytest.mark.parametrize("kind", ["VolumeMesh", "ShellMesh", "VoxelElements", "BeamMesh", "TetMesh"])
+def test_elements_go_to_other_packages_as_their_file_has_them(tmp_path, kind: str):
+    """A .vtu has sets of elements only where these are not those of faces."""
+    meshio = pytest.importorskip("meshio")
+    mesh = elements_of(kind)
+    assert type(mesh).__name__ == kind
+    mesh.write(tmp_path / "a.vtu")
+    file, made = meshio.read(tmp_path / "a.vtu"), mesh.to_meshio()
+    assert np.array_equal(made.points, file.points)
+    ((one, other),) = zip(made.cells, file.cells, strict=True)
+    assert one.type == other.type and np.array_equal(one.data, other.data)
+    assert set(made.cell_data) == set(file.cell_data) - set(made.cell_sets)
+    assert set(made.point_data) == set(file.point_data) - set(made.point_sets)
+    for name, (values,) in made.cell_data.items():
+        assert np.array_equal(values, file.cell_data[name][0].reshape(values.shape))
+    for name in set(made.cell_sets) & set(file.cell_data):
+        assert np.array_equal(np.flatnonzero(file.cell_data[name][0]), made.cell_sets[name][0])
+    for name, nodes in made.point_sets.items():
+        assert np.array_equal(np.flatnonzero(file.point_data[name]), nodes)
+    assert list(made.field_data) == (["WALL", "LOWER", "UPPER"] if kind == "VolumeMesh" else [])
+    pyvista = pytest.importorskip("pyvista")
+    theirs, back = mesh.to_pyvista(), pyvista.read(tmp_path / "a.vtu")
+    assert np.array_equal(theirs.points, back.points) and np.array_equal(theirs.cells, back.cells)
+    assert np.array_equal(theirs.celltypes, back.celltypes)
+    for one, other in ((theirs.point_data, back.point_data), (theirs.cell_data, back.cell_data)):
+        assert set(other) <= set(one) <= set(other) | set(made.cell_sets)
+        assert all(np.array_equal(one[name], other[name]) for name in other)

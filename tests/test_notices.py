@@ -5,14 +5,20 @@ import json
 import os
 import subprocess
 import sys
+import warnings
+from dataclasses import replace
 
 import pytest
+import trabecula as lt
 from conftest import CUBE
 from test_cli import COMMAND, names, run
 from test_islands import BALLS
 
 #: A sheet of walls 0.37 mm thick; a step of 0.5 mm is too coarse for it, as the warning says.
 COARSE = ("--edge", "0.5")
+LATTICE = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=4), level=lt.level.fraction(0.3))
+DESIGN = lt.Design(region=lt.region.box(size=[7.9, 7.9, 7.9]), lattice=LATTICE)
+SOLID = DESIGN.build()
 
 
 def piped(text, *words, cwd, status=0, env=None):
@@ -145,3 +151,29 @@ def test_a_warning_has_a_line_of_its_own(monkeypatch):
     assert shown[0] == "warning: lattice.a: a wall is thin"
     assert screen.getvalue().count("meshing:") == 5
     assert shown[1].strip() == "", "nothing of the progress line is left at the end"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda solid, place: solid.mesh(edge=0.5),
+        lambda solid, place: solid.measure(edge=0.5),
+        lambda solid, place: solid.parts(edge=0.5),
+        lambda solid, place: solid.thickness(edge=0.5),
+        lambda solid, place: solid.voxels(step=0.5),
+        lambda solid, place: solid.save(place / "a.stl", edge=0.5),
+        lambda solid, place: solid.save(place / "a.3mf", edge=0.5),
+        lambda solid, place: solid.save(place / "b.stl", edge=0.5, resume=True),
+        lambda solid, place: solid.save_voxels(place / "a.npy", step=0.5),
+        lambda solid, place: solid.render(place / "a.png", size=(80, 60), edge=0.5),
+        lambda solid, place: solid.view(edge=0.5),
+        lambda solid, place: solid.shell_mesh(edge=0.15),
+        lambda solid, place: replace(DESIGN, lattice=replace(LATTICE, level=lt.level.thickness(1.6))).build(),
+    ],
+)
+def test_a_warning_is_of_the_line_that_asks(tmp_path, call):
+    """Not of one in the package, by which nobody finds the call."""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        call(SOLID, tmp_path)
+    assert {(found.filename, found.lineno) for found in heard} == {(__file__, call.__code__.co_firstlineno)}

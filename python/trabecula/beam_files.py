@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import warnings
 
 from . import _core
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import extension, whole_file
 from .formats import BEAM_WRITES
 
@@ -39,11 +38,9 @@ def save_beams(
     clip = region_mesh(core) if core.cuts_beams() else None
     shown = shown_mesh(core, threads) if mesh else None
     if mesh and shown is None:
-        warnings.warn(
+        warn_caller(
             f"there are too many beams for a mesh of {MOST_SHOWN} triangles: programs that do not know the beam lattice "
             "extension show nothing of the file",
-            DesignWarning,
-            stacklevel=3,
         )
     title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
     with whole_file(path) as temporary:
@@ -53,7 +50,7 @@ def save_beams(
 def warned(made: BeamsFileReport) -> BeamsFileReport:
     """Warns of what the format cannot hold, before the file has its name: a warning may be an error."""
     for sentence in made.lost:
-        warnings.warn(sentence, DesignWarning, stacklevel=4)
+        warn_caller(sentence)
     return made
 
 

@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from .names import BeamName
+
 __all__ = ["cell", "cells", "names", "read"]
 
 
-def names() -> list[str]:
+def names() -> list[BeamName]:
     """The names of the cells."""
     return [it["name"] for it in cells()]
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .solid import Solid
+
     Progress = Callable[[int, int], Any]
 
 __all__ = ["Carrier"]
@@ -36,9 +38,10 @@ class Carrier(VolumeMesh):
     ``fields`` may have materials: ``carrier.moduli()``, {"C": carrier.stiffness().reshape(-1, 36)}.
     """
 
-    def __init__(self, core: _core.VolumeMesh, solid: _core.Solid):
-        super().__init__(core)
-        self._solid = solid
+    _make = staticmethod(_core.VolumeMesh.carrier)
+
+    def __init__(self, solid: Solid, plan: dict[str, Any], **how: Any):
+        super().__init__(solid, plan, **how)
         self._found: dict[tuple[float, int], list[tuple[list[float], list[float]]]] = {}
 
     def __repr__(self) -> str:
@@ -140,7 +143,7 @@ class Carrier(VolumeMesh):
     ) -> list[tuple[list[float], list[float]]]:
         """Of each domain C11, C12 and C44, and Young's modulus and Poisson's ratio of their mean; found once."""
         if (nu, n) not in self._found:
-            self._found[nu, n] = _core.VolumeMesh.carrier_materials(self._solid, nu, n, thread_count(threads), progress)
+            self._found[nu, n] = _core.VolumeMesh.carrier_materials(self._solid._core, nu, n, thread_count(threads), progress)
         return self._found[nu, n]
 
     def _of_elements(self) -> dict[str, NDArray]:

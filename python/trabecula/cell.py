@@ -12,12 +12,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from . import held
 from .given import named, plain, settings
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from .given import Vector
+    from .names import CellName, Component, TetName
 
 __all__ = ["file", "group", "names", "series", "term", "tet", "tet_facts", "tet_names"]
 
 
-def names() -> list[str]:
+def names() -> list[CellName]:
     """The names of the ready cells; each is a function of this module."""
     from . import _core
 
@@ -25,7 +33,7 @@ def names() -> list[str]:
 
 
 @named
-def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, component: str = "re") -> dict:
+def term(hkl: Sequence[int] | NDArray, amplitude: float = 1.0, phase: float = 0.0, component: Component = "re") -> dict:
     """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``.
 
     In a series with a group it is the real or imaginary part of amplitude · e^{2πi phase} Σ e^{2πi h·(R u + t)}, the sum
@@ -57,14 +65,14 @@ def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
 
 @named
 def file(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | ArrayLike,
     terms: int | None = None,
     threshold: float | None = None,
-    step: float | Sequence[float] | None = None,
-    period: float | Sequence[float] | None = None,
+    step: float | Vector | None = None,
+    period: float | Vector | None = None,
 ) -> dict:
     """A cell from a file: numbers over one period (npy), grey pictures one above the other (png, tif; "scan/*.png" or the
-    folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves.
+    folder "scan/"), or a mesh of the solid in one period; its largest ``terms`` waves. Or the numbers themselves, an array.
 
     Of a mesh the function is the signed periodic distance, positive inside and in edges of the cell, so ``part="upper"`` with
     ``iso`` 0 is the solid itself, but for what the waves leave out: ``truncation`` in a solid's report. ``period`` (mm, one
@@ -74,10 +82,10 @@ def file(
     ``step`` (mm, one or three) apart; without it the function is the numbers.
     """
     more = settings(terms=terms, threshold=threshold, step=step, period=period)
-    return {"file": {"path": os.fspath(path), **more}}
+    return {"file": {"path": held.path_of(path, held.grid), **more}}
 
 
-def tet_names() -> list[str]:
+def tet_names() -> list[TetName]:
     """The names of the ready tetrahedral cells."""
     from . import _core
 
@@ -96,14 +104,14 @@ def tet_facts(name: str) -> dict:
 
 @named
 def tet(
-    name: str | None = None,
+    name: TetName | None = None,
     *,
     group: int | str | None = None,
     terms: Iterable[dict] | None = None,
-    site: Sequence[float] | None = None,
+    site: Vector | None = None,
     dual: bool | None = None,
     edge: float | None = None,
-    zones: Mapping[int | str, str] | None = None,
+    zones: Mapping[int, str] | Mapping[str, str] | None = None,
 ) -> dict:
     """A tetrahedral cell, for ``map.tets``: a ready one by its name, your own, or a ready one for each of the mesh's ``zones``,
     by their numbers or their names in the mesh's file.
@@ -132,7 +140,7 @@ def group(symbol: int | str) -> dict:
     return {"number": number, "name": name, "operations": parts}
 
 
-def __getattr__(name: str) -> Callable[[], str]:
+def __getattr__(name: str) -> Callable[[], CellName]:
     known = [] if name.startswith("_") else names()
     if name not in known:
         from difflib import get_close_matches

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
 
 from . import _core, cell
 from . import beams as unit_cells
@@ -447,7 +448,7 @@ def doctor(args) -> None:
     print("\n".join(words(found)))
 
 
-def known_cell(name: str, known: list[str]) -> None:
+def known_cell(name: str, known: Sequence[str]) -> None:
     """Refuses the name of no cell."""
     if name not in known:
         from difflib import get_close_matches

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
-from .errors import DesignError, DesignWarning
-from .files import extension, read_text, write_text
+from .errors import DesignError, warn_caller
+from .files import extension, read_text, write_bytes, write_text
 from .given import copied, named, settings, three
+from .held import HELD, Held, content, file_name
 
 if TYPE_CHECKING:
+    from .given import Vector
+    from .names import BeamName, CellName, Dangling, Fit, PartName, Side, Trim, Unit
     from .solid import Solid
 
 #: Keys whose text names a file.
@@ -32,8 +34,8 @@ class Lattice:
     (f ≤ t) or "upper" (f ≥ t).
     """
 
-    cell: str | dict
-    part: str
+    cell: CellName | dict
+    part: PartName
     map: dict
     level: dict
 
@@ -63,7 +65,7 @@ class Beams:
     factor on them.
     """
 
-    cell: str | None = None
+    cell: BeamName | None = None
     map: dict | None = None
     radius: float | dict | None = None
     hub: float | dict | None = None
@@ -71,13 +73,13 @@ class Beams:
     struts: Any = None
     profile: str | dict | None = None
     fillet: str | dict | None = None
-    trim: str | None = None
-    dangling: str | None = None
+    trim: Trim | None = None
+    dangling: Dangling | None = None
     merge: float | None = None
     pattern: dict | None = None
     fraction: float | None = None
     path: str | os.PathLike[str] | None = None
-    unit: str | None = None
+    unit: Unit | None = None
     scale: float | None = None
 
     def __post_init__(self) -> None:
@@ -89,7 +91,7 @@ class Beams:
 
 
 @named
-def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
+def skin(thickness: float | dict, open: Side | dict | Iterable[Side | dict] | None = None) -> dict:
     """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
 
     ``open`` names what it leaves open: flat faces of the region, as sides of its bounds such as "-z" or by the planes of
@@ -154,7 +156,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data = _moved(data, lambda path: os.path.abspath(os.path.join(folder, path)))
+        data = _moved(data, lambda path: path if path.startswith(HELD) else os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -178,27 +180,31 @@ class Design:
         from .solid import Solid
 
         folder = self.folder or os.getcwd()
-        made = Solid(self._checked().build(folder), folder)
+        made = Solid(self._checked().build(folder), folder, held_in(self.to_dict()))
         for warning in made.warnings:
-            warnings.warn(DesignWarning(warning["message"], warning["path"]), stacklevel=2)
+            warn_caller(warning["message"], warning["path"])
         return made
 
     def files(self) -> list[str]:
         """The files that the design reads, as absolute paths."""
         folder = self.folder or os.getcwd()
-        return [os.path.join(folder, name) for name in files_in(self.to_dict())]
+        return [os.path.join(folder, name) for name in files_in(self.to_dict()) if not name.startswith(HELD)]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right.
+        """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right; arrays, tables and
+        meshes in memory are written next to it, under names made of their SHA-256.
 
         Raises DesignError for a design that cannot be built: nothing else is written.
         """
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data = _moved(data, lambda path: _relative(os.path.join(old, path), new))
+        data = _moved(data, lambda path: path if path.startswith(HELD) else _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
+        for name in {name for name in files_in(data) if name.startswith(HELD)}:
+            write_bytes(os.path.join(new, file_name(name)), content(name))
+        checked = _core.Design.from_data(_moved(data, file_name))
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
         write_text(path, text)
 
@@ -207,7 +213,7 @@ def _keep(data: Any) -> None:
     """Copies what a frozen data class was given: it does not follow what becomes of that."""
     for name in (f.name for f in fields(data)):
         value = getattr(data, name)
-        if hasattr(value, "tolist") or isinstance(value, (Mapping, list, tuple, range)):
+        if not isinstance(value, (str, Lattice, Beams)):
             value = copied(value)
         if isinstance(value, dict):
             value = {k: replace(v) if isinstance(v, (Lattice, Beams)) else v for k, v in value.items()}
@@ -260,11 +266,11 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
 @named
 def spartan(
     name: Literal["diamond", "gyroid"],
-    wavelength: float | Sequence[float] = (4, 4, 4),
-    rotate: Sequence[float] = (0, 0, 0),
+    wavelength: float | Vector = (4, 4, 4),
+    rotate: Vector = (0, 0, 0),
     porosity: float | dict = 0.7,
     region: dict | None = None,
-    fit: Literal["table", "spartan"] = "table",
+    fit: Fit = "table",
 ) -> Design:
     """The seven variables of "Equations for SPARTAN Gyroids and Diamonds" in one call.
 
@@ -288,6 +294,11 @@ def spartan(
     )
     box = {"box": {"size": [4 * w for w in waves]}} if region is None else region
     return Design(region=box, lattice={name: lattice})
+
+
+def held_in(data: Any) -> list[Held]:
+    """The data in memory that plain data name."""
+    return [name for name in files_in(data) if isinstance(name, Held)]
 
 
 def files_in(data: Any) -> list[str]:

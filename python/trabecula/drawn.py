@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Mapping
 from functools import cached_property
 
 from .camera import BACKGROUNDS, NO_SCALE, PROJECTIONS, section_plane, towards
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import extension, write_bytes
 from .given import check_keywords, named, number, parameters, positive, whole
 from .transforms import vector_of
@@ -390,4 +389,4 @@ def _paper(pixels: tuple[float, float], dpi: float | None) -> tuple[list[float],
 
 def _warn_small(seen: tuple, what: str) -> None:
     words = f"a picture of {seen[0]} × {seen[1]} pixels is too small for {what}: none is drawn"
-    warnings.warn(words, DesignWarning, stacklevel=3)
+    warn_caller(words)

@@ -9,12 +9,11 @@ import re
 import shutil
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from . import children
-from .errors import DesignWarning
+from .errors import warn_caller
 from .formats import MESHIO_READS, MESHIO_WRITES, TET_READS, dotted, kind_of
 
 if TYPE_CHECKING:
@@ -320,11 +319,9 @@ def kept_names(kind: str, names: list[Named]) -> list[Named]:
         plain = []
     lost = sorted({name for _, name in names} - {name for _, name in plain})
     if lost:
-        warnings.warn(
+        warn_caller(
             f"a .{kind} cannot hold {'the name' if len(lost) == 1 else 'the names'} {', '.join(lost):.300} of zones as "
             f"{'it is' if len(lost) == 1 else 'they are'}; numbers are kept",
-            DesignWarning,
-            stacklevel=3,
         )
     return plain
 

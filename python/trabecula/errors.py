@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-__all__ = ["DesignError", "DesignWarning", "IslandsWarning", "Refused", "WrongUsage"]
+import os
+import sys
+import warnings
+
+__all__ = ["DesignError", "DesignWarning", "IslandsWarning", "Refused", "WrongUsage", "warn_caller"]
+
+#: The folder of this package.
+HOME = os.path.dirname(__file__) + os.sep
 
 
 class DesignError(ValueError):
@@ -50,6 +57,14 @@ class DesignWarning(UserWarning):
 
 class IslandsWarning(DesignWarning):
     """A result in several connected components."""
+
+
+def warn_caller(message: str, path: str = "", kind: type[DesignWarning] = DesignWarning) -> None:
+    """Warns of a possible mistake, at the line outside of this package that asked for what it is about."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_code.co_filename.startswith(HOME):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(kind(message, path), stacklevel=level)
 
 
 class Refused(Exception):

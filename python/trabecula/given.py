@@ -16,15 +16,29 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeVar
 
+    import meshio
     import numpy as np
-    from numpy.typing import NDArray
+    import pyvista
+    import trimesh
+    from numpy.typing import ArrayLike, NDArray
+
+    from .mesh import Mesh
+
+    #: Numbers in order.
+    Vector = Sequence[float] | NDArray[Any]
+    #: Positions and the values taken there: {position: value}, or pairs.
+    Stops = Mapping[int, float] | Mapping[float, float] | Iterable[Vector]
+    #: Points [x, y, z], or the path of a table of them.
+    Points = Iterable[Vector] | str | os.PathLike[str]
+
+    #: A mesh in memory: ours, one of another package, or vertices and triangles.
+    MeshLike = Mesh | trimesh.Trimesh | pyvista.PolyData | meshio.Mesh | tuple[ArrayLike, ArrayLike]
 
     Builder = TypeVar("Builder", bound=Callable[..., Any])
 
 __all__ = [
     "QUEUES",
-    "Points",
-    "Stops",
+    "check_data",
     "check_keywords",
     "cluster_name",
     "control",
@@ -45,13 +59,6 @@ __all__ = [
     "three",
     "whole",
 ]
-
-#: Positions and the values taken there: {position: value}, or pairs.
-Stops = Mapping[float, float] | Iterable[Sequence[float]]
-
-#: Points [x, y, z], or the path of a table of them.
-Points = Iterable[Sequence[float]] | str | os.PathLike[str]
-
 
 #: How deep a design may nest; the core has the same limit.
 DEPTH = 64
@@ -176,7 +183,8 @@ def fixed(array: NDArray) -> NDArray:
 
 
 def plain(value: Any) -> Any:
-    """Arrays, tuples and ranges as lists."""
+    """Arrays, data frames, tuples and ranges as lists."""
+    value = value.to_numpy() if hasattr(value, "to_numpy") else value
     if hasattr(value, "tolist"):
         return value.tolist()
     return list(value) if isinstance(value, (tuple, range)) else value
@@ -193,6 +201,7 @@ def copied(data: Any, depth: int = 0) -> Any:
     """
     if depth > DEPTH:
         raise DesignError(f"a design is at most {DEPTH} levels deep; does it hold itself?")
+    check_data(data)
     data = plain(data)
     if isinstance(data, Mapping):
         for name in data:
@@ -200,6 +209,15 @@ def copied(data: Any, depth: int = 0) -> Any:
                 raise DesignError(f"the name {name!r} is no text; names of a design's keys, lattices and regions are")
         return {k: copied(zones(v) if k == "zones" else v, depth + 1) for k, v in data.items()}
     return [copied(v, depth + 1) for v in data] if isinstance(data, list) else data
+
+
+def check_data(given: Any) -> None:
+    """Refuses functions: a design is data."""
+    if callable(given) and not hasattr(given, "tolist"):
+        raise TypeError(
+            f"a design is data, which files can hold, and not code; found the function {getattr(given, '__name__', given)}: "
+            'give grade.formula("0.3 + 0.1*sin(x/5)"), or grade.grid(values, origin, step) of what it gives on a grid'
+        )
 
 
 def zones(given: Any) -> Any:

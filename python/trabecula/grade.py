@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import Literal
 
-from .given import Points, Stops, control, named, pairs, settings
+from . import held
+from .given import control, named, pairs, settings
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .given import Points, Stops, Vector
 
 __all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
 
 
 @named
-def linear(along: Sequence[float], stops: Stops) -> dict:
+def linear(along: Vector, stops: Stops) -> dict:
     """Along a direction: piecewise linear in s = along · x, constant beyond the ends.
 
     along: The direction [x, y, z]; s is measured in multiples of its length.
@@ -23,7 +29,7 @@ def linear(along: Sequence[float], stops: Stops) -> dict:
 
 
 @named
-def steps(along: Sequence[float], stops: Stops) -> dict:
+def steps(along: Vector, stops: Stops) -> dict:
     """In steps along a direction: piecewise constant in s = along · x, the value of the last stop at or below s; before
     the first stop its value. Its gradient is 0 everywhere.
 
@@ -43,7 +49,7 @@ def depth(stops: Stops) -> dict:
 
 
 @named
-def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+def radial(stops: Stops, center: Vector | None = None, axis: Vector | None = None) -> dict:
     """By the distance from a point or a line: piecewise linear, constant beyond the ends.
 
     stops: Pairs [distance in mm, value], distance rising.
@@ -61,9 +67,9 @@ def formula(text: str) -> dict:
 
 @named
 def grid(
-    path: str | os.PathLike[str],
-    origin: Sequence[float] | None = None,
-    step: float | Sequence[float] | None = None,
+    path: str | os.PathLike[str] | ArrayLike,
+    origin: Vector | None = None,
+    step: float | Vector | None = None,
     array: str | None = None,
     remap: Stops | None = None,
 ) -> dict:
@@ -71,26 +77,28 @@ def grid(
 
     path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
         tif, DICOM): one file, "scan/*.png" with a * in the last part for any text, or their folder, "scan/". Columns
-        run along x, rows along y, pictures along z; DICOM as its axes say.
+        run along x, rows along y, pictures along z; DICOM as its axes say. Or the numbers themselves, an array (nx, ny,
+        nz), with origin and step.
     origin: Position of the first number, of pictures the middle of the first pixel. VTI, VTK and DICOM files contain
         it. [mm, optional]
     step: Distance between numbers, one or three. VTI, VTK and DICOM files contain it. [mm, optional]
     array: Name of the array, where a file has several. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"grid": settings(path=os.fspath(path), origin=origin, step=step, array=array, remap=pairs(remap))}
+    return {"grid": settings(path=held.path_of(path, held.grid), origin=origin, step=step, array=array, remap=pairs(remap))}
 
 
 @named
-def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: Stops | None = None) -> dict:
+def points(path: str | os.PathLike[str] | ArrayLike, neighbours: int | None = None, remap: Stops | None = None) -> dict:
     """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
     distance.
 
-    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file.
+    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file. Or the rows themselves, an array
+        (n, 4) or a data frame.
     neighbours: Number of nearest points that count. [from 1 to 64, default 8]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
+    return {"points": settings(path=held.path_of(path, held.cloud), neighbours=neighbours, remap=pairs(remap))}
 
 
 @named
@@ -155,12 +163,7 @@ def region(of: dict, width: float, remap: Stops | None = None) -> dict:
 
 
 @named
-def distance(
-    points: Points,
-    closed: bool | None = None,
-    axis: Sequence[float] | None = None,
-    sharpness: float | None = None,
-) -> dict:
+def distance(points: Points, closed: bool | None = None, axis: Vector | None = None, sharpness: float | None = None) -> dict:
     """Distance to a chain of straight segments through control points.
 
     points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]
@@ -174,12 +177,7 @@ def distance(
 
 
 @named
-def rbf(
-    points: Points,
-    values: Sequence[float] | None = None,
-    delta: float | None = None,
-    axis: Sequence[float] | None = None,
-) -> dict:
+def rbf(points: Points, values: Vector | None = None, delta: float | None = None, axis: Vector | None = None) -> dict:
     """Gaussian radial basis functions through control points: the sum of β exp(−r²/δ²).
 
     points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]

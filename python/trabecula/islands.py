@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-
-from .errors import IslandsWarning
+from .errors import IslandsWarning, warn_caller
 
 __all__ = ["check_islands", "left_out", "warn_islands"]
 
@@ -36,4 +34,4 @@ def warn_islands(islands: IslandsReport, words: str) -> None:
     """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
     if islands.found > islands.dropped:
         message = f'the result is not in one piece: {words}; islands = "drop" (--islands drop) leaves all but the largest out'
-        warnings.warn(message, IslandsWarning, stacklevel=3)
+        warn_caller(message, kind=IslandsWarning)

@@ -14,10 +14,11 @@ from .formats import LAYER_WRITES, LAYERS
 from .given import number, positive, whole
 from .machine import fits
 from .outlines import outlines_svg
+from .remade import Remade
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, overload
 
     import numpy as np
     from numpy.typing import NDArray
@@ -68,17 +69,16 @@ class Layer:
         return f"<trabecula.Layer at z = {self.z:g} mm: {len(self.loops)} contours, {self.area:.6g} mm²>"
 
 
-class Layers(Sequence):
+class Layers(Remade, Sequence["Layer"]):
     """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
 
-    def __init__(self, solid: Solid, plan: dict[str, Any], threads: int | None):
-        self._solid = solid
-        #: How they are made: what ``_core.Layers.of`` takes besides the solid.
-        self._plan = plan
-        self._core = core = _core.Layers.of(solid._core, **plan)
+    _make = staticmethod(_core.Layers.of)
+
+    def __init__(self, solid: Solid, plan: dict[str, Any], threads: int | None = None):
+        super().__init__(solid, plan)
         self._threads = threads
         #: Where layers begin, and the end of the last one, mm.
-        self.heights: list[float] = core.heights
+        self.heights: list[float] = self._core.heights
 
     def __repr__(self) -> str:
         return f"<trabecula.Layers: {len(self)} from {self.heights[0]:g} to {self.heights[-1]:g} mm>"
@@ -86,7 +86,14 @@ class Layers(Sequence):
     def __len__(self) -> int:
         return len(self.heights) - 1
 
-    def __getitem__(self, index):
+    if TYPE_CHECKING:
+
+        @overload
+        def __getitem__(self, index: int) -> Layer: ...
+        @overload
+        def __getitem__(self, index: slice) -> list[Layer]: ...
+
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         try:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from .given import named
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .given import Vector
+    from .names import Fit, Of
 
 __all__ = ["fraction", "iso", "permeability", "pore", "porosity", "stiffness", "thickness"]
 
@@ -40,7 +43,7 @@ def pore(value: Amount, mid: float = 0.0) -> dict:
 
 
 @named
-def stiffness(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float = 0.3, n: int = 48, mid: float = 0.0) -> dict:
+def stiffness(value: Amount, along: Vector = (1.0, 0.0, 0.0), nu: float = 0.3, n: int = 48, mid: float = 0.0) -> dict:
     """Young's modulus of the periodic cell over that of the solid, ``along`` a direction in the axes of the cell: the fraction
     is solved for.
 
@@ -52,7 +55,7 @@ def stiffness(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), nu: float
 
 
 @named
-def permeability(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), n: int = 32, mid: float = 0.0) -> dict:
+def permeability(value: Amount, along: Vector = (1.0, 0.0, 0.0), n: int = 32, mid: float = 0.0) -> dict:
     """The permeability of the pore in mm², of both sides of a sheet together, ``along`` a direction in the axes of the cell:
     the fraction is solved for.
 
@@ -65,8 +68,8 @@ def permeability(value: Amount, along: Sequence[float] = (1.0, 0.0, 0.0), n: int
 @named
 def fraction(
     value: Amount,
-    of: str = "cell",
-    fit: str = "table",
+    of: Of = "cell",
+    fit: Fit = "table",
     mid: float = 0.0,
     thickness: float | None = None,
     pore: float | None = None,
@@ -86,8 +89,8 @@ def fraction(
 @named
 def porosity(
     value: Amount,
-    of: str = "cell",
-    fit: str = "table",
+    of: Of = "cell",
+    fit: Fit = "table",
     mid: float = 0.0,
     thickness: float | None = None,
     pore: float | None = None,
@@ -99,8 +102,8 @@ def porosity(
 def _level(
     key: str,
     value: Amount,
-    of: str = "cell",
-    fit: str = "table",
+    of: Of = "cell",
+    fit: Fit = "table",
     mid: float = 0.0,
     thickness: float | None = None,
     pore: float | None = None,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, overload
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, overload
 
 from . import _core
 from .given import number
@@ -11,15 +12,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["fraction", "iso"]
+    from .names import PartName
 
-PartName = Literal["sheet", "lower", "upper"]
+__all__ = ["fraction", "iso"]
 
 
 @overload
 def iso(cell: str | dict, fraction: float, part: PartName = "sheet") -> float: ...
 @overload
-def iso(cell: str | dict, fraction: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
+def iso(cell: str | dict, fraction: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
 def iso(cell, fraction, part="sheet"):
     """The level t at which this part of the cell has this solid fraction; numbers or arrays."""
     return _levels(cell, fraction, part, True)
@@ -28,7 +29,7 @@ def iso(cell, fraction, part="sheet"):
 @overload
 def fraction(cell: str | dict, iso: float, part: PartName = "sheet") -> float: ...
 @overload
-def fraction(cell: str | dict, iso: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
+def fraction(cell: str | dict, iso: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
 def fraction(cell, iso, part="sheet"):
     """The solid fraction of this part of the cell at level t; numbers or arrays."""
     return _levels(cell, iso, part, False)

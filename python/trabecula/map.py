@@ -7,16 +7,20 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from .given import Points, control, named, settings
+from .given import control, named, settings
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .given import Points, Vector
 
 __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
 
 @named
 def affine(
-    wavelength: float | Sequence[float] | None = None,
-    rotate: Sequence[float] | None = None,
-    offset: Sequence[float] | None = None,
+    wavelength: float | Vector | None = None,
+    rotate: Vector | None = None,
+    offset: Vector | None = None,
     skew: dict | None = None,
 ) -> dict:
     """A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
@@ -31,11 +35,7 @@ def affine(
 
 
 @named
-def spartan(
-    wavelength: float | Sequence[float] | None = None,
-    rotate: Sequence[float] | None = None,
-    offset: Sequence[float] | None = None,
-) -> dict:
+def spartan(wavelength: float | Vector | None = None, rotate: Vector | None = None, offset: Vector | None = None) -> dict:
     """The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
 
     wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness or a pore, from
@@ -48,28 +48,28 @@ def spartan(
 
 @named
 def phase(
-    wavelength: float | dict | Sequence[float | dict] | None = None,
-    rotate: Sequence[float | dict] | None = None,
+    wavelength: float | dict | Sequence[float | dict] | Vector | None = None,
+    rotate: Sequence[float | dict] | Vector | None = None,
     *,
     weight: float | dict | None = None,
     angle_weight: float | None = None,
     smooth: float | None = None,
     align: Literal["surface"] | None = None,
     align_depth: float | None = None,
-    stretch: Sequence[float] | None = None,
+    stretch: Vector | None = None,
     fix: Sequence[dict] | None = None,
     core: Literal["solid", "void"] | None = None,
     core_radius: float | None = None,
-    offset: Sequence[float] | None = None,
+    offset: Vector | None = None,
     step: float | None = None,
     domain: Literal["region", "box"] | None = None,
     folds: bool | None = None,
     rotate_x: float | dict | None = None,
     rotate_y: float | dict | None = None,
     rotate_z: float | dict | None = None,
-    direction: Sequence[float | dict] | dict | None = None,
+    direction: Sequence[float | dict] | Vector | dict | None = None,
     frame: dict | None = None,
-    stress: Sequence[float | dict] | dict | None = None,
+    stress: Sequence[float | dict] | Vector | dict | None = None,
 ) -> dict:
     """Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At
     most one of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
@@ -138,12 +138,7 @@ def phase(
 
 
 @named
-def cylinder(
-    wavelength: float | Sequence[float],
-    around: int,
-    center: Sequence[float] | None = None,
-    axis: Sequence[float] | None = None,
-) -> dict:
+def cylinder(wavelength: float | Vector, around: int, center: Vector | None = None, axis: Vector | None = None) -> dict:
     """Wrapped round an axis, a whole number of cells, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
 
     wavelength: Cell edge along the radius and along the axis, one number or two. [mm, above 0]
@@ -155,7 +150,7 @@ def cylinder(
 
 
 @named
-def sphere(wavelength: float, around: int, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+def sphere(wavelength: float, around: int, center: Vector | None = None, axis: Vector | None = None) -> dict:
     """Wrapped about a centre in shells, a whole number of cells round the equator and half as many from pole to pole.
 
     wavelength: Cell edge along the radius. [mm, above 0]
@@ -167,12 +162,7 @@ def sphere(wavelength: float, around: int, center: Sequence[float] | None = None
 
 
 @named
-def sweep(
-    wavelength: float | Sequence[float],
-    points: Points,
-    closed: bool | None = None,
-    normal: Sequence[float] | None = None,
-) -> dict:
+def sweep(wavelength: float | Vector, points: Points, closed: bool | None = None, normal: Vector | None = None) -> dict:
     """Along a line, in a frame that does not rotate about it: a cubic spline through control points, straight on beyond
     the ends of an open one; u = (a/λ₁, b/λ₂, s/λ₃), a and b across it, s along it.
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from functools import cached_property
 
 from . import _core
 from .drawn import Drawn
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, positive, thread_count, whole
@@ -22,7 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
+    import meshio
     import numpy as np
+    import pyvista
+    import trimesh
     from numpy.typing import ArrayLike, NDArray
 
     from .reports import (
@@ -120,17 +122,18 @@ class Mesh(Drawn, Transformed):
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
-    def to_trimesh(self) -> Any:
+    def to_trimesh(self) -> trimesh.Trimesh:
         """The mesh as a ``trimesh.Trimesh``: the same vertices and triangles, not processed, with ``cut`` as an attribute of
         faces. An ImportError without trimesh.
         """
         from .bridges import package
 
         attributes = {"cut": self.cut.copy()}
-        trimesh = package("trimesh")
-        return trimesh.Trimesh(self.vertices.copy(), self.triangles.copy(), process=False, face_attributes=attributes)
+        return package("trimesh").Trimesh(
+            self.vertices.copy(), self.triangles.copy(), process=False, face_attributes=attributes
+        )
 
-    def to_pyvista(self) -> Any:
+    def to_pyvista(self) -> pyvista.PolyData:
         """The mesh as a ``pyvista.PolyData``, with ``cut`` as data of cells. An ImportError without pyvista."""
         import numpy as np
 
@@ -141,7 +144,7 @@ class Mesh(Drawn, Transformed):
         made.cell_data["cut"] = self.cut.astype(np.uint8)
         return made
 
-    def to_meshio(self) -> Any:
+    def to_meshio(self) -> meshio.Mesh:
         """The mesh as a ``meshio.Mesh`` of triangles, with ``cut`` as data of cells (0 or 1). An ImportError without meshio."""
         import numpy as np
 
@@ -275,11 +278,9 @@ class Mesh(Drawn, Transformed):
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
         wall = 2 * self.volume / self.area
         if wanted is not None and wanted > wall / 2:
-            warnings.warn(
+            warn_caller(
                 f"step {wanted:g} mm is more than half the mean wall, {wall:.3g} mm (2 V / A): what is found is the size of "
                 f"voxels; use {wall / 8:.2g} mm or less",
-                DesignWarning,
-                stacklevel=2,
             )
         return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 

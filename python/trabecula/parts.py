@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 
 from . import _core
-from .errors import IslandsWarning
+from .errors import IslandsWarning, warn_caller
 from .files import check_place, extension, whole_file
 from .formats import MESH_WRITES
 from .machine import file_size, fits
@@ -35,7 +34,7 @@ def warn_pieces(name: str, islands: IslandsReport, words: str) -> None:
     """Warns of a part in several pieces."""
     if islands.found:
         message = f"{name} is not in one piece: {words}; all are kept, since a dropped one would leave a gap between the parts"
-        warnings.warn(message, IslandsWarning, stacklevel=3)
+        warn_caller(message, kind=IslandsWarning)
 
 
 def part_files(path: str | os.PathLike[str], names: Sequence[str]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from . import _core
 from .files import write_svg
 from .given import number, positive, three, whole
 from .outlines import outlines_svg
+from .remade import Remade
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -21,30 +22,29 @@ if TYPE_CHECKING:
 __all__ = ["Quadors", "Slice"]
 
 
-class Quadors:
+class Quadors(Remade):
     """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
 
     These are the beams alone, uncut by the region and without a skin. ``whole`` says whether that is the part; where it is
     not, ``Solid.field`` has the part's own sign.
     """
 
-    def __init__(self, core: _core.Quadors, whole: bool):
-        self._core = core
-        self._whole = whole
+    _make = staticmethod(_core.Solid.quadors)
+    _core: _core.Quadors
 
     def __len__(self) -> int:
         return self._core.hubs
 
     def __repr__(self) -> str:
-        uncut = "" if self._whole else ", uncut"
+        uncut = "" if self.whole else ", uncut"
         return f"<trabecula.Quadors of {self._core.hubs} hubs and {self._core.beams} beams{uncut}>"
 
-    @property
+    @cached_property
     def whole(self) -> bool:
         """Whether these beams are all of the part: the region cuts none, there is no skin, keep zone or other lattice. For a
         pattern of more than 20 000 beams this is decided by its bounding box.
         """
-        return self._whole
+        return self._solid._core.whole_beams(self._plan["name"])
 
     def volume(self) -> float:
         """The volume in mm³, fillets included, to 1e-10. Beams that run into each other without a node are refused."""
@@ -94,7 +94,7 @@ class Quadors:
             if list(normal) != [0, 0, 1]:
                 raise ValueError("z is along the normal (0, 0, 1); give a point to slice along another one")
             point = (0, 0, number("z", z))
-        return Slice(self._core.slice(three("point", point), three("normal", normal)))
+        return Slice(self, {"point": three("point", point), "normal": three("normal", normal)})
 
     def hub(self, hub: int) -> dict[str, Any]:
         """The surface of a hub, up to where its beams are parted, as faces of quadrics; places are from its ``center``.
@@ -110,11 +110,11 @@ class Quadors:
         return self._core.hub(whole("hub", hub, 0, len(self) - 1))
 
 
-class Slice:
+class Slice(Remade):
     """A plane slice of beams. Made by ``Quadors.slice``."""
 
-    def __init__(self, core: _core.Slice):
-        self._core = core
+    _make = staticmethod(_core.Quadors.slice)
+    _core: _core.Slice
 
     def __repr__(self) -> str:
         return f"<trabecula.Slice of {self.area:g} mm²>"

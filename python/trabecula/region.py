@@ -7,7 +7,14 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
+from . import held
 from .given import named, settings
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .given import MeshLike, Vector
 
 __all__ = [
     "box",
@@ -27,11 +34,11 @@ __all__ = [
 
 @named
 def box(
-    size: Sequence[float] | None = None,
-    center: Sequence[float] | None = None,
+    size: Vector | None = None,
+    center: Vector | None = None,
     *,
-    min: Sequence[float] | None = None,
-    max: Sequence[float] | None = None,
+    min: Vector | None = None,
+    max: Vector | None = None,
 ) -> dict:
     """An axis-aligned box, by its size and centre, or by two corners.
 
@@ -44,7 +51,7 @@ def box(
 
 
 @named
-def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence[float] | None = None) -> dict:
+def cylinder(base: Vector, radius: float, height: float, axis: Vector | None = None) -> dict:
     """A straight round cylinder.
 
     base: Middle of the lower face. [mm]
@@ -56,7 +63,7 @@ def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence
 
 
 @named
-def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
+def sphere(radius: float, center: Vector | None = None) -> dict:
     """A ball.
 
     radius: Radius. [mm, above 0]
@@ -66,7 +73,7 @@ def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
 
 
 @named
-def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict:
+def capsule(start: Vector, end: Vector, radius: float) -> dict:
     """A capsule: all points within a distance of a straight segment.
 
     start: One end of the segment, the centre of a hemisphere. [mm]
@@ -77,7 +84,7 @@ def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict
 
 
 @named
-def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = None) -> dict:
+def tetrahedron(corners: Sequence[Vector] | NDArray, sharpness: float | None = None) -> dict:
     """A tetrahedron.
 
     corners: Its four corners, in any order. [mm]
@@ -89,7 +96,7 @@ def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = No
 
 
 @named
-def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
+def halfspace(point: Vector, normal: Vector) -> dict:
     """One side of a plane; it bounds nothing alone, so combine it.
 
     point: A point on the plane. [mm]
@@ -100,7 +107,7 @@ def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
 
 @named
 def mesh(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | MeshLike,
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
@@ -111,7 +118,8 @@ def mesh(
 ) -> dict:
     """A triangle mesh from a file (stl, 3mf, ply, obj, off), or the solids of a part from a CAD system (step, iges).
 
-    path: Path of the file, relative to the design file.
+    path: Path of the file, relative to the design file. Or a mesh in memory: ours, of trimesh, pyvista or meshio, or
+        (vertices, triangles).
     unit: Unit of the file's coordinates (mm unless given); 3MF, STEP and IGES files name their own. [optional]
     scale: Factor on all coordinates, after the unit. [above 0, default 1.0]
     repair: Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
@@ -125,7 +133,7 @@ def mesh(
     solid: Of a STEP or IGES file: name of the solid that is read (all of them unless given). [optional]
     """
     given = settings(
-        path=os.fspath(path),
+        path=held.path_of(path, held.mesh),
         unit=unit,
         scale=scale,
         repair=repair,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 
-from .errors import DesignWarning
+from .errors import warn_caller
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -36,33 +35,25 @@ class Resolution:
         """Tells of a spacing that nobody asked for and that is coarser than the walls need."""
         if edge is None and per_cell is None and self._coarser:
             used, wanted, triangles = self._coarser
-            warnings.warn(
+            warn_caller(
                 f"a grid spacing of {wanted:.3g} mm, which the walls need, makes about {triangles:.2g} triangles; {used:g} mm "
                 "is used, which carries the thinnest wall; give an edge for another",
-                DesignWarning,
-                stacklevel=3,
             )
 
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
         """Warns of walls and necks that the grid cannot carry."""
         if self.skin is not None and self.skin < spacing:
-            warnings.warn(
-                DesignWarning(
-                    f"at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
-                    f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
-                    "skin",
-                ),
-                stacklevel=3,
+            warn_caller(
+                f"at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
+                f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
+                "skin",
             )
         for name, thin in self._thinnest.items():
             if thin < 1.5 * spacing:
-                warnings.warn(
-                    DesignWarning(
-                        f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
-                        f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
-                        name,
-                    ),
-                    stacklevel=3,
+                warn_caller(
+                    f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
+                    f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
+                    name,
                 )
 
     def _warn_beyond(self, step: float) -> None:
@@ -81,11 +72,9 @@ class Resolution:
             hint = f"use a step that divides its sizes, such as {better:.6g} mm"
             if math.prod(beyond(float(f"{better:.6g}"))) - 1 > BEYOND:
                 hint = "use a smaller step, or one that divides its sizes"
-            warnings.warn(
+            warn_caller(
                 f"voxels of {step:g} mm reach beyond the region's plane faces, {ratio * size:.4g} mm along one of {size:.4g} "
                 f"mm: their volume and fraction are up to {100 * more:.1f} % too large; {hint}",
-                DesignWarning,
-                stacklevel=3,
             )
 
     def _warn_coarse(self, volume: float, spacing: float, word: str = "edge", pieces: int | None = None) -> None:
@@ -93,7 +82,7 @@ class Resolution:
         also of one that falls into more ``pieces`` than the lattice has.
         """
         if pieces is not None and (message := self._core.coarse_steps(spacing, volume, pieces)):
-            warnings.warn(message, DesignWarning, stacklevel=3)
+            warn_caller(message)
             return
         share, region = self._core.expected()
         found = volume / region
@@ -102,11 +91,9 @@ class Resolution:
         tets = any(it.tets for it in self.report().lattices.values())
         if abs(found - share) > min(0.05, share / 3, math.inf if tets else 0.05 * share + 0.005):
             better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
-            warnings.warn(
+            warn_caller(
                 f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design one of about "
                 f"{share:.2g}; use {_a(word)} of {better:.2g} mm or less",
-                DesignWarning,
-                stacklevel=3,
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import os
@@ -12,8 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import _core
-from .design import Design, _moved
+from .design import Design, _moved, held_in
 from .errors import DesignWarning
+from .held import Held
 from .keys import listless, missing, unit_of
 from .solid import Solid
 
@@ -64,15 +66,21 @@ class Job:
     sent: tuple[str, dict[str, str]] | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain data, the folder of the design included."""
+        """As plain data, the folder of the design and its data in memory included."""
         data = {key: getattr(self, key) for key in ("edge", "per_cell", "meshes", "pictures", "properties", "threads")}
-        return data | {"design": self.design.to_dict(), "folder": self.design.folder or os.getcwd()}
+        design = self.design.to_dict()
+        held = {name: base64.b64encode(name.content).decode() for name in held_in(design)}
+        return data | {"design": design, "folder": self.design.folder or os.getcwd()} | ({"held": held} if held else {})
 
     @staticmethod
     def of(data: Mapping[str, Any]) -> Job:
         """From plain data."""
-        settings = {key: value for key, value in data.items() if key not in ("design", "folder")}
-        return Job(Design(**data["design"], folder=data["folder"]), **settings)
+        settings = {key: value for key, value in data.items() if key not in ("design", "folder", "held")}
+        held = {
+            name: Held.of(base64.b64decode(content), name.rpartition(".")[2]) for name, content in data.get("held", {}).items()
+        }
+        design = _moved(data["design"], lambda name: held.get(name, name))
+        return Job(Design(**design, folder=data["folder"]), **settings)
 
 
 def row_of(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:

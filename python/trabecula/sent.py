@@ -5,8 +5,9 @@ from __future__ import annotations
 import glob
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
+from . import held
 from .design import files_in, parsed
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -25,12 +26,12 @@ def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
 
 def contents(data: Any, folder: str) -> dict[str, dict[str, bytes]]:
     """The files of a design by the names that its ``data`` have for them: a name is that of one, a pattern or a folder."""
-    return {name: {inner: _content(path) for inner, path in _paths(name, folder)} for name in files_in(data)}
+    return {name: dict(_contents(name, folder)) for name in files_in(data)}
 
 
 def digests(data: Any, folder: str) -> dict[str, str]:
     """The SHA-256 of each file that a design's ``data`` names; of a pattern or a folder, that of all its files."""
-    return {name: digest_of((inner, _content(path)) for inner, path in _paths(name, folder)) for name in files_in(data)}
+    return {name: digest_of(_contents(name, folder)) for name in files_in(data)}
 
 
 def digest_of(files: Iterable[tuple[str, bytes]]) -> str:
@@ -45,13 +46,23 @@ def put_files(given: dict[str, dict[str, bytes]], folder: str) -> dict[str, str]
     """Writes such files to a folder; their names there by those that the design has for them."""
     places = {}
     for n, (name, files) in enumerate(given.items()):
-        places[name] = f"{n}/{os.path.basename(name.rstrip('/'))}"
+        places[name] = f"{n}/{os.path.basename(held.file_name(name).rstrip('/'))}"
         for inner, content in files.items():
             at = os.path.join(folder, str(n), inner)
             os.makedirs(os.path.dirname(at), exist_ok=True)
             with open(at, "wb") as file:
                 file.write(content)
     return places
+
+
+def _contents(name: str, folder: str) -> Iterator[tuple[str, bytes]]:
+    """The files behind a name in a design with their bytes."""
+    if name.startswith(held.HELD):
+        yield held.file_name(name), held.content(name)
+        return
+    for inner, path in _paths(name, folder):
+        with open(path, "rb") as file:
+            yield inner, file.read()
 
 
 def _paths(name: str, folder: str) -> list[tuple[str, str]]:
@@ -63,8 +74,3 @@ def _paths(name: str, folder: str) -> list[tuple[str, str]]:
         found = glob.glob(glob.escape(path).replace("[*]", "*"))
     base = os.path.dirname(path.rstrip("/"))
     return [(os.path.relpath(one, base).replace(os.sep, "/"), one) for one in sorted(found)]
-
-
-def _content(path: str) -> bytes:
-    with open(path, "rb") as file:
-        return file.read()

@@ -5,9 +5,8 @@ lattices of a blend.
 from __future__ import annotations
 
 import math
-import warnings
 
-from .errors import DesignWarning
+from .errors import warn_caller
 from .local_fields import fields_at
 from .trajectories import trajectories
 
@@ -82,7 +81,7 @@ def _stiffness(solid: Solid, threads: int | None = None) -> Look:
         words = (
             f"stiffness at a fraction of {fraction:.3g}: {said.removeprefix('stiffness: ')} of `law`, a picture has {VOXELS}"
         )
-        warnings.warn(DesignWarning(words, f"lattice.{name}"), stacklevel=4)
+        warn_caller(words, f"lattice.{name}")
 
     def at(points: NDArray) -> NDArray:
         known = fields_at(solid, ["fraction"], points)["solid_fraction"]

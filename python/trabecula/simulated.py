@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Callable
 from functools import cached_property
 
 from . import _core
 from .carrier import Carrier
-from .errors import DesignWarning
+from .errors import warn_caller
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
@@ -109,19 +108,16 @@ class Simulated:
             usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
             used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
             if used > size:
-                warnings.warn(
+                warn_caller(
                     f"an edge of {used:g} mm is used: two edges through the thinnest wall ({size:.3g} mm) would make about "
                     f"{count:.2g} tetrahedra; give an edge to have them",
-                    DesignWarning,
-                    stacklevel=2,
                 )
                 size, count = used, count * (size / used) ** 3
         if count > 3e8:
             raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
         fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
-        largest = islands == "drop"
-        core = _core.VolumeMesh.make(self._core, size, of, order, periodic, largest, thread_count(threads), progress)
-        made = VolumeMesh(core, self._core.design)
+        plan = {"edge": size, "of": of, "order": order, "periodic": periodic, "largest": islands == "drop"}
+        made = VolumeMesh(self, plan, threads=thread_count(threads), progress=progress)
         if islands == "error" and (pieces := made.report().pieces) > 1:
             raise ValueError(f"the mesh has {pieces} components that do not touch; drop or keep those other than the largest")
         warn_flaws(made, one=one)
@@ -136,9 +132,9 @@ class Simulated:
         empty set, and for more than 256 domains.
         """
         order = _order(order)
-        made = Carrier(_core.VolumeMesh.carrier(self._core, order, thread_count(threads)), self._core)
+        made = Carrier(self, {"order": order}, threads=thread_count(threads))
         if left := self._core.bodies:
-            warnings.warn(f"{', '.join(left)}: no part of the carrier, which is the lattice alone", DesignWarning, stacklevel=2)
+            warn_caller(f"{', '.join(left)}: no part of the carrier, which is the lattice alone")
         return made
 
     def voxel_elements(
@@ -161,7 +157,8 @@ class Simulated:
         low, high = self.bounds
         count = math.prod((b - a) / size + 1 for a, b in zip(low, high, strict=True))
         fits(VOXEL_BYTES * count, f"{count:.3g} voxels", edge=size, power=3, word="step")
-        return VoxelElements(_core.VoxelElements.make(self._core, size, share, thread_count(threads), progress))
+        plan = {"step": size, "least": share}
+        return VoxelElements(self, plan, threads=thread_count(threads), progress=progress)
 
     def shell_mesh(
         self,
@@ -184,9 +181,10 @@ class Simulated:
         """
         order = _order(order, "triangles")
         size = self.spacing(edge, 16 if edge is None and per_cell is None else per_cell)
-        made = ShellMesh(_core.Shells.make(self._core, size, order == 2, thread_count(threads), progress))
+        plan = {"edge": size, "quadratic": order == 2}
+        made = ShellMesh(self, plan, threads=thread_count(threads), progress=progress)
         if found := made._core.warning:
-            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+            warn_caller(f"{found[0]}: {found[1]}")
         warn_sharp(made)
         return made
 
@@ -211,19 +209,18 @@ class Simulated:
         if islands not in ("keep", "drop", "error"):
             raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
         size = None if edge is None else positive("edge", edge)
-        made = BeamMesh(_core.BeamElements.make(self._core, size, order == 2, islands == "drop", thread_count(threads)))
+        plan = {"edge": size, "quadratic": order == 2, "largest": islands == "drop"}
+        made = BeamMesh(self, plan, threads=thread_count(threads))
         pieces = made.report().pieces
         if pieces > 1 and islands == "error":
             raise ValueError(f"the beams have {pieces} components that do not touch; drop or keep those other than the longest")
         if pieces > 1:
-            warnings.warn(
+            warn_caller(
                 f"the beams have {pieces} components that do not touch: loose ones are not held by supports on another; "
                 'islands = "drop" (--islands drop) leaves all but the longest out',
-                DesignWarning,
-                stacklevel=2,
             )
         if found := made._core.warning:
-            warnings.warn(f"{found[0]}: {found[1]}", DesignWarning, stacklevel=2)
+            warn_caller(f"{found[0]}: {found[1]}")
         return made
 
     def _thinnest_wall(self) -> tuple[str, float]:

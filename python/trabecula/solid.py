@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import math
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
 from .beam_files import save_beams
-from .errors import DesignWarning
+from .errors import warn_caller
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
 from .given import flag, number, positions, positive, shard_bytes, thread_count
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .held import Held
     from .islands import Islands
     from .reports import (
         BeamsFileReport,
@@ -76,9 +76,11 @@ class Solid(Seen, Simulated, Resolution):
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
     """
 
-    def __init__(self, core: _core.Solid, folder: str = ""):
+    def __init__(self, core: _core.Solid, folder: str = "", held: Sequence[Held] = ()):
         self._core = core
         self._folder = folder
+        #: Data in memory that its design names, which are there as long as this.
+        self._held = held
 
     def __copy__(self) -> Solid:
         return self
@@ -87,7 +89,7 @@ class Solid(Seen, Simulated, Resolution):
         return self
 
     def __reduce__(self) -> tuple:
-        return _rebuilt, (self._core.design, self._folder)
+        return _rebuilt, (self._core.design, self._folder, self._held)
 
     def __repr__(self) -> str:
         (a, b, c), (d, e, f) = self.bounds
@@ -136,7 +138,7 @@ class Solid(Seen, Simulated, Resolution):
             if len(names) != 1:
                 raise ValueError(f"name one of the beams: {', '.join(names)}" if names else "the design has no beams")
             name = names[0]
-        return Quadors(self._core.quadors(name), self._core.whole_beams(name))
+        return Quadors(self, {"name": name})
 
     def report(self) -> DesignReport:
         """The figures without meshing: level, fraction and thickness of each lattice, lengths and counts of beams, the region,
@@ -493,11 +495,9 @@ class Solid(Seen, Simulated, Resolution):
             made = self._core.write_step(temporary, (name, protocol), within, assembly, thread_count(threads), progress)
             meant = sum(of.pieces or 1 for of in self.report().beams.values())  # of beams, those that do not touch by design
             if made.solids > max(meant, 1):
-                warnings.warn(
+                warn_caller(
                     f"the file has {made.solids} solids that do not touch: a STEP file keeps all components, of which meshes "
                     "drop the small ones",
-                    DesignWarning,
-                    stacklevel=2,
                 )
             return made
 
@@ -625,7 +625,7 @@ class Solid(Seen, Simulated, Resolution):
         """
         spacing, _ = self._voxel_grid(step, per_cell)
         self._warn_thin(spacing, "step")
-        made = Voxels(self._core.voxels(spacing, thread_count(threads), progress))
+        made = Voxels(self, {"step": spacing}, threads=thread_count(threads), progress=progress)
         if step is not None or per_cell is not None:
             self._warn_beyond(spacing)
         self._warn_coarse(made.volume, spacing, "step")
@@ -728,7 +728,7 @@ class Solid(Seen, Simulated, Resolution):
         elif least is not None:
             raise ValueError("least is for adaptive layers: give adaptive, the greatest height of steps on the surface, mm")
         plan = {"layer": thick, "tolerance": within, "step": spacing, "begin": begin, "end": end, "adaptive": cusp}
-        return Layers(self, plan, thread_count(threads))
+        return Layers(self, plan, threads=thread_count(threads))
 
     def thickness(
         self,
@@ -758,6 +758,6 @@ def _shards_in(name: str) -> str:
     return folder
 
 
-def _rebuilt(design: str, folder: str) -> Solid:
+def _rebuilt(design: str, folder: str, held: Sequence[Held] = ()) -> Solid:
     """A solid that was pickled."""
-    return Solid(_core.Design.from_text(design).build(folder), folder)
+    return Solid(_core.Design.from_text(design).build(folder), folder, held)

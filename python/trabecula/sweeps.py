@@ -51,7 +51,7 @@ def sweep(
     The study is a design with ``sweep``: {path of a key: list of values, or {"from", "to", "count"}} and ``sampling``,
     ``count``, ``seed``, ``where``; or the path of its file. A row has the number of the design, the values by path,
     ``fraction_asked`` (of the cell), ``wall_mm`` and ``pore_mm`` (the least), and as measured at ``edge`` (mm) or
-    ``per_cell`` ``fraction``, ``volume_mm3``, ``area_mm2`` and ``pieces``; then ``warnings`` (of design, mesh, properties),
+    ``per_cell`` ``solid_fraction``, ``volume_mm3``, ``area_mm2``, ``pieces``; then ``warnings`` (of design, mesh, properties),
     ``error`` (why there is no such design, or None), ``seconds``, ``sha256`` of the design's text, ``version``.
     ``properties`` names what else is computed, with settings: {"stiffness": {"n": 48}}; each figure has its relative error
     next to it. ``meshes`` and ``pictures`` are names of files to write, with ``{design}`` for the number. ``jobs`` processes

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
 from .design import Design
 from .drawn import Picture
-from .errors import DesignError, DesignWarning
+from .errors import DesignError, warn_caller
+from .exchanged import Exchanged
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
 from .given import fixed, thread_count
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["TetMesh"]
 
 
-class TetMesh(Picture, Transformed):
+class TetMesh(Picture, Transformed, Exchanged):
     """A tetrahedral mesh, checked: conforming, every tetrahedron of positive volume.
 
     Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``. It never changes, and its arrays are read-only:
@@ -157,6 +157,19 @@ class TetMesh(Picture, Transformed):
         with whole_file(path) as temporary:
             elements.write(temporary, kind, self.nodes, self.tets, self.zones, names)
 
+    def _connected(self) -> NDArray[np.uint32]:
+        return self.tets
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        zones = {"zone": self.zones} if len(self.zones) else {}
+        return zones | {"least_dihedral": self.least_dihedral, "size": self.sizes}
+
+    def _members(self) -> dict[str, tuple[NDArray, NDArray]]:
+        import numpy as np
+
+        found = {name: np.flatnonzero(np.isin(self.zones, numbers)) for name, numbers in self.zone_names.items()}
+        return {name: (np.unique(self.tets[of]), of) for name, of in found.items()}
+
     def _picture(self) -> Mesh:
         return self.boundary()
 
@@ -165,5 +178,5 @@ def made_of(core: _core.TetMesh) -> TetMesh:
     """The mesh; its warnings are raised."""
     made = TetMesh(core)
     for path, message in core.warnings:
-        warnings.warn(DesignWarning(message, path), stacklevel=3)
+        warn_caller(message, path)
     return made

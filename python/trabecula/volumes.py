@@ -7,7 +7,6 @@ import math
 import os
 import re
 import tempfile
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -15,11 +14,13 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 from . import _core
-from .errors import DesignWarning
+from .errors import warn_caller
+from .exchanged import LINES, TRIANGLES, Exchanged
 from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive
 from .mesh import Mesh
+from .remade import Remade
 from .texts import counted
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -60,7 +61,7 @@ class VolumeSet(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-class FiniteElements:
+class FiniteElements(Remade, Exchanged):
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
     #: What a set needs that is held or loaded.
@@ -69,6 +70,7 @@ class FiniteElements:
     _writes: ClassVar[tuple[str, ...]]
     #: Those with fields.
     _with_fields: tuple[str, ...] = ("vtu", "xdmf")
+    elements: NDArray[np.uint32]
     sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
 
@@ -169,9 +171,11 @@ class FiniteElements:
             if np.isin(self.forces(name, force)[0], fast).all():
                 raise ValueError(f"all nodes of {name}, which is loaded, are held by {', '.join(held)}: the force does nothing")
 
-    def _of_elements(self) -> dict[str, NDArray]:
-        """What each element has."""
-        return {}
+    def _connected(self) -> NDArray[np.uint32]:
+        return self.elements
+
+    def _members(self) -> dict[str, tuple[NDArray, NDArray]]:
+        return {name: (of.nodes, of.elements) for name, of in self.sets.items()}
 
     def _materials(self, kind: str, E: float, nu: float) -> list[list[float]]:
         """Young's modulus (MPa) and Poisson's ratio in a file: of all domains."""
@@ -205,11 +209,9 @@ class FiniteElements:
 class VolumeMesh(FiniteElements):
     """Tetrahedra that conform to a solid's surfaces, edges and corners. Made by ``Solid.volume_mesh``."""
 
+    _make = staticmethod(_core.VolumeMesh.make)
     _with_fields = ("vtu", "xdmf", "msh")
-
-    def __init__(self, core: _core.VolumeMesh, design: str = ""):
-        self._core = core
-        self._design = design
+    _core: _core.VolumeMesh
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -298,6 +300,9 @@ class VolumeMesh(FiniteElements):
     def _of_elements(self) -> dict[str, NDArray]:
         return {"domain": self.domain}
 
+    def _names_of_domains(self) -> list[str]:
+        return self.domains
+
     def _check_loads(self) -> None:
         if self._figures.pairs:
             raise ValueError("a periodic mesh has steps of its own; leave out hold and load")
@@ -336,10 +341,9 @@ class VoxelElements(FiniteElements):
     modulus in each set is ``E`` (MPa) times its mean fraction.
     """
 
+    _make = staticmethod(_core.VoxelElements.make)
     _writes = VOXEL_ELEMENT_WRITES
-
-    def __init__(self, core: _core.VoxelElements):
-        self._core = core
+    _core: _core.VoxelElements
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -383,11 +387,11 @@ class ShellMesh(FiniteElements):
     each resultant is that of a uniform traction on the wall's faces at the border. ``fields`` are for .vtu.
     """
 
+    _make = staticmethod(_core.Shells.make)
     _writes = SHELL_WRITES
+    _kinds = TRIANGLES
     _of_sets = "edges on the border"
-
-    def __init__(self, core: _core.Shells):
-        self._core = core
+    _core: _core.Shells
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -418,6 +422,9 @@ class ShellMesh(FiniteElements):
         """
         return self._named_sets()
 
+    def _of_nodes(self) -> dict[str, NDArray]:
+        return {"thickness": self.thickness}
+
     def report(self) -> ShellReport:
         """The figures: numbers of triangles and nodes, area, volume, thickness, angles, sets."""
         return copy.deepcopy(self._figures)
@@ -426,10 +433,10 @@ class ShellMesh(FiniteElements):
 class BeamMesh(FiniteElements):
     """Beams as line elements along their axes, each with a circular section. Made by ``Solid.beam_mesh``."""
 
+    _make = staticmethod(_core.BeamElements.make)
     _of_sets = "ends of elements"
-
-    def __init__(self, core: _core.BeamElements):
-        self._core = core
+    _kinds = LINES
+    _core: _core.BeamElements
 
     def __repr__(self) -> str:
         figures = self._figures
@@ -457,6 +464,9 @@ class BeamMesh(FiniteElements):
         that come to them from elsewhere: an element, and 0 or 1.
         """
         return self._named_sets()
+
+    def _of_elements(self) -> dict[str, NDArray]:
+        return {"radius": self.radii}
 
     def report(self) -> BeamMeshReport:
         """The figures: numbers of elements, nodes and beams, length, volume, radii, sets."""
@@ -542,7 +552,7 @@ def warn_sharp(made: ShellMesh) -> None:
     place = ", ".join(f"{v:.4g}" for v in corners[worst].mean(axis=0))
     some = f"{counted(few, 'triangle')} of {len(least)} have an angle below {SHARP} degrees"
     message = f"{some}, the least is {least[worst]:.2g} at ({place}) mm: bending there is poor; another edge mostly has none"
-    warnings.warn(message, DesignWarning, stacklevel=3)
+    warn_caller(message)
 
 
 def warn_flaws(made: VolumeMesh, one: bool) -> None:
@@ -565,4 +575,4 @@ def warn_flaws(made: VolumeMesh, one: bool) -> None:
         angles = f"{figures.min_angle:.1f} to {figures.max_angle:.1f}"
         found += [f"dihedral angles run from {angles} degrees; a smaller edge mostly brings them to {SHARP} to {FLAT}"]
     for message in found:
-        warnings.warn(message, DesignWarning, stacklevel=3)
+        warn_caller(message)

@@ -13,9 +13,12 @@ from .files import extension, whole_file
 from .formats import VOXEL_WRITES
 from .given import fixed, positive
 from .machine import fits
+from .remade import Remade
 from .transforms import factor_of, vector_of
 
 if TYPE_CHECKING:
+    from typing import Any
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -27,11 +30,17 @@ def fits_file(path: str | os.PathLike[str], count: int, step: float) -> None:
     fits(1000.0 + count, f"{count:.3g} voxels", path, step, 3, "step")
 
 
-class Voxels:
+def made_of(solid: _core.Solid, step: float, place: tuple[Sequence[float], float] | None = None, **how: Any) -> _core.Voxels:
+    """The voxels of a solid, perhaps with another origin and step."""
+    made = solid.voxels(step, **how)
+    return made if place is None else made.placed(*place)
+
+
+class Voxels(Remade):
     """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
 
-    def __init__(self, core: _core.Voxels):
-        self._core = core
+    _make = staticmethod(made_of)
+    _core: _core.Voxels
 
     def __repr__(self) -> str:
         return f"<trabecula.Voxels {' x '.join(map(str, self.shape))}, step {self.step:g} mm>"
@@ -62,7 +71,7 @@ class Voxels:
         origin = [a + b for a, b in zip(self.origin, vector_of("vector", vector), strict=True)]
         if not all(map(math.isfinite, origin)):
             raise ValueError(f"vector is {list(vector)}; the origin would be beyond 1e308 mm")
-        return Voxels(self._core.placed(origin, self.step))
+        return self._placed(origin, self.step)
 
     def scaled(self, factor: float, center: Sequence[float] = (0, 0, 0)) -> Voxels:
         """The voxels with origin and step scaled by one ``factor`` greater than 0 about ``center``: they stay cubes. Mirrored
@@ -70,7 +79,10 @@ class Voxels:
         """
         by = abs(factor_of("factor", positive("factor", factor)))
         middle = vector_of("center", center)
-        return Voxels(self._core.placed([(a - c) * by + c for a, c in zip(self.origin, middle, strict=True)], self.step * by))
+        return self._placed([(a - c) * by + c for a, c in zip(self.origin, middle, strict=True)], self.step * by)
+
+    def _placed(self, origin: Sequence[float], step: float) -> Voxels:
+        return self._like(self._core.placed(origin, step), place=(origin, step))
 
     @property
     def volume(self) -> float:

@@ -7,15 +7,22 @@ use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use trabecula::design::{CadMesh, FaceLabel, Loader, Scan, Tessellation, ZonedElements};
 
 use crate::arrays::table;
+
+/// How names begin that are no files, but bytes in Python's memory.
+const HELD: &str = "held:";
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
 
 impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        if path.starts_with(HELD) {
+            return held(path);
+        }
         crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
     }
 
@@ -76,6 +83,17 @@ type ReadResult<'py> = (
     Option<usize>,
     PyReadonlyArray1<'py, f64>,
 );
+
+/// The bytes that Python has under a name.
+fn held(name: &str) -> Result<Vec<u8>, String> {
+    Python::attach(|py| {
+        let read = || -> PyResult<Vec<u8>> {
+            let found = py.import("trabecula.held")?.getattr("content")?.call1((name,))?;
+            Ok(found.cast::<PyBytes>()?.as_bytes().to_vec())
+        };
+        read().map_err(|e| words(py, &e))
+    })
+}
 
 /// What an exception says.
 fn words(py: Python<'_>, e: &PyErr) -> String {

@@ -1,0 +1,40 @@
+"""What solids make of themselves, and how that is copied and pickled."""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any, ClassVar, TypeVar
+
+    Self = TypeVar("Self", bound="Remade")
+
+__all__ = ["Remade"]
+
+
+class Remade:
+    """What a solid, or its beams, make by a plan. It never changes, so a copy is itself. Pickled it is the solid's design and
+    the plan, and is made again where that is read: the same in every bit.
+    """
+
+    #: What makes it, of the core's part of the solid and the plan.
+    _make: ClassVar[Callable[..., Any]]
+
+    def __init__(self, solid: Any, plan: dict[str, Any], **how: Any):
+        self._solid, self._plan = solid, plan
+        self._core = self._make(solid._core, **plan, **how)
+
+    def _like(self: Self, core: Any, **more: Any) -> Self:
+        """Another of its kind, which is made already, by its plan and what is new in that."""
+        made = object.__new__(type(self))
+        made._solid, made._plan, made._core = self._solid, self._plan | more, core
+        return made
+
+    def __copy__(self: Self) -> Self:
+        return self
+
+    def __deepcopy__(self: Self, memo: dict) -> Self:
+        return self
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self._solid, self._plan)
