@@ -277,6 +277,29 @@ def test_graphs_are_what_other_programs_read(tmp_path):
         assert np.allclose(other.points[lines], nodes[ends], rtol=0, atol=1e-12), suffix
 
 
+@pytest.mark.filterwarnings("ignore::trabecula.DesignWarning")
+@pytest.mark.parametrize("cell", ["octet", "kelvin", "bcc"])
+@pytest.mark.parametrize("suffix", ["csv", "json", "3mf"])
+def test_fillets_add_no_beams_to_a_file(tmp_path, cell, suffix):
+    """Neighbours outside the region shape the fillets in it; nothing of them is in it."""
+
+    def made(fillet):
+        text = f'[region.box]\nmin = [-1, -1, -1]\nmax = [25, 25, 25]\n[beams.core]\ncell = "{cell}"\nradius = 0.5\n'
+        solid = built(f'{text}fillet = "{fillet}"\nmap.affine.wavelength = 12\n')
+        file = solid.save_beams(tmp_path / f"{fillet}.{suffix}", mesh=False)
+        back = lt.beams.read(tmp_path / f"{fillet}.{suffix}")
+        ends = back["nodes"][back["beams"]]
+        core = solid.report().beams["core"]
+        assert (core.beams, file.beams) == (len(ends), len(ends))
+        assert abs(core.total_length / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 1) < 1e-6
+        along = ends[:, :1] + np.linspace(0, 1, 101)[:, None] * (ends[:, 1:] - ends[:, :1])
+        outside = np.maximum(np.maximum(-1 - along, along - 25), 0)
+        assert np.linalg.norm(outside, axis=2).min(axis=1).max() < 0.5
+        return len(ends)
+
+    assert made("auto") == made("none")
+
+
 def test_what_a_format_cannot_hold_is_warned_of(tmp_path):
     solid = built(WAISTED)
     for suffix, expected in [("ltcx", "2 beams unlike the hubs"), ("csv", "the balls of 3 hubs"), ("obj", "no radii")]:

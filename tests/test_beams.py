@@ -196,6 +196,21 @@ def test_a_grid_too_coarse_for_beams_is_warned_of():
         solid.mesh(edge=0.15)
 
 
+def test_what_chords_cost_of_beams_is_expected_and_warned_of():
+    """Against the exact volume of beams that the region holds."""
+    cell = {"cell": "octet", "map": lt.map.affine(wavelength=12), "radius": 0.7, "fillet": {"radius": 0.4}, "trim": "drop"}
+    solid = built(lt.region.box(min=[-2, -2, -2], max=[26, 26, 26]), **cell)
+    exact = solid.report().beams["core"].volume
+    for edge in (0.9, 0.45, 0.23):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            lost = 1 - solid.mesh(edge=edge).volume / exact
+        expected = solid.volume_error(edge)
+        assert expected / 3 < lost < 3 * expected, (edge, lost, expected)
+        assert any("chords cost" in str(w.message) for w in said) == (expected > 0.05)
+    assert solid.volume_error(0.9) > 0.05 > solid.volume_error(0.45)
+
+
 def test_loose_ends_are_told_and_dropped():
     """A ring with a tail of two beams."""
     nodes = [*SQUARE, [5, 5, 5], [5, 5, 8]]
@@ -343,6 +358,7 @@ CASES = [
         ["no beam lies in the region"],
     ),
     (but(OWN, struts=[[0, 9]]), "struts[0]", ["there is no node 9; there are 4 nodes"]),
+    (but(OWN, struts=[[0, -1]]), "struts[0]", ["there is no node -1; there are 4 nodes, their numbers are 0 to 3"]),
     (but(OWN, struts=[[0, 0]]), "struts", ["two different ends"]),
     (but(OWN, struts=[[0, 1.5]]), "struts[0][1]", ["whole number", "1.5"]),
     (but(OWN, struts=None), "", ['"struts" is missing']),

@@ -8,6 +8,7 @@ import pytest
 import trabecula as lt
 from conftest import CUBE
 from test_cli import run
+from trabecula.design import parsed
 
 
 def test_attributes_keys_and_plain_data(cube):
@@ -51,6 +52,23 @@ def test_every_field_is_documented(name):
     fields = [node for node in tree.body if isinstance(node, ast.AnnAssign)]
     texts = [node.value.value for node in tree.body if isinstance(node, ast.Expr)]
     assert fields and len(texts) == len(fields) + 1 and all(text.endswith(".") for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("region", "core", "beams"),
+    [
+        ("min = [1, -2, -2]\nmax = [9, 2, 2]", "nodes = [[0, 0, 0], [10, 0, 0]]\nstruts = [[0, 1]]", 1),
+        ("min = [-1, 1, 1]\nmax = [1, 5, 5]", 'cell = "octet"\nmap.affine.wavelength = 12', 1),
+    ],
+)
+def test_beams_without_a_hub_in_the_region_are_reported(region, core, beams):
+    """All cross it; there was no least length, which no text could give."""
+    text = f"schema = 1\n[region.box]\n{region}\n[beams.core]\n{core}\nradius = 0.7"
+    solid = parsed(text, False, "test", ".").build()
+    found = solid.report().beams["core"]
+    assert (found.hubs, found.beams) == (0, beams)
+    assert f"0 hubs, {beams} beam" in str(solid.report()) and "in all" in str(solid.report())
+    assert found.pieces == solid.mesh(edge=0.2, islands="keep").pieces
 
 
 def test_figures_of_all_parts_of_a_design(tmp_path):

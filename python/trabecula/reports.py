@@ -159,7 +159,7 @@ class BeamsReport(Report):
     fraction_exact: bool
     """Whether the fraction is exact; else it is estimated at points."""
     hub_radius: list[float]
-    """Least and greatest radius of hubs, mm."""
+    """Least and greatest radius of the hubs of these, mm."""
     hubs: float | None
     """Number of hubs, repeats included."""
     inertia: list[list[float]] | None
@@ -167,9 +167,9 @@ class BeamsReport(Report):
     kinds: int | None
     """Number of hubs that differ in more than position and scale."""
     length: list[float] | None
-    """Least and greatest length of beams, mm."""
+    """Least and greatest length of these beams from hub to hub, mm; None where there are none, only fillets of others."""
     pieces: int | None
-    """Number of connected components of the graph."""
+    """Number of connected components of these beams, which are joined at hubs whose ball reaches into the region."""
     porosity: float
     """1 − fraction."""
     repeats: list[int] | None
@@ -181,13 +181,13 @@ class BeamsReport(Report):
     solved_radius: float | None
     """Radius of beams, mm, solved for from the fraction asked for; None where the radius is given."""
     thickness: float
-    """Diameter of the thinnest beam, mm."""
+    """Diameter of the thinnest beam in the region, mm."""
     total_length: float | None
-    """Length of all beams, mm."""
+    """Sum of these lengths, mm: also of beams that the region cuts, in full."""
     trimmed: TrimmedReport | None
     """What the region trimmed."""
     valence: dict[str, int] | None
-    """Number of nodes by their number of beams."""
+    """Number of hubs in the region by their number of beams."""
     volume: float | None
     """Volume with fillets, mm³; None where the region cuts the beams or beams collide."""
     wavelength: float

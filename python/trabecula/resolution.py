@@ -17,6 +17,10 @@ __all__ = ["Resolution"]
 
 #: Share of the volume by which voxels may reach beyond plane faces of the region unwarned.
 BEYOND = 0.01
+#: Share of the volume of beams that chords may cost unwarned, and what the step that is advised leaves of it.
+CHORDS, SLIGHT = 0.05, 0.01
+#: Steps on the diameter of a beam from which on chords cost less.
+SURE = 3.0
 
 
 class Resolution:
@@ -54,6 +58,17 @@ class Resolution:
                     f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
                     f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
                     name,
+                )
+        beams = [thin for name, thin in self._thinnest.items() if name.startswith("beams.")]
+        if word == "edge" and beams and 1.5 * spacing <= min(beams) < SURE * spacing:
+            error = self._core.volume_error(spacing)
+            if error is not None and error > CHORDS:
+                better = spacing * (SLIGHT / error) ** 0.5
+                warnings.warn(
+                    f"with {min(beams) / spacing:.2g} grid steps of {spacing:g} mm through the thinnest beam, chords cost "
+                    f"about {100 * error:.1g} % of the volume of beams; with an edge of {better:.2g} mm {100 * SLIGHT:g} %",
+                    DesignWarning,
+                    stacklevel=3,
                 )
 
     def _warn_beyond(self, step: float) -> None:

@@ -125,7 +125,7 @@ class Solid(Seen, Simulated, Resolution):
     @property
     def beams(self) -> dict[str, dict[str, NDArray]]:
         """The graphs of beams by name: ``centers`` (n, 3) and ``radii`` (n,) of hubs, mm, and ``struts`` (m, 2), the hubs
-        that each beam joins.
+        that each beam joins; with neighbours outside the region whose fillets shape what is in it.
         """
         return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
 
@@ -324,9 +324,10 @@ class Solid(Seen, Simulated, Resolution):
         return self._measured(edge, per_cell, threads, progress, apart)[0]
 
     def volume_error(self, edge: float | None = None, per_cell: float | None = None) -> float | None:
-        """The relative error to expect of the volume that lattices have in a mesh at this spacing, without meshing the part:
-        one period of each is meshed and held against its fraction on the torus. The realised error is at most three times as
-        much. None where no lattice is meshed on a grid.
+        """The relative error to expect of the volume that lattices and beams have in a mesh on a grid of this spacing, without
+        meshing the part: one period of each lattice is meshed and held against its fraction on the torus, and some hubs with
+        their beams against their exact volume. The realised error is at most three times as much. None where neither is meshed
+        on a grid, over tetrahedra, and of beams that overlap halfway along.
         """
         return self._core.volume_error(self.spacing(edge, per_cell))
 
@@ -513,7 +514,8 @@ class Solid(Seen, Simulated, Resolution):
         and of those that are cut. Fillets are left out. With ``mesh``, a coarse mesh goes with them for programs that do not
         know the extension.
 
-        Others are graphs of nodes and beams, whole where the region cuts them, in decimals that read back to the same numbers:
+        A file has the beams of which something is in the region, whole where it cuts them. Others than .3mf are graphs of nodes
+        and beams, in decimals that read back to the same numbers:
         .ltcx (nTopology, radii at nodes), .csv (a row of end points and radii for each beam), .json, .vtu, .obj (lines without
         radii), .inp (Abaqus B31) and .bdf (Nastran CBAR, numbers of sixteen characters), these two with a circular section for
         each radius.

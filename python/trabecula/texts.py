@@ -286,7 +286,7 @@ ABSENT = {
     "edge": "none: made without a grid",
     "quality": "no triangles",
     "quality.largest_aspect": "a triangle has no area",
-    "volume_error": "not known: no lattice on a grid",
+    "volume_error": "not known: no lattice or beams on a grid",
 }
 
 

@@ -14,7 +14,7 @@ pub use radii::position_text;
 pub use radii::{Radii, with_radii};
 pub use tables::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
-pub use wireframe::{GivenRadii, Wireframe, WireframeReport};
+pub use wireframe::{GivenRadii, Wireframe, WireframeReport, Within};
 
 use geometry::math::Vec3;
 
@@ -61,4 +61,22 @@ pub struct Graph {
     pub hubs: Vec<Hub>,
     /// The beams.
     pub beams: Vec<Beam>,
+}
+
+impl Graph {
+    /// Some of the beams, with the hubs that they have.
+    pub fn part(&self, kept: &[bool]) -> Graph {
+        let mut number = vec![None; self.hubs.len()];
+        let beams = || self.beams.iter().zip(kept).filter(|(_, kept)| **kept).map(|(b, _)| *b);
+        beams().flat_map(|b| b.ends).for_each(|n| number[n as usize] = Some(0));
+        let mut hubs = Vec::new();
+        for (number, hub) in number.iter_mut().zip(&self.hubs) {
+            if let Some(n) = number {
+                *n = hubs.len() as u32;
+                hubs.push(*hub);
+            }
+        }
+        let of = |n: u32| number[n as usize].unwrap_or(0);
+        Graph { beams: beams().map(|b| Beam { ends: b.ends.map(of), ..b }).collect(), hubs }
+    }
 }

@@ -535,8 +535,8 @@ impl Built {
         built_report::transitions(self)
     }
 
-    /// The relative error to expect of the volume of lattices in a mesh at grid spacing `edge` (mm); `None` where none is meshed on
-    /// a grid.
+    /// The relative error to expect of the volume of lattices and beams in a mesh at grid spacing `edge` (mm); `None` where it is not
+    /// known.
     pub fn volume_error(&self, edge: f64) -> Option<f64> {
         volume_error::volume_error(self, edge)
     }

@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 mod beam_fields;
 mod fill_region;
+mod in_region;
 
 pub use fill_region::fill;
+pub use in_region::{beams_in, within};
 
 use crate::implicit::Implicit;
-use beams::graph::{Cleaned, Graph, Trim, Trimmed, WireframeReport};
+use beams::graph::{Cleaned, Graph, Trim, Trimmed, WireframeReport, Within};
 use beams::pattern::PatternField;
 use beams::quador::{Collision, Quadors, Shortfall};
 
@@ -57,7 +59,9 @@ pub struct Truss {
     pub wavelength: f64,
     /// Whether that is of what repeats, rather than of struts listed one by one, whose length says nothing of their detail.
     pub repeats: bool,
-    /// Statistics of the wireframe.
+    /// What of the graph is in the region.
+    pub within: Within,
+    /// Statistics of that.
     pub report: WireframeReport,
     /// Minimum and maximum fillet radius in the tightest crotches of hubs inside the region, mm; `None` without
     /// fillets.

@@ -1,11 +1,9 @@
 //! Wireframes: nodes and struts without radii, and their statistics.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 use geometry::math::{Vec3, dot, norm, sub, unit};
-use geometry::union_find::unite;
+use geometry::union_find::{singles, unite};
 
 /// A wireframe: nodes, and struts between them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,20 +30,31 @@ impl GivenRadii {
     }
 }
 
-/// Statistics of a wireframe.
+/// What of a wireframe is in a region.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Within {
+    /// Whether each strut is: all those of a node that is.
+    pub struts: Vec<bool>,
+    /// Whether each node is.
+    pub nodes: Vec<bool>,
+    /// Whether each node joins its struts there.
+    pub joints: Vec<bool>,
+}
+
+/// Statistics of what of a wireframe is in a region.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WireframeReport {
-    /// Number of nodes by valence, of nodes inside.
+    /// Number of nodes by valence.
     pub valence: BTreeMap<usize, usize>,
-    /// Number of struts with an end inside.
+    /// Number of struts.
     pub struts: usize,
-    /// Minimum and maximum length of these struts, mm.
-    pub length: [f64; 2],
-    /// Total length of these struts, mm.
+    /// Minimum and maximum length of struts, mm; `None` without struts.
+    pub length: Option<[f64; 2]>,
+    /// Total length of struts, mm.
     pub total_length: f64,
     /// Minimum angle between two struts at a node (degrees), and the node's position, mm.
     pub min_angle: Option<(f64, Vec3)>,
-    /// Number of connected components.
+    /// Number of connected components of struts that are joined.
     pub components: usize,
 }
 
@@ -121,27 +130,31 @@ impl Wireframe {
         }
     }
 
-    /// Statistics of the nodes for which `inside` holds and of the struts incident to them.
-    pub fn report(&self, inside: &(impl Fn(Vec3) -> bool + Sync)) -> WireframeReport {
-        let within: Vec<bool> = self.nodes.par_iter().map(|p| inside(*p)).collect();
-        let has = |s: &&[u32; 2]| s.iter().any(|n| within[*n as usize]);
-        let part = Wireframe { nodes: self.nodes.clone(), struts: self.struts.iter().filter(has).copied().collect() };
+    /// All of it.
+    pub fn whole(&self) -> Within {
+        let nodes = vec![true; self.nodes.len()];
+        Within { struts: vec![true; self.struts.len()], joints: nodes.clone(), nodes }
+    }
+
+    /// Statistics of what is within a region.
+    pub fn report(&self, within: &Within) -> WireframeReport {
+        let kept = self.struts.iter().zip(&within.struts).filter(|(_, kept)| **kept);
+        let part = Wireframe { nodes: self.nodes.clone(), struts: kept.map(|(s, _)| *s).collect() };
         let incidence = Incidence::of(&part);
         let mut report = WireframeReport {
             struts: part.struts.len(),
-            length: [f64::INFINITY, 0.0],
-            components: part.components(),
+            components: part.components(&incidence, &within.joints),
             ..WireframeReport::default()
         };
         for strut in &part.struts {
             let l = self.length(*strut);
-            report.length = [report.length[0].min(l), report.length[1].max(l)];
+            report.length = Some(report.length.map_or([l; 2], |[a, b]| [a.min(l), b.max(l)]));
             report.total_length += l;
         }
         let mut max_cosine = -1.0;
         let mut rays: Vec<Vec3> = Vec::new();
         for (n, slot) in self.nodes.iter().enumerate() {
-            if !within[n] {
+            if !within.nodes[n] {
                 continue;
             }
             let incident = incidence.at(n);
@@ -168,13 +181,14 @@ impl Wireframe {
         report
     }
 
-    /// Number of connected components; nodes without struts do not count.
-    fn components(&self) -> usize {
-        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        let ends: BTreeSet<u32> = self.struts.iter().flatten().copied().collect();
-        let mut components = ends.len();
-        for [a, b] in &self.struts {
-            components -= usize::from(unite(&mut root, *a, *b));
+    /// Number of connected components of struts, which are joined at these nodes.
+    fn components(&self, incidence: &Incidence, joints: &[bool]) -> usize {
+        let mut root = singles(self.struts.len());
+        let mut components = self.struts.len();
+        for node in (0..self.nodes.len()).filter(|n| joints[*n]) {
+            for pair in incidence.at(node).windows(2) {
+                components -= usize::from(unite(&mut root, pair[0], pair[1]));
+            }
         }
         components
     }
@@ -198,10 +212,18 @@ mod tests {
             ],
             struts: vec![[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [5, 6]],
         };
-        let report = wireframe.report(&|_| true);
+        let mut within = wireframe.whole();
+        let report = wireframe.report(&within);
         assert_eq!(report.valence, BTreeMap::from([(1, 3), (2, 3), (3, 1)]));
-        assert_eq!((report.length, report.components), ([1.0, 3.0], 2));
+        assert_eq!((report.length, report.components), (Some([1.0, 3.0]), 2));
         assert!((report.total_length - 12.0).abs() < 1e-12);
         assert!(report.min_angle.is_some_and(|a| (a.0 - 90.0).abs() < 1e-9));
+        // What crosses a region with both ends outside is counted, and joined to others at nodes there alone.
+        within.nodes.fill(false);
+        within.joints = vec![false, true, false, false, false, false, false];
+        let report = wireframe.report(&within);
+        assert_eq!((report.struts, report.components, report.valence.len()), (6, 5, 0));
+        within.struts.fill(false);
+        assert_eq!(wireframe.report(&within), WireframeReport::default());
     }
 }

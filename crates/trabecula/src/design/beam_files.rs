@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{Built, build_beams};
 use crate::report::BeamsFileReport;
-use crate::truss::Beams;
+use crate::truss::{Beams, beams_in};
 use beams::{Fillet, Frusta, Graph, Profile, Quadors};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{
@@ -16,11 +16,13 @@ use geometry::formats::{
 };
 use geometry::progress::{Stopped, checkpoint};
 
-/// The only beams of a design, and whether its region cuts some.
+/// The only beams of a design of which something is in its region, and whether this cuts some.
 pub(super) struct Written<'a> {
     name: &'a str,
     graph: Cow<'a, Graph>,
+    /// Fillets aside.
     pub(super) quadors: Arc<Quadors>,
+    has_fillets: bool,
     cut: bool,
 }
 
@@ -36,12 +38,30 @@ pub(super) fn written(built: &Built) -> Result<Written<'_>, Fault> {
         Fault::new("", message)
     };
     let (name, beams) = build_beams::only(built).map_err(refuse)?;
-    let (graph, quadors) = match beams {
+    let cut = !build_beams::held(beams, built);
+    let (mut graph, mut quadors) = match beams {
         Beams::Truss(t) => (Cow::Borrowed(&t.graph), t.quadors.clone()),
         Beams::Pattern(laid) => (Cow::Owned(laid.pattern().expanded()?), laid.expand()?),
     };
     checkpoint();
-    Ok(Written { name, graph, quadors, cut: !build_beams::held(beams, built) })
+    let has_fillets = quadors.fillet() != Fillet::None;
+    let kept = match beams {
+        Beams::Truss(t) => t.within.struts.clone(),
+        Beams::Pattern(_) if cut => beams_in(&quadors, &*built.solid.region),
+        Beams::Pattern(_) => Vec::new(),
+    };
+    if kept.contains(&false) {
+        graph = Cow::Owned(graph.part(&kept));
+        if graph.beams.is_empty() {
+            return Err(Fault::new(
+                "",
+                "no beam lies in the region, only fillets of beams do: a file of beams would be empty",
+            ));
+        }
+        quadors = Arc::new(Quadors::new(&graph, Fillet::None)?);
+        checkpoint();
+    }
+    Ok(Written { name, graph, quadors, has_fillets, cut })
 }
 
 impl Written<'_> {
@@ -67,7 +87,7 @@ impl Written<'_> {
 
     /// What any file of beams loses, unless it has the region's mesh and fillets.
     fn lost(&self, clipped: bool) -> Vec<String> {
-        let hubs = if self.quadors.fillet() == Fillet::None { 0 } else { self.quadors.len() };
+        let hubs = if self.has_fillets { self.quadors.len() } else { 0 };
         let filleted = (0..hubs).filter(|i| self.quadors.hub(*i).half_beams.len() > 1).count();
         let mut lost = Vec::new();
         if filleted > 0 {

@@ -20,7 +20,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use crate::kind::DesignError;
 use crate::region::HalfSpace;
-use crate::truss::{Beams, Truss, fill};
+use crate::truss::{self, Beams, Truss, fill};
 use ::beams::Plane;
 use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
@@ -103,10 +103,13 @@ pub(super) fn beams(
     checkpoint();
     let mut collisions = quadors.collisions();
     collisions.retain(|c| inside(c.at));
+    let whole = whole(&quadors, region);
+    let within = if whole { wire.whole() } else { truss::within(&quadors, region, &inside) };
     let truss = Truss {
-        whole: whole(&quadors, region),
+        whole,
         collisions,
-        report: wire.report(&inside),
+        report: wire.report(&within),
+        within,
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         shortfalls,
         cell: cell.map(|u| u.name),

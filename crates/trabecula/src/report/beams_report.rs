@@ -18,9 +18,9 @@ pub struct BeamsReport {
     pub fraction_exact: bool,
     /// 1 − fraction.
     pub porosity: f64,
-    /// Diameter of the thinnest beam, mm.
+    /// Diameter of the thinnest beam in the region, mm.
     pub thickness: f64,
-    /// Least and greatest radius of hubs, mm.
+    /// Least and greatest radius of the hubs of these, mm.
     pub hub_radius: [f64; 2],
     /// Volume with fillets, mm³; None where the region cuts the beams or beams collide.
     pub volume: Option<f64>,
@@ -35,15 +35,15 @@ pub struct BeamsReport {
 /// What is known of a graph of beams alone.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct GraphReport {
-    /// Number of hubs in the region.
+    /// Number of hubs whose centre is in the region.
     pub hubs: usize,
-    /// Number of beams in the region.
+    /// Number of beams of which something is in the region: whose axis is somewhere nearer to it than the beam's radius there.
     pub beams: usize,
     /// Radius of beams, mm, solved for from the fraction asked for; None where the radius is given.
     pub solved_radius: Option<f64>,
-    /// Least and greatest length of beams, mm.
-    pub length: [f64; 2],
-    /// Length of all beams, mm.
+    /// Least and greatest length of these beams from hub to hub, mm; None where there are none, only fillets of others.
+    pub length: Option<[f64; 2]>,
+    /// Sum of these lengths, mm: also of beams that the region cuts, in full.
     pub total_length: f64,
     /// Surface area, mm²; None where the volume is.
     pub area: Option<f64>,
@@ -51,7 +51,7 @@ pub struct GraphReport {
     pub centroid: Option<[f64; 3]>,
     /// Inertia tensor about the centre of mass for density 1, mm⁵.
     pub inertia: Option<[[f64; 3]; 3]>,
-    /// Number of nodes by their number of beams.
+    /// Number of hubs in the region by their number of beams.
     pub valence: BTreeMap<String, usize>,
     /// Least and greatest radius of fillets at their tightest places, mm; None without fillets.
     pub fillet_radius: Option<[f64; 2]>,
@@ -61,7 +61,7 @@ pub struct GraphReport {
     pub smallest_angle: Option<f64>,
     /// Position of that node, mm.
     pub smallest_angle_at: Option<[f64; 3]>,
-    /// Number of connected components of the graph.
+    /// Number of connected components of these beams, which are joined at hubs whose ball reaches into the region.
     pub pieces: usize,
     /// Number of nodes inside the region with a single beam.
     pub dangling: usize,

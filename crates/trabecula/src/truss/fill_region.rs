@@ -92,11 +92,12 @@ mod tests {
             let mut wireframe = fill(&graph, &affine(4.0), &bounds, 0.0).expect("a wireframe");
             let done = wireframe.clean(1e-9, &mut GivenRadii::default());
             assert_eq!(done, Default::default(), "{}", unit.name);
-            let report = wireframe.report(&|_| true);
+            let report = wireframe.report(&wireframe.whole());
             let mut lengths = graph.lengths([4.0; 3]);
             lengths.sort_by(f64::total_cmp);
-            assert!((report.length[0] - lengths[0]).abs() < 1e-9, "{}", unit.name);
-            assert!((report.length[1] - lengths[lengths.len() - 1]).abs() < 1e-9);
+            let [least, most] = report.length.expect("struts");
+            assert!((least - lengths[0]).abs() < 1e-9, "{}", unit.name);
+            assert!((most - lengths[lengths.len() - 1]).abs() < 1e-9);
             // A node deeper than the longest strut has all its struts.
             let deep = bounds.grown(-lengths[lengths.len() - 1]);
             let mut valence = vec![0; wireframe.nodes.len()];

@@ -1,6 +1,7 @@
 //! Laws of the whole: random designs, rates of convergence, bodies known exactly.
 
 mod beam_fraction;
+mod beams_in_region;
 mod blend;
 mod combined;
 mod common;

@@ -84,3 +84,36 @@ fn the_volume_error_reported_bounds_the_realised_one() {
         assert!(realised <= 3.0 * reported + 1e-5, "{realised:.1e}, reported {reported:.1e} at {edge:.4}:\n{text}");
     }
 }
+
+/// As above, of random frames of beams (more in a campaign), turned, with and without fillets: nor is the realised error less than a tenth
+/// of the one reported. Beams lose volume by chords; what a coarse grid does to the thinnest ones is in it too.
+#[test]
+fn the_volume_error_reported_of_beams_is_near_the_realised_one() {
+    let mut random = Random(12);
+    let fillets = ["\"none\"", "\"auto\"", "{ tau = 0.7 }", "{ radius = 0.05 }"];
+    for _ in 0..cases(8) {
+        let cell = ["sc", "bcc", "fcc", "octet", "diamond", "kelvin"][random.below(6)];
+        let (radius, fillet) = (random.between(0.04, 0.07), fillets[random.below(4)]);
+        let [u, v, w] = [0; 3].map(|_| random.between(-180.0, 180.0) * f64::from(random.below(2) as u8));
+        let [x, y, z] = [0; 3].map(|_| random.between(-1.0, 1.0));
+        let text = format!(
+            "schema = 1\n[region.box]\nmin = [{x}, {y}, {z}]\nmax = [{}, {}, {}]\n[beams.a]\ncell = \"{cell}\"\nradius = {radius}\nfillet = \
+             {fillet}\nmap.affine = {{ wavelength = 1, rotate = [{u}, {v}, {w}] }}",
+            x + random.between(1.5, 2.2),
+            y + random.between(1.5, 2.2),
+            z + random.between(1.5, 2.2),
+        );
+        let built = Design::from_toml(&text).expect("text").build(&NoFiles).expect("built");
+        let edge = 2.0 * radius / random.between(1.4, 6.0);
+        let volume = |edge: f64| {
+            let options = Options { resolution: edge, islands: Islands::Keep };
+            GridSurface(&built.solid).measure(&options, &Silent).expect("surface").figures.size.volume
+        };
+        let realised = (volume(edge) / volume(0.3 * edge) - 1.0).abs();
+        let reported = built.volume_error(edge).expect("beams");
+        assert!(
+            realised <= 3.0 * reported && realised >= 0.1 * reported,
+            "{realised:.1e}, reported {reported:.1e} at {edge:.4}:\n{text}"
+        );
+    }
+}

@@ -147,8 +147,11 @@ pub(in crate::design) fn report(
         Beams::Pattern(laid) => return build_pattern::report(laid, built, sampled),
     };
     let (frame, graph, quadors) = (&truss.report, &truss.graph, &truss.quadors);
-    let radii = graph.hubs.iter().map(|h| h.radius);
-    let thin = (0..graph.beams.len()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
+    // Where there are fillets alone, those of all beams that have them.
+    let only_fillets = frame.struts == 0;
+    let present = || (0..graph.beams.len()).filter(|b| only_fillets || truss.within.struts[*b]);
+    let radii = present().flat_map(|b| quadors.pencil(b).radii);
+    let thin = present().map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
     // Of a part that the region cuts, or whose beams intersect, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();

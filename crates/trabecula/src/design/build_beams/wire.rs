@@ -142,18 +142,9 @@ pub(super) fn tables(
             let text = String::from_utf8_lossy(&text);
             graph::struts(&text, &nodes).map_err(|f| wrong(path, "struts", f))?
         }
-        StrutsSpec::Rows(Pairs(rows)) => {
-            for (i, n) in rows.iter().enumerate().flat_map(|(i, r)| r.iter().map(move |n| (i, n))) {
-                if *n as usize >= nodes.positions.len() {
-                    let message = format!(
-                        "there is no node {n}; there are {}, counted from 0",
-                        counted(nodes.positions.len(), "node")
-                    );
-                    let at = format!("{}[{i}]", below("struts"));
-                    return Err(DesignError::new(at, message).found(n.to_string()));
-                }
-            }
-            Wireframe { nodes: nodes.positions.clone(), struts: rows.clone() }
+        StrutsSpec::Rows(pairs) => {
+            let struts = numbered(pairs, nodes.positions.len(), &below("struts"))?;
+            Wireframe { nodes: nodes.positions.clone(), struts }
         }
     };
     if spec.fraction.is_some() && !nodes.radii.is_empty() {
@@ -166,6 +157,22 @@ pub(super) fn tables(
         return Err(DesignError::new(&environment.path, message));
     }
     Ok((wire, GivenRadii { nodes: nodes.radii, struts: Vec::new() }))
+}
+
+/// Struts listed in the design, between some of `count` nodes.
+fn numbered(pairs: &Pairs, count: usize, path: &str) -> Result<Vec<[u32; 2]>, DesignError> {
+    let mut struts = Vec::with_capacity(pairs.0.len());
+    for (i, ids) in pairs.0.iter().enumerate() {
+        if let Some(NodeId(n)) = ids.iter().find(|id| id.0 < 0 || id.0 as usize >= count) {
+            let all =
+                if count == 1 { "its number is 0".into() } else { format!("their numbers are 0 to {}", count - 1) };
+            let are = if count == 1 { "is" } else { "are" };
+            let message = format!("there is no node {n}; there {are} {}, {all}", counted(count, "node"));
+            return Err(DesignError::new(format!("{path}[{i}]"), message).found(n.to_string()));
+        }
+        struts.push(ids.map(|id| id.0 as u32));
+    }
+    Ok(struts)
 }
 
 /// Nodes listed in the design.

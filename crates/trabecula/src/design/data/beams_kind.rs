@@ -225,7 +225,37 @@ pub enum StrutsSpec {
 
 /// Struts: pairs of node ids, whole numbers from 0.
 #[derive(Clone, Debug, PartialEq, Kind)]
-pub struct Pairs(#[kind(least = 1)] pub Vec<[u32; 2]>);
+pub struct Pairs(#[kind(least = 1)] pub Vec<[NodeId; 2]>);
+
+/// The id of a node: those that there are, and so the ids allowed, are known where the nodes are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeId(pub i32);
+
+impl Kind for NodeId {
+    fn expected() -> String {
+        i32::expected()
+    }
+
+    fn fits(node: &Node) -> u8 {
+        i32::fits(node)
+    }
+
+    fn read(at: &At) -> Result<Self, DesignError> {
+        i32::read(at).map(NodeId)
+    }
+
+    fn write(&self) -> Node {
+        self.0.write()
+    }
+
+    fn check(&self, _: &Key) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn schema(key: &Key, defs: &mut Defs) -> Node {
+        u32::schema(key, defs)
+    }
+}
 
 /// A graph that is repeated by up to three steps: what is at [i, j, k] is the first step done i times, then the second j
 /// times, then the third k times. It is not written out, however often it is repeated.
