@@ -89,7 +89,7 @@ CONTROL = {
 
 
 #: Kinds whose file may be given as data in memory: their type, what makes a file of them, and how they are given.
-HELD = {
+IN_MEMORY = {
     "grid": ("ArrayLike", "grid", "Or the numbers themselves, an array (nx, ny, nz), with origin and step."),
     "points": ("ArrayLike", "cloud", "Or the rows themselves, an array (n, 4) or a data frame."),
     "mesh": ("MeshLike", "mesh", "Or a mesh in memory: ours, of trimesh, pyvista or meshio, or (vertices, triangles)."),
@@ -107,9 +107,9 @@ def converted(name, schema, required, kind_of_table):
         return f"Stops{optional}", f"{name}=pairs({name})"
     if "propertyNames" in of:
         return f"Mapping[int, {annotation(of['additionalProperties'])}]{optional}", f"{name}={name}"
-    if name == "path" and kind_of_table in HELD:
-        hint, maker, _ = HELD[kind_of_table]
-        return f"{PATH} | {hint}{optional}", f"path=held.path_of(path, held.{maker})"
+    if name == "path" and kind_of_table in IN_MEMORY:
+        hint, maker, _ = IN_MEMORY[kind_of_table]
+        return f"{PATH} | {hint}{optional}", f"path=memory.path_of(path, memory.{maker})"
     if name == "path":
         form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
         return f"{PATH}{optional}", f"path={form}"
@@ -156,7 +156,7 @@ def builder(name, schema):
             starred = True
         kind, item = converted(key, value, required, name)
         signature.append(f"{key}: {kind}")
-        more = f" {HELD[name][2]}" if key == "path" and name in HELD else ""
+        more = f" {IN_MEMORY[name][2]}" if key == "path" and name in IN_MEMORY else ""
         rows.append(sentence(key, value, required) + more)
         given.append(item)
     head = wrapped(f"def {name}(", signature, ") -> dict:")
@@ -177,7 +177,7 @@ def module(definition, text):
     used += [f"from collections.abc import {generic}"] * bool(generic)
     used += ["from typing import Literal"] * ("Literal[" in body)
     given = ["named", *(n for n in ("control", "pairs", "settings") if f"{n}(" in body)]
-    used_here = ["from . import held"] * ("held." in body)
+    used_here = ["from . import memory"] * ("memory." in body)
     lines += [*used, "", *used_here, f"from .given import {', '.join(sorted(given))}", ""]
     hinted = [n for n in ("MeshLike", "Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
     lines += ["TYPE_CHECKING = False  # as type checkers know it, without the import", "if TYPE_CHECKING:"]

@@ -54,7 +54,7 @@ def test_a_ball_is_meshed_face_to_face():
     assert boundary.closed and np.isclose(boundary.volume, of.sum(), rtol=1e-12)
     # Boundary nodes are outside of the surface by what chords between them are inside, at most size² / 8R and some.
     off = np.linalg.norm(boundary.vertices, axis=1) - 5
-    assert -1e-6 < off.min() and off.mean() > 0 and off.max() < 1.5**2 / 16
+    assert off.min() > -1e-6 and off.mean() > 0 and off.max() < 1.5**2 / 16
     assert not report["warnings"] and mesh.volume == pytest.approx(report["region_volume"], rel=5e-4)
     assert np.isclose(report["region_volume"], 4 / 3 * np.pi * 5**3, rtol=1e-12)
     assert report["fit"]["to_part"]["max"] < 1.5**2 / 8

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from . import held
+from . import memory
 from .given import named, plain, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -82,7 +82,7 @@ def file(
     ``step`` (mm, one or three) apart; without it the function is the numbers.
     """
     more = settings(terms=terms, threshold=threshold, step=step, period=period)
-    return {"file": {"path": held.path_of(path, held.grid), **more}}
+    return {"file": {"path": memory.path_of(path, memory.grid), **more}}
 
 
 def tet_names() -> list[TetName]:

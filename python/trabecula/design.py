@@ -12,7 +12,7 @@ from . import _core
 from .errors import DesignError, warn_caller
 from .files import extension, read_text, write_bytes, write_text
 from .given import copied, named, settings, three
-from .held import HELD, Held, content, file_name
+from .memory import IN_MEMORY, InMemory, content, file_name
 
 if TYPE_CHECKING:
     from .given import Vector
@@ -156,7 +156,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data = _moved(data, lambda path: path if path.startswith(HELD) else os.path.abspath(os.path.join(folder, path)))
+        data = _moved(data, lambda path: path if path.startswith(IN_MEMORY) else os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -180,7 +180,7 @@ class Design:
         from .solid import Solid
 
         folder = self.folder or os.getcwd()
-        made = Solid(self._checked().build(folder), folder, held_in(self.to_dict()))
+        made = Solid(self._checked().build(folder), folder, in_memory_in(self.to_dict()))
         for warning in made.warnings:
             warn_caller(warning["message"], warning["path"])
         return made
@@ -188,7 +188,7 @@ class Design:
     def files(self) -> list[str]:
         """The files that the design reads, as absolute paths."""
         folder = self.folder or os.getcwd()
-        return [os.path.join(folder, name) for name in files_in(self.to_dict()) if not name.startswith(HELD)]
+        return [os.path.join(folder, name) for name in files_in(self.to_dict()) if not name.startswith(IN_MEMORY)]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right; arrays, tables and
@@ -199,10 +199,10 @@ class Design:
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data = _moved(data, lambda path: path if path.startswith(HELD) else _relative(os.path.join(old, path), new))
+        data = _moved(data, lambda path: path if path.startswith(IN_MEMORY) else _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
-        for name in {name for name in files_in(data) if name.startswith(HELD)}:
+        for name in {name for name in files_in(data) if name.startswith(IN_MEMORY)}:
             write_bytes(os.path.join(new, file_name(name)), content(name))
         checked = _core.Design.from_data(_moved(data, file_name))
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
@@ -296,9 +296,9 @@ def spartan(
     return Design(region=box, lattice={name: lattice})
 
 
-def held_in(data: Any) -> list[Held]:
+def in_memory_in(data: Any) -> list[InMemory]:
     """The data in memory that plain data name."""
-    return [name for name in files_in(data) if isinstance(name, Held)]
+    return [name for name in files_in(data) if isinstance(name, InMemory)]
 
 
 def files_in(data: Any) -> list[str]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from typing import Literal
 
-from . import held
+from . import memory
 from .given import control, named, pairs, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -85,7 +85,7 @@ def grid(
     array: Name of the array, where a file has several. [optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"grid": settings(path=held.path_of(path, held.grid), origin=origin, step=step, array=array, remap=pairs(remap))}
+    return {"grid": settings(path=memory.path_of(path, memory.grid), origin=origin, step=step, array=array, remap=pairs(remap))}
 
 
 @named
@@ -98,7 +98,7 @@ def points(path: str | os.PathLike[str] | ArrayLike, neighbours: int | None = No
     neighbours: Number of nearest points that count. [from 1 to 64, default 8]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"points": settings(path=held.path_of(path, held.cloud), neighbours=neighbours, remap=pairs(remap))}
+    return {"points": settings(path=memory.path_of(path, memory.cloud), neighbours=neighbours, remap=pairs(remap))}
 
 
 @named

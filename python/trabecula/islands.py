@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .errors import IslandsWarning, warn_caller
 
-__all__ = ["check_islands", "left_out", "warn_islands"]
+__all__ = ["check_islands", "warn_islands"]
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -23,11 +23,6 @@ def check_islands(islands: object) -> None:
     """Refuses what is no word for it, before any work is done."""
     if not (isinstance(islands, str) and islands in ISLANDS):
         raise ValueError(f'islands is {islands!r}; it must be "keep", "drop-small", "drop" or "error"')
-
-
-def left_out(islands: IslandsReport) -> float:
-    """Volume of what was dropped less that of the voids that were filled, mm³."""
-    return islands.dropped_volume - islands.filled_volume
 
 
 def warn_islands(islands: IslandsReport, words: str) -> None:

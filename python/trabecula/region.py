@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
-from . import held
+from . import memory
 from .given import named, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -133,7 +133,7 @@ def mesh(
     solid: Of a STEP or IGES file: name of the solid that is read (all of them unless given). [optional]
     """
     given = settings(
-        path=held.path_of(path, held.mesh),
+        path=memory.path_of(path, memory.mesh),
         unit=unit,
         scale=scale,
         repair=repair,

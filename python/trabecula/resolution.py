@@ -64,11 +64,9 @@ class Resolution:
             error = self._core.volume_error(spacing)
             if error is not None and error > CHORDS:
                 better = spacing * (SLIGHT / error) ** 0.5
-                warnings.warn(
+                warn_caller(
                     f"with {min(beams) / spacing:.2g} grid steps of {spacing:g} mm through the thinnest beam, chords cost "
-                    f"about {100 * error:.1g} % of the volume of beams; with an edge of {better:.2g} mm {100 * SLIGHT:g} %",
-                    DesignWarning,
-                    stacklevel=3,
+                    f"about {100 * error:.2g} % of the volume of beams; with an edge of {better:.2g} mm {100 * SLIGHT:g} %",
                 )
 
     def _warn_beyond(self, step: float) -> None:
@@ -101,10 +99,10 @@ class Resolution:
             return
         share, region = self._core.expected()
         found = volume / region
-        # A share of the fraction, and three standard deviations of the sample that the expected one is from. Over tetrahedra
-        # the sample may lie where none is.
+        # A share of the fraction and of the porosity, and three deviations of the sample that the expected one is from. Over
+        # tetrahedra the sample may lie where none is.
         tets = any(it.tets for it in self.report().lattices.values())
-        if abs(found - share) > min(0.05, share / 3, math.inf if tets else 0.05 * share + 0.005):
+        if abs(found - share) > min(0.05, share / 3, max((1 - share) / 3, 0.005), math.inf if tets else 0.05 * share + 0.005):
             better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
             warn_caller(
                 f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design one of about "

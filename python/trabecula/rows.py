@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import _core
-from .design import Design, _moved, held_in
+from .design import Design, _moved, in_memory_in
 from .errors import DesignWarning
-from .held import Held
 from .keys import listless, missing, unit_of
+from .memory import InMemory
 from .solid import Solid
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -69,17 +69,18 @@ class Job:
         """As plain data, the folder of the design and its data in memory included."""
         data = {key: getattr(self, key) for key in ("edge", "per_cell", "meshes", "pictures", "properties", "threads")}
         design = self.design.to_dict()
-        held = {name: base64.b64encode(name.content).decode() for name in held_in(design)}
-        return data | {"design": design, "folder": self.design.folder or os.getcwd()} | ({"held": held} if held else {})
+        memory = {name: base64.b64encode(name.content).decode() for name in in_memory_in(design)}
+        return data | {"design": design, "folder": self.design.folder or os.getcwd()} | ({"memory": memory} if memory else {})
 
     @staticmethod
     def of(data: Mapping[str, Any]) -> Job:
         """From plain data."""
-        settings = {key: value for key, value in data.items() if key not in ("design", "folder", "held")}
-        held = {
-            name: Held.of(base64.b64decode(content), name.rpartition(".")[2]) for name, content in data.get("held", {}).items()
+        settings = {key: value for key, value in data.items() if key not in ("design", "folder", "memory")}
+        memory = {
+            name: InMemory.of(base64.b64decode(content), name.rpartition(".")[2])
+            for name, content in data.get("memory", {}).items()
         }
-        design = _moved(data["design"], lambda name: held.get(name, name))
+        design = _moved(data["design"], lambda name: memory.get(name, name))
         return Job(Design(**design, folder=data["folder"]), **settings)
 
 

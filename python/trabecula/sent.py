@@ -7,7 +7,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator
 
-from . import held
+from . import memory
 from .design import files_in, parsed
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -46,7 +46,7 @@ def put_files(given: dict[str, dict[str, bytes]], folder: str) -> dict[str, str]
     """Writes such files to a folder; their names there by those that the design has for them."""
     places = {}
     for n, (name, files) in enumerate(given.items()):
-        places[name] = f"{n}/{os.path.basename(held.file_name(name).rstrip('/'))}"
+        places[name] = f"{n}/{os.path.basename(memory.file_name(name).rstrip('/'))}"
         for inner, content in files.items():
             at = os.path.join(folder, str(n), inner)
             os.makedirs(os.path.dirname(at), exist_ok=True)
@@ -57,8 +57,8 @@ def put_files(given: dict[str, dict[str, bytes]], folder: str) -> dict[str, str]
 
 def _contents(name: str, folder: str) -> Iterator[tuple[str, bytes]]:
     """The files behind a name in a design with their bytes."""
-    if name.startswith(held.HELD):
-        yield held.file_name(name), held.content(name)
+    if name.startswith(memory.IN_MEMORY):
+        yield memory.file_name(name), memory.content(name)
         return
     for inner, path in _paths(name, folder):
         with open(path, "rb") as file:

@@ -15,7 +15,7 @@ from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
 from .given import flag, number, positions, positive, shard_bytes, thread_count
 from .implicit import save_implicit
-from .islands import check_islands, left_out, warn_islands
+from .islands import check_islands, warn_islands
 from .layers import Layers
 from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .held import Held
     from .islands import Islands
+    from .memory import InMemory
     from .reports import (
         BeamsFileReport,
         DanglingReport,
@@ -76,11 +76,11 @@ class Solid(Seen, Simulated, Resolution):
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
     """
 
-    def __init__(self, core: _core.Solid, folder: str = "", held: Sequence[Held] = ()):
+    def __init__(self, core: _core.Solid, folder: str = "", memory: Sequence[InMemory] = ()):
         self._core = core
         self._folder = folder
         #: Data in memory that its design names, which are there as long as this.
-        self._held = held
+        self._memory = memory
 
     def __copy__(self) -> Solid:
         return self
@@ -89,7 +89,7 @@ class Solid(Seen, Simulated, Resolution):
         return self
 
     def __reduce__(self) -> tuple:
-        return _rebuilt, (self._core.design, self._folder, self._held)
+        return _rebuilt, (self._core.design, self._folder, self._memory)
 
     def __repr__(self) -> str:
         (a, b, c), (d, e, f) = self.bounds
@@ -295,7 +295,7 @@ class Solid(Seen, Simulated, Resolution):
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, thread_count(threads), progress, islands)
-        self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
+        self._warn_coarse(core.volume() + others.dropped_volume, spacing, pieces=others.found + 1)
         warn_islands(others, words)
         if not smooth:
             return Mesh(core, self._core.region, spacing, others)
@@ -350,7 +350,7 @@ class Solid(Seen, Simulated, Resolution):
             from . import ranges
 
             made, quality, islands = ranges.measure(self, spacing, volume, threads, progress, **apart)
-        self._warn_coarse(made.volume + left_out(islands), spacing, pieces=islands.found + 1)
+        self._warn_coarse(made.volume + islands.dropped_volume, spacing, pieces=islands.found + 1)
         return made, quality
 
     def _chord_of(self, chord: float | None, edge: float | None, per_cell: float | None, islands: str) -> float | None:
@@ -579,7 +579,7 @@ class Solid(Seen, Simulated, Resolution):
 
     def _accept(self, made: SurfaceReport, words: str, spacing: float, accept: Callable[[SurfaceReport], Any]) -> None:
         """Warns of what may be wrong with a surface before its file gets its name."""
-        self._warn_coarse(made.volume + left_out(made.islands), spacing, pieces=made.islands.found + 1)
+        self._warn_coarse(made.volume + made.islands.dropped_volume, spacing, pieces=made.islands.found + 1)
         warn_islands(made.islands, words)
         accept(made)
 
@@ -760,6 +760,6 @@ def _shards_in(name: str) -> str:
     return folder
 
 
-def _rebuilt(design: str, folder: str, held: Sequence[Held] = ()) -> Solid:
+def _rebuilt(design: str, folder: str, memory: Sequence[InMemory] = ()) -> Solid:
     """A solid that was pickled."""
-    return Solid(_core.Design.from_text(design).build(folder), folder, held)
+    return Solid(_core.Design.from_text(design).build(folder), folder, memory)

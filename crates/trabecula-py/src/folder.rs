@@ -13,15 +13,15 @@ use trabecula::design::{CadMesh, FaceLabel, Loader, Scan, Tessellation, ZonedEle
 use crate::arrays::table;
 
 /// How names begin that are no files, but bytes in Python's memory.
-const HELD: &str = "held:";
+const IN_MEMORY: &str = "memory:";
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
 
 impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-        if path.starts_with(HELD) {
-            return held(path);
+        if path.starts_with(IN_MEMORY) {
+            return in_memory(path);
         }
         crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
     }
@@ -85,10 +85,10 @@ type ReadResult<'py> = (
 );
 
 /// The bytes that Python has under a name.
-fn held(name: &str) -> Result<Vec<u8>, String> {
+fn in_memory(name: &str) -> Result<Vec<u8>, String> {
     Python::attach(|py| {
         let read = || -> PyResult<Vec<u8>> {
-            let found = py.import("trabecula.held")?.getattr("content")?.call1((name,))?;
+            let found = py.import("trabecula.memory")?.getattr("content")?.call1((name,))?;
             Ok(found.cast::<PyBytes>()?.as_bytes().to_vec())
         };
         read().map_err(|e| words(py, &e))

@@ -20,31 +20,31 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["HELD", "Held", "cloud", "content", "file_name", "grid", "mesh", "path_of"]
+__all__ = ["IN_MEMORY", "InMemory", "cloud", "content", "file_name", "grid", "mesh", "path_of"]
 
 #: How the names begin; the core knows it.
-HELD = "held:"
+IN_MEMORY = "memory:"
 #: What is in use, by name.
-_known: weakref.WeakValueDictionary[str, Held] = weakref.WeakValueDictionary()
+_known: weakref.WeakValueDictionary[str, InMemory] = weakref.WeakValueDictionary()
 
 
-class Held(str):
+class InMemory(str):
     """The name of data in memory, and the bytes of the file that they would be, which are there as long as it is."""
 
     content: bytes
 
     @staticmethod
-    def of(content: bytes, suffix: str) -> Held:
+    def of(content: bytes, suffix: str) -> InMemory:
         """The name of these bytes."""
-        name = f"{HELD}{hashlib.sha256(content).hexdigest()}.{suffix}"
+        name = f"{IN_MEMORY}{hashlib.sha256(content).hexdigest()}.{suffix}"
         made = _known.get(name)
         if made is None:
-            made = _known[name] = Held(name)
+            made = _known[name] = InMemory(name)
             made.content = content
         return made
 
     def __reduce__(self) -> tuple:
-        return Held.of, (self.content, self.rpartition(".")[2])
+        return InMemory.of, (self.content, self.rpartition(".")[2])
 
 
 def content(name: str) -> bytes:
@@ -57,15 +57,15 @@ def content(name: str) -> bytes:
 
 def file_name(name: str) -> str:
     """The name of a file for data in memory."""
-    return name.removeprefix(HELD)
+    return name.removeprefix(IN_MEMORY)
 
 
-def path_of(given: Any, hold: Callable[[Any], Held]) -> str:
+def path_of(given: Any, hold: Callable[[Any], InMemory]) -> str:
     """The path of a file, or the name of what is given in its place, which ``hold`` makes."""
     return os.fspath(given) if isinstance(given, (str, os.PathLike)) else hold(given)
 
 
-def grid(given: Any) -> Held:
+def grid(given: Any) -> InMemory:
     """Numbers on a grid, (nx, ny, nz), as a .npy."""
     import io
 
@@ -74,18 +74,18 @@ def grid(given: Any) -> Held:
     numbers = _numbers("the grid", given, 3)
     out = io.BytesIO()
     np.save(out, numbers)
-    return Held.of(out.getvalue(), "npy")
+    return InMemory.of(out.getvalue(), "npy")
 
 
-def cloud(given: Any) -> Held:
+def cloud(given: Any) -> InMemory:
     """Rows of x, y, z (mm) and a value as a .csv, with the names of a data frame's columns if x, y and z are among them."""
     rows = _numbers("the points", given, 2).tolist()
     names = [str(name) for name in getattr(given, "columns", ())]
     head = [",".join(names)] if {"x", "y", "z"} <= {name.lower() for name in names} else []
-    return Held.of("\n".join([*head, *(",".join(map(repr, row)) for row in rows), ""]).encode(), "csv")
+    return InMemory.of("\n".join([*head, *(",".join(map(repr, row)) for row in rows), ""]).encode(), "csv")
 
 
-def mesh(given: Any) -> Held:
+def mesh(given: Any) -> InMemory:
     """A mesh, (vertices, triangles) or one of another package, as a .ply in double precision."""
     import numpy as np
 
@@ -102,7 +102,7 @@ def mesh(given: Any) -> Held:
         "property double x\nproperty double y\nproperty double z\n"
         f"element face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
     )
-    return Held.of(head.encode() + made.vertices.astype("<f8").tobytes() + faces.tobytes(), "ply")
+    return InMemory.of(head.encode() + made.vertices.astype("<f8").tobytes() + faces.tobytes(), "ply")
 
 
 def _numbers(what: str, given: Any, dimensions: int) -> NDArray[np.float64]:

@@ -105,7 +105,7 @@ def test_solids_sweeps_and_ranges_have_the_data(tmp_path):
     assert again.mesh(edge=0.4).volume == expected == solid.mesh(edge=0.4).volume
     assert solid.save(tmp_path / "a.stl", edge=0.4, resume=True).volume == pytest.approx(expected, rel=1e-9)
     del solid, again
-    with pytest.raises(lt.DesignError, match=r"held:[0-9a-f]{64}\.npy is data that no design in this process holds"):
+    with pytest.raises(lt.DesignError, match=r"memory:[0-9a-f]{64}\.npy is data that no design in this process holds"):
         lt.Design(**__import__("json").loads(lt._core.Design.from_text(text).to_json())).build()
 
 
