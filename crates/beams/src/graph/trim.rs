@@ -138,7 +138,7 @@ fn min_distance(region: Values, [a, b]: [Vec3; 2], enough: f64) -> f64 {
         // By the Lipschitz bound no point before this step is within `enough`.
         t += ((d - enough) / length).max(1.0 / MIN_STEPS);
     }
-    min_distance
+    min_distance.min(value_at(region, b))
 }
 
 /// Parameter (0 to 1) at which a segment that begins inside first leaves the region by more than `slack`.
@@ -181,6 +181,13 @@ mod tests {
         let mut cut = comb();
         let done = Trim::Cut.apply(&mut cut, ball, 0.3, 0.0, &mut GivenRadii::default());
         assert_eq!((cut.struts.len(), done.outside), (8, 4));
+        // Of one whose end alone is near, whichever it is.
+        let tip: Values = &|p, out| out.iter_mut().zip(p).for_each(|(o, p)| *o = norm(sub(*p, [0.0, 3.0, 0.0])) - 1.0);
+        for struts in [vec![[0, 1]], vec![[1, 0]]] {
+            let mut tall = Wireframe { nodes: vec![[0.0, -7.0, 0.0], [0.0, 1.71, 0.0]], struts };
+            let done = Trim::Cut.apply(&mut tall, tip, 0.3, 0.0, &mut GivenRadii::default());
+            assert_eq!((tall.struts.len(), done.outside), (1, 0));
+        }
         let mut dropped = comb();
         let done = Trim::Drop.apply(&mut dropped, ball, 0.3, 0.0, &mut GivenRadii::default());
         assert_eq!((dropped.struts.len(), done.dropped), (6, 6));
