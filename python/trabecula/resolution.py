@@ -66,7 +66,7 @@ class Resolution:
                 better = spacing * (SLIGHT / error) ** 0.5
                 warn_caller(
                     f"with {min(beams) / spacing:.2g} grid steps of {spacing:g} mm through the thinnest beam, chords cost "
-                    f"about {100 * error:.2g} % of the volume of beams; with an edge of {better:.2g} mm {100 * SLIGHT:g} %",
+                    f"about {100 * error:.2g} % of the volume of beams; an edge of {better:.2g} mm leaves {100 * SLIGHT:g} %",
                 )
 
     def _warn_beyond(self, step: float) -> None:
