@@ -228,6 +228,20 @@ def test_what_is_left_out_and_far_from_the_surface_is_warned_of(tmp_path):
     assert "mm off the surface" in words
 
 
+def test_what_no_tetrahedron_has_seen_is_left_out_too():
+    # Struts thinner than an edge: nearly half of them lie between the nodes.
+    region = lt.region.box([8, 8, 8])
+    part = lt.Lattice(cell=lt.cell.tet("pn3m_dual"), part="lower", map=lt.map.tets(size=4), level=lt.level.fraction(0.2))
+    made = lt.Design(region=region, lattice=part).build()
+    with pytest.warns(lt.DesignWarning) as found:
+        mesh = made.volume_mesh(edge=0.8)
+    (words,) = [str(w.message) for w in found if "left out" in str(w.message)]
+    stated = float(words.split(" ", 1)[0])
+    assert mesh.report().dropped < stated
+    # Within the deviation of the sample.
+    assert stated == pytest.approx(0.2 * 8**3 - mesh.volume, abs=0.02 * 0.2 * 8**3)
+
+
 def test_a_size_that_nobody_gave_is_bounded(monkeypatch):
     part = solid("gyroid", "sheet", 0.3, lt.region.box([8, 8, 8]))
     full = part.volume_mesh()

@@ -196,7 +196,7 @@ def volume(args) -> None:
         what = "tetrahedra"
         quality = f", dihedral angles {figures['min_angle']:.1f} to {figures['max_angle']:.1f} degrees"
     if figures.get("dropped", 0) > 1e-6 * made.volume:
-        quality += f", {figures['dropped']:.2g} mm³ left out"
+        quality += f", {figures['dropped']:.2g} mm³ dropped"
     say(
         f"{args.output}: {figures['elements']} {what}, {figures['nodes']} nodes, volume {figure(made.volume)} mm³{quality}; "
         f"sets {', '.join(figures['sets'])}; {figures['seconds']:.2f} s"

@@ -555,13 +555,15 @@ def warn_sharp(made: ShellMesh) -> None:
     warn_caller(message)
 
 
-def warn_flaws(made: VolumeMesh, one: bool) -> None:
-    """Warns of what was left out, of faces far from the surface, of several components, if there should be ``one``, of surfaces
-    that cross, and of badly shaped tetrahedra."""
+def warn_flaws(made: VolumeMesh, one: bool, missing: float = 0.0) -> None:
+    """Warns of what was left out, which is what was dropped or more if more is ``missing`` (mm³), of faces far from the
+    surface, of several components, if there should be ``one``, of surfaces that cross, and of badly shaped tetrahedra.
+    """
     figures, found = made.report(), []
-    if figures.dropped > LEFT_OUT * figures.volume:
-        out = f"{figures.dropped:.3g} mm³ ({100 * figures.dropped / (figures.volume + figures.dropped):.2g} %)"
-        found += [f"{out} is left out where the solid is thinner than an edge; use a smaller edge"]
+    out = max(figures.dropped, missing)
+    if out > LEFT_OUT * figures.volume:
+        share = f"{out:.3g} mm³ ({100 * out / (figures.volume + out):.2g} %)"
+        found += [f"{share} is left out where the solid is thinner than an edge; use a smaller edge"]
     if figures.deviation > FAR * max(figures.edge):
         off = f"the boundary is up to {figures.deviation:.2g} mm off the surface"
         found += [f"{off}: the edge is too long for it; use a smaller one"]
