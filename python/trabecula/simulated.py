@@ -251,7 +251,11 @@ class Simulated:
                 f"{where}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
             )
         if size > self.wavelength / 4:
-            raise ValueError(f"an edge of {size:.4g} mm is more than a quarter of the wavelength, {self.wavelength:g} mm")
+            what = "wavelength" if self.report().lattices else "scale of the beams"
+            raise ValueError(
+                f"an edge of {size:.4g} mm is more than a quarter of the {what}, {self.wavelength:g} mm; use "
+                f"{rounded_down(self.wavelength / 4):g} mm or less"
+            )
         return size
 
     @cached_property
