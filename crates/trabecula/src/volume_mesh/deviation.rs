@@ -9,9 +9,10 @@ use rayon::prelude::*;
 
 /// Faces at a time.
 const BATCH: usize = 256;
-/// A distance of first order is believed up to this part of the face's longest edge; beyond, the surface is looked for along the normal.
+/// A distance of first order is believed up to this part of the face's longest edge; beyond, the surface is looked for along the face's
+/// normal and the field's gradient.
 const NEAR: f64 = 0.2;
-/// Positions along the normal at which it is looked for, on each side.
+/// Positions along each at which it is looked for, to either side.
 const STEPS: u32 = 16;
 
 /// The greatest distance of faces on curved surfaces from them (mm), at corners, edges and centroids. `faces` are tetrahedron and
@@ -37,7 +38,7 @@ pub(super) fn deviation(mesh: &FeMesh, faces: &[((u32, u8), SurfaceSet, bool)], 
                 for (at, d) in of.iter().zip(off.by_ref()) {
                     let believed = d.abs() <= NEAR * longest;
                     let normal = || unit(cross(sub(q, p), sub(r, p)));
-                    let d = if believed { d.abs() } else { along(&*surface.field, *at, normal(), longest) };
+                    let d = if believed { d.abs() } else { farther(&*surface.field, *at, normal(), longest) };
                     most = most.max(d);
                 }
             }
@@ -62,10 +63,14 @@ fn points(mesh: &FeMesh, face: (u32, u8)) -> [Vec3; 7] {
     }
 }
 
-/// The distance along a direction, to either side, at which a field changes sign, in steps; at most `reach`.
-fn along(field: &dyn Field, p: Vec3, direction: Vec3, reach: f64) -> f64 {
-    let solid = field.value(p) < 0.0;
+/// The distance along the normal of a face or the gradient of a field, to either side, at which the field changes sign, in steps; at most
+/// `reach`. Where a face bridges a thin strut, its normal may run along that and meet nothing.
+fn farther(field: &dyn Field, p: Vec3, normal: Vec3, reach: f64) -> f64 {
+    let (mut value, mut gradient) = ([0.0], [[0.0; 3]]);
+    field.gradients(&[p], &mut value, &mut gradient);
+    let solid = value[0] < 0.0;
+    let crosses = |d: f64, along: Vec3| (field.value(add(p, scale(along, d))) < 0.0) != solid;
     let ahead = (1..=STEPS).map(|k| reach * f64::from(k) / f64::from(STEPS));
-    let crosses = |d: &f64| [*d, -*d].iter().any(|d| (field.value(add(p, scale(direction, *d))) < 0.0) != solid);
-    ahead.into_iter().find(crosses).unwrap_or(reach)
+    let ways = [normal, unit(gradient[0])];
+    ahead.into_iter().find(|d| ways.iter().any(|a| crosses(*d, *a) || crosses(-d, *a))).unwrap_or(reach)
 }

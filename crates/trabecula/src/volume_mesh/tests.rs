@@ -78,6 +78,17 @@ fn nodes_of_a_lattice_over_tetrahedra_stay_in_the_region() {
     assert!(made.deviation < 1.0, "{}", made.deviation);
 }
 
+/// Faces that bridge a strut have normals along it, which meet no surface: they were said to be a whole edge off.
+#[test]
+fn faces_across_a_thin_strut_are_as_far_off_as_its_surface() {
+    let text = "schema = 1\nregion.box.size = [6, 6, 6]\n[beams.a]\nradius = 0.4\nstruts = [[0, 1], [1, 2], [2, 0], [2, 3]]\n\
+                nodes = [[-2, -2, -2], [-0.5, -2, -2], [-1, -0.8, -2], [2, 2, 2]]\n";
+    let design = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design");
+    let made = design.volume_mesh(&options(0.5), &Silent).expect("a mesh");
+    // A point within a strut or this near to it is at most its radius from its surface.
+    assert!(made.deviation < 0.4, "{}", made.deviation);
+}
+
 /// A graded sheet of which the box cuts off a chip at a corner: a component of its own, left out on request, to the volume.
 #[test]
 fn the_largest_component_alone_is_kept_on_request() {
