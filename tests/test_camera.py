@@ -120,7 +120,9 @@ def test_a_section_in_a_face_is_hatched_as_a_whole_and_one_outside_is_refused(cu
     eye = (azimuth + 180 * (axis == 0 and not far) + (90 if far else -90) * (axis == 1), elevation)
     eye = eye if axis < 2 else (azimuth, (5 + abs(elevation)) * (1 if far else -1))
     at, inside = (read(cube.png((160, 120), *eye, section=f"{name}={v}", **look))[1][0] for v in (place, abs(place - 0.004)))
-    assert abs(int(red(at)) - int(red(inside))) <= 0.02 * red(inside) + 8
+    # Its edges may lie a pixel farther: a row and a column of it, which is much where it is seen at a narrow angle.
+    seen = np.any([(p[..., 0].astype(int) - p[..., 1]) > 60 for p in (at, inside)], axis=0)
+    assert abs(int(red(at)) - int(red(inside))) <= seen.any(axis=0).sum() + seen.any(axis=1).sum()
     for text in (f"{name}=100", f"{name}<100", f"{name}>100", f"{name}=-1"):
         with pytest.raises(ValueError, match=rf"the mesh lies from 0 to 4 mm along {name}"):
             cube.png((40, 30), section=text)
