@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -19,7 +20,7 @@ TRIANGLES = {3: ("triangle", 5), 6: ("triangle6", 22)}
 VOLUMES = {4: ("tetra", 10), 8: ("hexahedron", 12), 10: ("tetra10", 24)}
 
 
-class Exchanged:
+class Exchanged(ABC):
     """Meshes of elements of one kind that other packages take, with what nodes and elements have, and named sets."""
 
     #: What the elements are for other packages, by the number of their nodes.
@@ -70,9 +71,9 @@ class Exchanged:
             made.field_data["domains"] = names
         return made
 
+    @abstractmethod
     def _connected(self) -> NDArray[np.uint32]:
         """The nodes of each element, in VTK's order."""
-        raise NotImplementedError
 
     def _of_nodes(self) -> dict[str, NDArray]:
         """What each node has."""
@@ -82,9 +83,9 @@ class Exchanged:
         """What each element has."""
         return {}
 
+    @abstractmethod
     def _members(self) -> dict[str, tuple[NDArray, NDArray]]:
         """Nodes and elements of each set."""
-        raise NotImplementedError
 
     def _names_of_domains(self) -> list[str]:
         """The names of the domains, if there are any."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from . import _core
     from .reports import DesignReport
 
-__all__ = ["Resolution"]
+__all__ = ["Resolution", "sample_error"]
 
 #: Share of the volume by which voxels may reach beyond plane faces of the region unwarned.
 BEYOND = 0.01
@@ -21,6 +21,11 @@ BEYOND = 0.01
 CHORDS, SLIGHT = 0.05, 0.01
 #: Steps on the diameter of a beam from which on chords cost less.
 SURE = 3.0
+
+
+def sample_error(share: float) -> float:
+    """How far the solid share of a region may be from that of the sample that it is known from: three standard deviations."""
+    return 0.05 * share + 0.005
 
 
 class Resolution:
@@ -99,10 +104,9 @@ class Resolution:
             return
         share, region = self._core.expected()
         found = volume / region
-        # A share of the fraction and of the porosity, and three deviations of the sample that the expected one is from. Over
-        # tetrahedra the sample may lie where none is.
+        # A share of the fraction and of the porosity, and the error of the sample. Over tetrahedra that may lie where none is.
         tets = any(it.tets for it in self.report().lattices.values())
-        if abs(found - share) > min(0.05, share / 3, max((1 - share) / 3, 0.005), math.inf if tets else 0.05 * share + 0.005):
+        if abs(found - share) > min(0.05, share / 3, max((1 - share) / 3, 0.005), math.inf if tets else sample_error(share)):
             better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
             warn_caller(
                 f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design one of about "

@@ -12,6 +12,7 @@ from .carrier import Carrier
 from .errors import warn_caller
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
+from .resolution import sample_error
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -120,9 +121,9 @@ class Simulated:
         made = VolumeMesh(self, plan, threads=thread_count(threads), progress=progress)
         if islands == "error" and (pieces := made.report().pieces) > 1:
             raise ValueError(f"the mesh has {pieces} components that do not touch; drop or keep those other than the largest")
-        # What no tetrahedron has is known by the sample that the share is from, three standard deviations apart.
+        # What no tetrahedron has is known by the sample that the share is from.
         missing = share * region - made.report().volume
-        known = of == "solid" and islands == "keep" and not periodic and missing > (0.05 * share + 0.005) * region
+        known = of == "solid" and islands == "keep" and not periodic and missing > sample_error(share) * region
         warn_flaws(made, one=one, missing=missing if known else 0.0)
         return made
 
