@@ -14,7 +14,7 @@ from .formats import LAYER_WRITES, LAYERS
 from .given import number, positive, whole
 from .machine import fits
 from .outlines import outlines_svg
-from .remade import Remade
+from .reproducible import Reproducible
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Layer:
         return f"<trabecula.Layer at z = {self.z:g} mm: {len(self.loops)} contours, {self.area:.6g} mm²>"
 
 
-class Layers(Remade, Sequence["Layer"]):
+class Layers(Reproducible, Sequence["Layer"]):
     """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
 
     _make = staticmethod(_core.Layers.of)

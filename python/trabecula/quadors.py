@@ -10,7 +10,7 @@ from . import _core
 from .files import write_svg
 from .given import number, positive, three, whole
 from .outlines import outlines_svg
-from .remade import Remade
+from .reproducible import Reproducible
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Quadors", "Slice"]
 
 
-class Quadors(Remade):
+class Quadors(Reproducible):
     """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
 
     These are the beams alone, uncut by the region and without a skin. ``whole`` says whether that is the part; where it is
@@ -110,7 +110,7 @@ class Quadors(Remade):
         return self._core.hub(whole("hub", hub, 0, len(self) - 1))
 
 
-class Slice(Remade):
+class Slice(Reproducible):
     """A plane slice of beams. Made by ``Quadors.slice``."""
 
     _make = staticmethod(_core.Quadors.slice)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from . import _core
 from .design import Design
 from .drawn import Picture
+from .element_mesh import ElementMesh
 from .errors import DesignError, warn_caller
-from .exchanged import Exchanged
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
 from .given import fixed, thread_count
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["TetMesh"]
 
 
-class TetMesh(Picture, Transformed, Exchanged):
+class TetMesh(Picture, Transformed, ElementMesh):
     """A tetrahedral mesh, checked: conforming, every tetrahedron of positive volume.
 
     Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``. It never changes, and its arrays are read-only:

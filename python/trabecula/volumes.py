@@ -14,13 +14,13 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 from . import _core
+from .element_mesh import LINES, TRIANGLES, ElementMesh
 from .errors import warn_caller
-from .exchanged import LINES, TRIANGLES, Exchanged
 from .files import check_place, extension, whole_file
 from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
 from .given import fixed, number, poisson, positive
 from .mesh import Mesh
-from .remade import Remade
+from .reproducible import Reproducible
 from .texts import counted
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -61,7 +61,7 @@ class VolumeSet(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-class FiniteElements(Remade, Exchanged):
+class FiniteElements(Reproducible, ElementMesh):
     """What meshes for finite elements have in common: named sets, forces at nodes, files."""
 
     #: What a set needs that is held or loaded.

@@ -13,7 +13,7 @@ from .files import extension, whole_file
 from .formats import VOXEL_WRITES
 from .given import fixed, positive
 from .machine import fits
-from .remade import Remade
+from .reproducible import Reproducible
 from .transforms import factor_of, vector_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def made_of(solid: _core.Solid, step: float, place: tuple[Sequence[float], float
     return made if place is None else made.placed(*place)
 
 
-class Voxels(Remade):
+class Voxels(Reproducible):
     """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
 
     _make = staticmethod(made_of)

@@ -7,12 +7,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, ClassVar, TypeVar
 
-    Self = TypeVar("Self", bound="Remade")
+    Self = TypeVar("Self", bound="Reproducible")
 
-__all__ = ["Remade"]
+__all__ = ["Reproducible"]
 
 
-class Remade:
+class Reproducible:
     """What a solid, or its beams, make by a plan. It never changes, so a copy is itself. Pickled it is the solid's design and
     the plan, and is made again where that is read: the same in every bit.
     """

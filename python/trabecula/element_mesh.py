@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pyvista
     from numpy.typing import NDArray
 
-__all__ = ["Exchanged"]
+__all__ = ["ElementMesh"]
 
 #: meshio's names of elements and VTK's numbers, by the number of their nodes: of beams, shells, and volumes.
 LINES = {2: ("line", 3), 3: ("line3", 21)}
@@ -20,7 +20,7 @@ TRIANGLES = {3: ("triangle", 5), 6: ("triangle6", 22)}
 VOLUMES = {4: ("tetra", 10), 8: ("hexahedron", 12), 10: ("tetra10", 24)}
 
 
-class Exchanged(ABC):
+class ElementMesh(ABC):
     """Meshes of elements of one kind that other packages take, with what nodes and elements have, and named sets."""
 
     #: What the elements are for other packages, by the number of their nodes.
