@@ -14,14 +14,17 @@ mod line_drawing;
 mod lines;
 mod marks;
 mod occlusion;
+mod palette;
 mod paper;
 mod png;
 mod raster;
 mod section;
 mod shade;
+mod shading_normals;
 mod shares;
 mod space_lines;
 mod svg_legend;
+mod svg_path;
 mod tint;
 mod visible_parts;
 

@@ -12,13 +12,15 @@ use crate::math::Vec3;
 mod beam_lattice;
 mod beam_lattice_read;
 mod deflate;
+mod model;
 mod package;
+mod placed_beams;
 mod read;
 
 pub use beam_lattice::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
-pub use beam_lattice_read::read_beam_lattice;
 use package::Entry;
 pub use package::Piece;
+pub use placed_beams::read_beam_lattice;
 pub use read::{object_names, read, read_object};
 
 const MODEL: &str = "3D/3dmodel.model";

@@ -9,6 +9,7 @@ use super::paper::Paper;
 use super::raster::Projected;
 use super::section::SeenSection;
 use super::space_lines::{LineKind, SpaceLine, space_lines};
+use super::svg_path::path;
 use super::visible_parts::{Point, Seen, simpler};
 use super::{BAND, Background, Camera, Look, Marks, OVER, View, legend, picture, png, svg_legend};
 use crate::surface_mesh::SurfaceMesh;
@@ -161,20 +162,6 @@ fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, behind: &str, 
     }
     out.push_str(foot);
     out.push_str("</g>\n</svg>\n");
-    out
-}
-
-pub(super) fn path(lines: &[Vec<Point>], digits: usize) -> String {
-    let mut out = String::new();
-    for line in lines {
-        let closed = line.len() > 2 && line.first() == line.last();
-        let points = &line[..line.len() - usize::from(closed)];
-        for (i, [x, y]) in points.iter().enumerate() {
-            let before = ["M", "L", " "][i.min(2)];
-            let _ = write!(out, "{before}{x:.digits$} {y:.digits$}");
-        }
-        out.push_str(if closed { "Z" } else { "" });
-    }
     out
 }
 

@@ -1,6 +1,6 @@
 //! Lines in a picture: tubes with round ends, seen through the surface.
 
-use super::legend::{self, LINES};
+use super::palette::{self, LINES};
 use super::raster::Raster;
 use super::tint::decode;
 use crate::math::{Vec3, add, cross, norm, scale, sub, unit};
@@ -53,7 +53,7 @@ impl Tubes {
 
     /// The colour of a vertex, in linear light.
     pub fn colour(&self, vertex: usize) -> [f32; 3] {
-        legend::colour(&LINES, self.kinds.get(vertex).copied().unwrap_or(0)).map(decode)
+        palette::colour(&LINES, self.kinds.get(vertex).copied().unwrap_or(0)).map(decode)
     }
 
     fn ball(&mut self, center: Vec3, radius: f64) {

@@ -1,6 +1,6 @@
 //! What tells size and direction: a scale bar and the axes, side by side at the foot of a picture.
 
-use super::legend::LINES;
+use super::palette::LINES;
 use super::paper::{Colour, INK};
 use super::{Projection, View};
 

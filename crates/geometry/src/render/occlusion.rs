@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::raster::{INSIDE, Projected, Raster, weights};
-use super::shade::{Normals, area};
+use super::shading_normals::{Normals, area};
 use super::{Camera, SAMPLES, Section};
 use crate::math::{Vec3, dot, scale, sub};
 use crate::surface_mesh::SurfaceMesh;

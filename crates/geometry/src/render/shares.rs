@@ -1,6 +1,7 @@
 //! Shares of named parts on a surface, as mixtures of their colours.
 
-use super::legend::{self, AREAS, Row};
+use super::legend::{self, Row};
+use super::palette::{self, AREAS};
 use super::paper::Paper;
 use super::section::PlaneGrid;
 use super::tint::{Tint, decode};
@@ -79,7 +80,7 @@ impl Shares {
         for (at, weight) in of {
             let some = values.get(n * at..n * (at + 1)).unwrap_or_default();
             for (i, share) in some.iter().enumerate().filter(|(_, share)| share.is_finite()) {
-                let light = legend::colour(&AREAS, i).map(decode);
+                let light = palette::colour(&AREAS, i).map(decode);
                 (0..3).for_each(|k| sum[k] += (weight * share) as f32 * light[k]);
             }
         }

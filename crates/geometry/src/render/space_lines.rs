@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::shade::{Normals, area};
+use super::shading_normals::{Normals, area};
 use super::{Camera, Section};
 use crate::math::{Vec3, add, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;

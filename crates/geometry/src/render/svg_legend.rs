@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::encode;
 use super::legend::{self, Row};
-use super::line_drawing::path;
 use super::marks::SeenMarks;
 use super::paper::{Colour, INK, Paper, short};
+use super::svg_path::path;
 use super::tint::Tint;
 
 /// The height of a capital, of the size of its font.

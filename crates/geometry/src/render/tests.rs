@@ -411,7 +411,7 @@ fn the_scale_bar_is_as_long_as_it_says() {
     assert!(!bar.fits(&small) && bar.fits(&PARALLEL) && Look::default().fits(&small));
     assert_eq!(render(&s, &small, &bar), render(&s, &small, &white(Marks::default())));
     let axes = render(&s, &PARALLEL, &white(Marks { scale_bar: false, axes: true }));
-    let seen = |k: usize| (0..400 * 300).any(|i| axes[3 * i..3 * i + 3] == legend::LINES[k]);
+    let seen = |k: usize| (0..400 * 300).any(|i| axes[3 * i..3 * i + 3] == palette::LINES[k]);
     assert!((0..3).all(seen), "each axis has its colour, the one that is seen from its end by its letter");
 }
 
@@ -523,7 +523,7 @@ fn facets_of_a_ball_throw_no_shade() {
     let out = |v: &u32| unit(sub(ball.mesh.vertices[*v as usize], [0.5; 3])).map(|c| c as f32);
     let given: Vec<[f32; 3]> = ball.mesh.triangles.as_flattened().iter().map(out).collect();
     let camera = Camera::new(&ball.mesh.bounds(), &ball.mesh.vertices, &view, view.size.map(|n| n * OVER));
-    let normals = shade::Normals::of(&ball, Some(&given));
+    let normals = shading_normals::Normals::of(&ball, Some(&given));
     let open = occlusion::Occlusion::of(&ball, &normals, &camera, view.size.map(|n| n * OVER), None);
     let raster = Projected::of(&ball, &camera, view.size.map(|n| n * OVER), None).draw(&ball, 0, 240 * OVER);
     let mut least = 1.0f32;

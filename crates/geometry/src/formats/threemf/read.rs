@@ -10,88 +10,16 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::MODEL;
-use super::beam_lattice_read::{self, Lattice};
+use super::model::{Lattice, Model, Object, PlacedObject, Placement, Source, Use};
 use crate::fault::{Fault, counted};
 use crate::formats::join::Joiner;
 use crate::formats::text::{parse, shown};
 use crate::formats::xml::{Scanner, attribute, attribute_where};
-use crate::math::{Mat3, Vec3, add, apply, determinant, scale};
+use crate::math::{Vec3, determinant, scale};
 use crate::mesh::Mesh;
 
 /// Components may nest this deep; deeper is a loop.
 const DEPTH: usize = 32;
-
-/// x ↦ m x + shift.
-#[derive(Clone, Copy)]
-struct Placement {
-    m: Mat3,
-    shift: Vec3,
-}
-
-impl Placement {
-    const NONE: Placement = Placement { m: crate::math::IDENTITY, shift: [0.0; 3] };
-
-    fn of(&self, x: Vec3) -> Vec3 {
-        add(apply(&self.m, x), self.shift)
-    }
-
-    /// This one after `inner`.
-    fn after(&self, inner: &Placement) -> Placement {
-        Placement { m: crate::math::product(&self.m, &inner.m), shift: self.of(inner.shift) }
-    }
-}
-
-/// A use of an object: which file it is in (empty: the same), its number, and where it goes.
-pub(super) struct Use {
-    path: String,
-    id: u32,
-    placement: Placement,
-}
-
-#[derive(Default)]
-pub(super) struct Object {
-    pub vertices: Vec<Vec3>,
-    pub triangles: Vec<[u32; 3]>,
-    pub components: Vec<Use>,
-    pub lattice: Option<Lattice>,
-    /// The type: model, support and so on.
-    pub kind: String,
-    /// Its name; empty without one.
-    name: String,
-    /// Whether its mesh only stands for slices.
-    slices: bool,
-    /// Whether it has properties for what has none of its own.
-    pub properties: bool,
-}
-
-impl Object {
-    /// What one use of it costs: vertices, triangles and beams.
-    fn size(&self) -> usize {
-        self.vertices.len() + self.triangles.len() + self.lattice.as_ref().map_or(0, |l| l.beams.len())
-    }
-
-    fn is_support(&self) -> bool {
-        matches!(self.kind.as_str(), "support" | "solidsupport")
-    }
-}
-
-#[derive(Default)]
-pub(super) struct Model {
-    unit: f64,
-    pub objects: HashMap<u32, Object>,
-    items: Vec<Use>,
-}
-
-/// An object where the build has it.
-pub(super) struct PlacedObject<'a> {
-    pub object: &'a Object,
-    /// The linear part of its placement.
-    pub matrix: Mat3,
-    /// Its vertices, mm.
-    pub vertices: Vec<Vec3>,
-    /// The file's unit, mm.
-    pub unit: f64,
-}
 
 /// What all files of an archive may inflate to: a multiple of the archive's size, and a constant. Meshes come to ten times.
 const MOST: (u64, u64) = (100, 1 << 24);
@@ -267,7 +195,7 @@ pub(super) fn place_all(
     for i in 0..items {
         traversal.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
-    Ok(Contents { objects, items, lattices: files.values().map(beam_lattice_read::count).sum() })
+    Ok(Contents { objects, items, lattices: files.values().map(Model::lattices).sum() })
 }
 
 /// The name of the main model.
@@ -345,8 +273,6 @@ struct ModelParser {
     prefix: Option<String>,
     object: Option<(u32, Object)>,
 }
-
-pub(super) type Source<'a> = Scanner<&'a mut dyn BufRead>;
 
 /// Parses one model file.
 fn model(text: &mut dyn BufRead) -> Result<Model, Fault> {
