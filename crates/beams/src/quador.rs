@@ -30,6 +30,7 @@ use geometry::math::{Aabb, Vec3, add, norm, scale, sub};
 use geometry::progress::{Cancellation, checkpoint};
 
 mod active_in_box;
+mod affine_function;
 mod bezier;
 mod block_fill;
 mod boundary_form;
@@ -40,6 +41,7 @@ mod collisions;
 pub mod complex;
 mod conic;
 mod facets;
+mod fillet_matrix;
 mod fillet_sizes;
 mod foot;
 mod gauss;
@@ -52,6 +54,7 @@ mod hub_quadric;
 mod integral;
 mod pencil;
 mod periodic_cell;
+mod perpendicular;
 mod quador_field;
 mod rational_patch;
 mod rays;
@@ -74,9 +77,9 @@ pub use rational_patch::{Patch, TrimCurve, homogeneous_matrix};
 pub use rays::Hit;
 pub use tessellation::{Measures, Tessellation};
 
+use affine_function::AffineFunction;
 use box_index::BoxIndex;
 use fillet_sizes::{FilletSizes, fillet_sizes, hub_fillets};
-use hub::AffineFunction;
 
 /// Number of half-beams that a processor's own cache holds.
 const CACHED_HALF_BEAMS: usize = 4096;

@@ -58,6 +58,19 @@ pub struct FeSet {
     pub bulk: bool,
 }
 
+/// Numbers at nodes or in elements.
+#[derive(Clone, Debug, Default)]
+pub struct FeField {
+    /// Its name.
+    pub name: String,
+    /// Numbers for each node or element.
+    pub components: usize,
+    /// Whether it is at nodes.
+    pub at_nodes: bool,
+    /// The numbers, those of a node or element together.
+    pub values: Vec<f64>,
+}
+
 /// A node of a periodic cell and its image on lower bounding planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {

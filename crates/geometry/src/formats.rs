@@ -32,7 +32,7 @@ mod vtu;
 mod xml;
 
 pub use element_files::{
-    BEAM_FORMATS, BeamFormat, FE_FORMATS, FeField, FeFormat, FeText, HEX_FORMATS, HexFormat, POLY_FILES, PolyFile,
+    BEAM_FORMATS, BeamFormat, FE_FORMATS, FeFormat, FeText, HEX_FORMATS, HexFormat, POLY_FILES, PolyFile,
     SHELL_FORMATS, ShellFormat,
 };
 pub use elements::Elements;

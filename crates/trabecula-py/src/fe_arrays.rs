@@ -3,8 +3,9 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use geometry::fe_mesh::FeField;
 use geometry::fe_mesh::FeSet;
-use geometry::formats::{FeField, FeText};
+use geometry::formats::FeText;
 use geometry::math::Vec3;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;

@@ -17,6 +17,7 @@ use crate::surface_maker::{
     self, Estimate, Islands, Measured, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, not_empty,
 };
 
+mod block_nodes;
 mod cube_table;
 mod feature_cells;
 mod feature_edges;
@@ -34,6 +35,7 @@ mod tile_figures;
 mod tile_queue;
 mod tile_ranges;
 mod vertex_id;
+mod vertex_numbers;
 mod voxelize;
 
 pub use joined_ranges::{JoinedRanges, WholeSurface};

@@ -9,6 +9,7 @@ mod error;
 mod json;
 mod node;
 mod schema;
+mod schema_defs;
 mod schema_types;
 mod values;
 
@@ -16,7 +17,8 @@ pub(crate) use at::{At, Fields};
 pub use error::{DesignError, Warning};
 pub use kind_derive::Kind;
 pub use node::{Lines, Node, Value};
-pub(crate) use schema::{Defs, Open, any_schema, choice_schema};
+pub(crate) use schema::{Open, any_schema, choice_schema};
+pub(crate) use schema_defs::Defs;
 pub use values::{OneOrThree, OneOrTwo, Unit};
 
 pub use geometry::fault::Fault;

@@ -6,7 +6,8 @@
 
 use geometry::math::{Vec3, scale};
 
-use super::hub::{AffineFunction, Hub};
+use super::affine_function::AffineFunction;
+use super::hub::Hub;
 use super::smooth_union::ROUNDING;
 
 /// Bound of the rounding of an affine function and of its maximum, relative to the sum of its terms' magnitudes.

@@ -155,7 +155,7 @@ impl BoundaryForm {
             let axis = rows.into_iter().max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
             let mut filled = *q;
             let axis = unit(axis);
-            filled.add_square(1.0, &super::hub::AffineFunction { a: axis, b: 0.0 });
+            filled.add_square(1.0, &super::affine_function::AffineFunction { a: axis, b: 0.0 });
             (along, nu) = direction(&filled);
             let left = sub(apply(&q.m, along), scale(g, nu));
             if !short(along) || dot(left, left) > 1e-24 * nu * nu * size {

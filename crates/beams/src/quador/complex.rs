@@ -8,10 +8,11 @@ use geometry::fault::Fault;
 use geometry::math::{Vec3, add, cross, norm, scale, sub, unit};
 use geometry::union_find::{find, unite};
 
+use super::affine_function::AffineFunction;
 use super::bezier::{Bezier, curves};
 use super::conic::Conic;
 use super::gauss::gauss;
-use super::hub::{AffineFunction, Hub};
+use super::hub::Hub;
 use super::hub_quadric::Quadric;
 
 mod coincident_arcs;

@@ -4,11 +4,9 @@ use geometry::math::dot;
 use geometry::roots::bisect;
 
 use super::Fillet;
-use super::hub::Hub;
-use super::smooth_union::{inverse, is_positive_definite};
+use super::fillet_matrix::{inverse, is_positive_definite};
+use super::hub::{Hub, MAX_TAU};
 
-/// Maximum τ of fillets: a fillet above it cannot be distinguished from a crease.
-pub(super) const MAX_TAU: f64 = 0.999;
 /// Fraction of the distance from contact plane to split plane that fillets may occupy.
 const FILLET_REACH: f64 = 0.999;
 /// Least eigenvalue of R, or half of 1 − τ of the narrowest pair: seams of an R closer to singular lose digits.

@@ -11,31 +11,11 @@
 
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
-use super::fillet_sizes::MAX_TAU;
-use super::smooth_union::{Factor, largest};
+use super::affine_function::{AffineFunction, largest};
+use super::fillet_matrix::Factor;
 
-/// An affine function of the position x in a hub's frame: a·x + b.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct AffineFunction {
-    /// Gradient a.
-    pub a: Vec3,
-    /// Value b at the hub's centre.
-    pub b: f64,
-}
-
-impl AffineFunction {
-    /// The value at x.
-    #[inline]
-    pub(crate) fn at(&self, x: Vec3) -> f64 {
-        dot(self.a, x) + self.b
-    }
-
-    /// self + s · o.
-    #[inline]
-    pub(crate) fn plus(&self, s: f64, o: &AffineFunction) -> AffineFunction {
-        AffineFunction { a: add(self.a, scale(o.a, s)), b: self.b + s * o.b }
-    }
-}
+/// Maximum τ of fillets: a fillet above it cannot be distinguished from a crease.
+pub(super) const MAX_TAU: f64 = 0.999;
 
 /// The half of a beam that belongs to one hub.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,7 +194,7 @@ impl Hub<'_> {
     /// N of these functions over all half-beams, which is at least N over any of them, as a sum of squares.
     fn squares(&self, g: &dyn Fn(usize) -> AffineFunction) -> Vec<AffineFunction> {
         let all: Vec<usize> = (0..self.half_beams.len()).collect();
-        Factor::new(self, &all).squares(g)
+        Factor::new(&all, |i, j| self.tau(i, j)).squares(g)
     }
 
     /// The middle of the crotch of two half-beams, where the crease between them would be, and the fillet's radius of

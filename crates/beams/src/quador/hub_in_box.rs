@@ -4,7 +4,8 @@ use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 use super::Quadors;
 use super::active_in_box::{Around, FewHalfBeams, HalfBeamSet};
-use super::hub::{AffineFunction, Hub};
+use super::affine_function::AffineFunction;
+use super::hub::Hub;
 
 /// Largest number of positions of which values are lowered at a time.
 pub(super) const MOST_POINTS: usize = 32;

@@ -2,8 +2,9 @@
 
 use geometry::math::{Mat3, Vec3, add, apply, determinant, dot, inverse, scale};
 
-use super::hub::{AffineFunction, Hub};
-use super::smooth_union::Factor;
+use super::affine_function::AffineFunction;
+use super::fillet_matrix::Factor;
+use super::hub::Hub;
 
 /// The quadratic function x ↦ xᵀMx + 2 b·x + c.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -109,7 +110,7 @@ pub(super) fn piece_quadric(hub: &Hub, label: u64) -> Quadric {
     if hub.sharp() {
         return quadric(hub, &active.iter().map(|i| g(*i)).collect::<Vec<_>>());
     }
-    quadric(hub, &Factor::new(hub, &active).squares(&g))
+    quadric(hub, &Factor::new(&active, |i, j| hub.tau(i, j)).squares(&g))
 }
 
 /// S less squares.
@@ -140,7 +141,7 @@ pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) 
         return Piece { quadric, toggles };
     }
     let active = active(hub, label);
-    let factor = Factor::new(hub, &active);
+    let factor = Factor::new(&active, |i, j| hub.tau(i, j));
     let quadric = quadric(hub, &factor.squares(&|i| hub.half_beams[i].g));
     let y = factor.solved(factor.squares(g));
     let mut toggles: Vec<AffineFunction> = (0..hub.half_beams.len())

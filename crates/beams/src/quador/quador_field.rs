@@ -5,8 +5,8 @@
 //! the distance past them.
 
 use super::Quadors;
+use super::affine_function::largest;
 use super::hub::Hub;
-use super::smooth_union::largest;
 use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Maximum number of hubs examined for the bound over a box.

@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn the_matrix_is_the_quadric_elsewhere() {
         let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.1, -0.2, 0.3], c: -1.0 };
-        q.add_square(-0.7, &super::super::hub::AffineFunction { a: [1.0, 2.0, -0.5], b: 0.3 });
+        q.add_square(-0.7, &super::super::affine_function::AffineFunction { a: [1.0, 2.0, -0.5], b: 0.3 });
         let (center, x) = ([3.0, -1.0, 2.0], [0.3, 0.8, -0.4]);
         let m = homogeneous_matrix(&q, center);
         let y = add(center, x);

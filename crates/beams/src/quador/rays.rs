@@ -6,8 +6,10 @@
 use geometry::math::{Aabb, Vec3, add, dot, scale, sub, unit};
 
 use super::Quadors;
+use super::affine_function::largest;
+use super::fillet_matrix::solve;
 use super::hub::Hub;
-use super::smooth_union::{EXACT, largest, solve};
+use super::smooth_union::EXACT;
 
 /// Intersection of a ray with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use core::f64::consts::{PI, TAU};
 use std::collections::HashMap;
 
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::union_find::unite;
 
@@ -14,6 +14,7 @@ use super::complex::Complex;
 use super::facets::{Facets, SEAM_SHARE};
 use super::hub::{HalfBeam, Hub};
 use super::hub_classes::HubClasses;
+use super::perpendicular::perpendicular;
 
 /// Shares of the chord error that are tried for triangles before their vertices are moved.
 const SHARES: [f64; 8] = [1.0, 0.7, 0.5, 0.35, 0.84, 0.6, 0.42, 0.25];
@@ -51,13 +52,6 @@ pub(super) struct HubMesh {
     pub bounds: Aabb,
     /// Maximum distance from the surface, mm.
     pub error: f64,
-}
-
-/// A unit vector perpendicular to an axis, the same for an axis and its opposite. It is discontinuous only away from
-/// common directions, so that beams that are equal up to rounding have it in common.
-pub(super) fn perpendicular(axis: Vec3) -> Vec3 {
-    let pole = if axis[0].abs() < 0.618_034 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    unit(sub(pole, scale(axis, dot(pole, axis))))
 }
 
 impl Quadors {

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use rayon::prelude::*;
 
-use crate::fe_mesh::FeMesh;
+use crate::fe_mesh::{FeField, FeMesh};
 use crate::math::Vec3;
 
 mod abaqus;
@@ -48,19 +48,6 @@ impl FeText {
     fn elastic(&self, domain: usize) -> [f64; 2] {
         self.elastic.get(domain).or(self.elastic.last()).copied().unwrap_or([1.0, 0.3])
     }
-}
-
-/// Numbers at nodes or in elements.
-#[derive(Clone, Debug, Default)]
-pub struct FeField {
-    /// Its name.
-    pub name: String,
-    /// Numbers for each node or element.
-    pub components: usize,
-    /// Whether it is at nodes.
-    pub at_nodes: bool,
-    /// The numbers, those of a node or element together.
-    pub values: Vec<f64>,
 }
 
 /// A format of finite element meshes.

@@ -4,8 +4,7 @@
 
 use std::io::{self, Write};
 
-use super::FeField;
-use crate::fe_mesh::FeSet;
+use crate::fe_mesh::{FeField, FeSet};
 use crate::math::Vec3;
 use crate::tetmesh::TetMesh;
 

@@ -24,14 +24,15 @@ use geometry::math::{Vec3, add, scale};
 use geometry::mesh::{Mesh, is_embedded};
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::block_nodes::Nodes;
 use super::cube_table::{CASES, EDGES};
 use super::feature_edges::{DividedFaces, EdgeStore};
 use super::sampling_grid::{Grid, LocalSolid, Sides};
 use super::sign_words::Signs;
-use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
-pub(super) use fragments::Fragments;
-pub(super) use simplex_cut::{CutVertex, Simplex, section};
+use super::vertex_numbers::{Numbers, numbered};
+pub(super) use fragments::{CutVertex, Fragments};
+pub(super) use simplex_cut::{Simplex, section};
 
 /// Vertices and triangles that marching cubes does not make.
 #[derive(Default)]

@@ -22,11 +22,13 @@ mod boundary_loops;
 mod cell_claims;
 mod cell_faces;
 mod contours;
+mod divided_faces;
 mod double_crossings;
 mod edge_graph;
 mod fallback_fill;
 mod fill_fitted;
 mod fitted_cells;
+mod loop_patch;
 mod polygon_triangulation;
 mod subvolumes;
 mod surface_patch;
@@ -39,15 +41,15 @@ use rustc_hash::FxHashMap;
 use crate::field::Field;
 use geometry::math::{Vec3, add, dot, scale, sub};
 
+use super::block_nodes::Nodes;
 use super::sampling_grid::{Grid, LocalSolid};
 use super::sign_words::Signs;
-use super::tile::Nodes;
 use super::vertex_id::VertexId;
 use cell_claims::{CellClaims, OtherSurfaces, decides};
 pub(super) use contours::Contour;
-pub(super) use fitted_cells::DividedFaces;
+pub(super) use divided_faces::DividedFaces;
+pub(super) use trace_edges::TracedEdges;
 use trace_edges::cell_of;
-pub(super) use trace_edges::{PaddedNodes, TracedEdges, by_tile};
 
 /// A feature edge that passes a grid edge within this distance may pierce a face without a contour, in multiples of the least
 /// distance of points from nodes. A wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to

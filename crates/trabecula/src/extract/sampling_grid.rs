@@ -8,9 +8,10 @@ use crate::field::Block;
 use crate::implicit::Surface;
 use crate::solid::{Solid, Spaces};
 use geometry::fault::{Fault, number};
+use geometry::feature_edges::Creases;
 use geometry::math::{Aabb, Vec3};
 
-use super::feature_edges;
+use super::block_nodes::PaddedNodes;
 
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
 pub const TILE: usize = 61;
@@ -21,6 +22,12 @@ pub const MOST_STEPS: f64 = 4e6;
 /// Most grid cells: those of 9 million tiles. Bounds dismiss a tile in some hundredths of a millisecond to a millisecond, so what
 /// is empty takes minutes to some hours.
 pub const MOST_CELLS: f64 = 2e12;
+
+/// Straight edges of at least this many grid steps are kept, whatever their angle.
+const LONG: f64 = 3.0;
+/// Edges of at least this angle are kept whatever their length, radians (25°). Without them the surface is off by up to a tenth
+/// of a grid step.
+const SHARP: f64 = 0.436;
 
 /// The solid on its grid.
 pub(super) struct Grid {
@@ -109,7 +116,7 @@ impl Grid {
         }
         let mut grid =
             Grid { axes, margin, step: edge, surfaces, trees, faces, grid_plane, creases: Vec::new(), fitted: None };
-        grid.creases = (grid.surfaces.iter()).map(|f| feature_edges::by_tile(&grid, &f.creases)).collect();
+        grid.creases = (grid.surfaces.iter()).map(|f| by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
         grid.fitted = creased.next().filter(|_| fits);
@@ -227,10 +234,10 @@ impl Grid {
     }
 
     /// The same with one node more on each side, where there is one.
-    pub(super) fn padded(&self, tile: [usize; 3]) -> feature_edges::PaddedNodes<'_> {
+    pub(super) fn padded(&self, tile: [usize; 3]) -> PaddedNodes<'_> {
         let n = self.nodes(tile);
         let from = n.each_ref().map(|n| n.start.saturating_sub(1));
-        feature_edges::PaddedNodes {
+        PaddedNodes {
             axes: [0, 1, 2].map(|a| {
                 let axis = &self.axes[a];
                 &axis[from[a]..(n[a].end + 1).min(axis.len())]
@@ -365,6 +372,35 @@ fn count(axes: &[Vec<f64>; 3], edge: f64) -> Result<(), Fault> {
             number(rounded_up(1.001 * better))
         ),
     ))
+}
+
+/// The segments of a surface's feature edges that are kept, by the tiles near which they pass.
+fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
+    let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
+    let tiles = grid.tiles();
+    for (i, s) in (0..).zip(&creases.segments) {
+        let [p, q] = s.ends;
+        if s.turn < SHARP && s.run < LONG * grid.step {
+            continue;
+        }
+        let range = [0, 1, 2].map(|a| {
+            let axis = &grid.axes[a];
+            // The cells it passes, and two more on either side: as far beyond its border does a tile need edges.
+            let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
+            let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
+            let tile = |c: usize| (c / TILE).min(tiles[a] - 1);
+            tile(low.saturating_sub(2))..tile(high + 2) + 1
+        });
+        for k in range[2].clone() {
+            for j in range[1].clone() {
+                for t in range[0].clone() {
+                    let tile = t + tiles[0] * (j + tiles[1] * k);
+                    found.entry(tile).or_default().push(i);
+                }
+            }
+        }
+    }
+    found
 }
 
 /// At least v, with two significant digits.

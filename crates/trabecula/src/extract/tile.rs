@@ -34,13 +34,14 @@ use crate::implicit::{Pair, Surface};
 use geometry::fault::Fault;
 use geometry::math::Vec3;
 
+use super::block_nodes::Nodes;
 use super::feature_cells::{FeatureCells, FeatureMesh};
 use super::feature_edges::{DividedFaces, EdgeStore, SurfaceContext};
 use super::planar_caps;
 use super::sampling_grid::{Grid, GridPlane, LocalSolid, Sides, TILE};
 use super::sign_words::{Signs, below, bits, negative};
-use super::tile_components::TileComponents;
 use super::vertex_id::VertexId;
+use super::vertex_numbers::Numbers;
 pub(super) use count::count;
 use edge_vertices::{list_vertices, solve};
 use holes::hole;
@@ -81,42 +82,6 @@ pub(super) struct Scratch {
     extra: FeatureMesh,
     edges: EdgeStore,
     divided_faces: DividedFaces,
-}
-
-/// Numbers of the vertices of one surface: those on x-edges, then y, then z, each in node order.
-#[derive(Default)]
-pub(super) struct Numbers {
-    crossed: [Vec<u64>; 3],
-    offset: [Vec<u32>; 3],
-}
-
-impl Numbers {
-    /// The number of the vertex on the edge along `axis` from node i of a row, if it has one.
-    #[inline]
-    pub fn get(&self, axis: usize, row: usize, i: usize) -> Option<u32> {
-        (self.crossed[axis][row] >> i & 1 == 1).then(|| self.of(axis, row, i))
-    }
-
-    /// The edges along `axis` of a row that have a vertex, and the number of the first one's.
-    pub fn row(&self, axis: usize, row: usize) -> (u64, u32) {
-        (self.crossed[axis][row], self.offset[axis][row])
-    }
-
-    #[inline(always)]
-    fn of(&self, axis: usize, row: usize, i: usize) -> u32 {
-        self.offset[axis][row] + (self.crossed[axis][row] & ((1u64 << i) - 1)).count_ones()
-    }
-}
-
-/// The number of a vertex of a plain cell by its id.
-pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: VertexId) -> Option<u32> {
-    let steps = key.steps();
-    if !(steps.is_power_of_two() && steps < 8) {
-        return None;
-    }
-    let [i, j, k] = nodes.at(key.node());
-    let row = k * nodes.shape[1] + j;
-    numbers[key.surfaces().next()?].get(steps.trailing_zeros() as usize, row, i)
 }
 
 /// What plain cells make.
@@ -184,50 +149,6 @@ impl Vertex {
             let share = if a == usize::from(self.axis) { s } else { 0.0 };
             nodes.positions[a][n] + share * nodes.steps[a][n]
         })
-    }
-}
-
-/// The nodes of a block, indexed.
-pub(super) struct Nodes<'a> {
-    pub axes: [&'a [f64]; 3],
-    pub shape: [usize; 3],
-    pub stride: [usize; 3],
-    /// The coordinates again, and the steps to the next, where any index is within bounds.
-    positions: [[f64; 64]; 3],
-    steps: [[f64; 64]; 3],
-}
-
-impl<'a> Nodes<'a> {
-    fn new(block: &Block<'a>) -> Nodes<'a> {
-        let shape = block.shape();
-        let (mut positions, mut steps) = ([[0.0; 64]; 3], [[0.0; 64]; 3]);
-        for (a, axis) in block.axes.iter().enumerate() {
-            positions[a][..axis.len()].copy_from_slice(axis);
-            for (step, ends) in steps[a].iter_mut().zip(axis.windows(2)) {
-                *step = ends[1] - ends[0];
-            }
-        }
-        Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], positions, steps }
-    }
-
-    pub fn count(&self) -> usize {
-        self.shape[2] * self.stride[2]
-    }
-
-    pub fn at(&self, n: usize) -> [usize; 3] {
-        // Divisions of short numbers are the faster ones, and a block has few nodes.
-        let (n, nx, ny) = (n as u32, self.shape[0] as u32, self.shape[1] as u32);
-        let row = n / nx;
-        [n - row * nx, row % ny, row / ny].map(|i| i as usize)
-    }
-
-    pub fn index(&self, at: [usize; 3]) -> usize {
-        at[0] + at[1] * self.stride[1] + at[2] * self.stride[2]
-    }
-
-    pub fn position(&self, n: usize) -> Vec3 {
-        let at = self.at(n);
-        [0, 1, 2].map(|a| self.axes[a][at[a]])
     }
 }
 
@@ -483,27 +404,6 @@ impl View<'_> {
     /// Whether a part of the solid lies where a live surface is positive.
     pub fn is_outside(&self, part: usize, surface: usize) -> bool {
         self.grid.is_outside(part, self.local.live[surface])
-    }
-
-    /// The surface of a part of the solid in the tile by components, with what stitching needs; and the components.
-    pub fn patch(&self, part: usize, middle: Vec3) -> (Patch, TileComponents) {
-        let mut patch = Patch::default();
-        let mut renamed = vec![u32::MAX; self.s.positions.len()];
-        let mut shared = vec![false; self.s.positions.len()];
-        self.each_shared(&mut |v| shared[v as usize] = true);
-        let bodies = TileComponents::each_triangle(self, part, middle, |t, cut| {
-            patch.cut.push(cut);
-            patch.triangles.push(t.map(|v| {
-                let slot = &mut renamed[v as usize];
-                if *slot == u32::MAX {
-                    *slot = patch.vertices.len() as u32;
-                    patch.vertices.push(self.s.positions[v as usize]);
-                    patch.shared.push(shared[v as usize].then(|| self.name(v as usize)));
-                }
-                *slot
-            }));
-        });
-        (patch, bodies)
     }
 
     /// The tile's position among the tiles.

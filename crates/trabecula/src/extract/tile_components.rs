@@ -15,7 +15,7 @@ use rustc_hash::FxHashMap;
 
 use super::sampling_grid::TILE;
 use super::sign_words::{bits, within};
-use super::tile::View;
+use super::tile::{Patch, View};
 use crate::surface_maker::{ComponentGraph, Islands, NONE, Resolved, Totals};
 
 /// The components that a grid line in x crosses in a tile.
@@ -286,6 +286,27 @@ fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<
 }
 
 impl View<'_> {
+    /// The surface of a part of the solid in the tile by components, with what stitching needs; and the components.
+    pub fn patch(&self, part: usize, middle: Vec3) -> (Patch, TileComponents) {
+        let mut patch = Patch::default();
+        let mut renamed = vec![u32::MAX; self.positions().len()];
+        let mut shared = vec![false; self.positions().len()];
+        self.each_shared(&mut |v| shared[v as usize] = true);
+        let bodies = TileComponents::each_triangle(self, part, middle, |t, cut| {
+            patch.cut.push(cut);
+            patch.triangles.push(t.map(|v| {
+                let slot = &mut renamed[v as usize];
+                if *slot == u32::MAX {
+                    *slot = patch.vertices.len() as u32;
+                    patch.vertices.push(self.positions()[v as usize]);
+                    patch.shared.push(shared[v as usize].then(|| self.name(v as usize)));
+                }
+                *slot
+            }));
+        });
+        (patch, bodies)
+    }
+
     /// Calls `found` for every vertex at which a grid line in x that belongs to the tile may cross the surface of a part of the
     /// solid, with the numbers of the line and the vertex, the position on the line, and whether the line enters the part there.
     fn each_crossing(&self, part: usize, found: &mut impl FnMut(u32, u32, f64, bool)) {

@@ -9,8 +9,14 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 use super::error::DesignError;
 use super::node::{Node, Value};
 
-/// Reads a tree from JSON.
-pub(super) fn read(text: &str) -> Result<Node, DesignError> {
+impl Node {
+    /// Reads JSON.
+    pub fn from_json(text: &str) -> Result<Node, DesignError> {
+        read(text)
+    }
+}
+
+fn read(text: &str) -> Result<Node, DesignError> {
     let line = Cell::new(1);
     let counted = Counted { bytes: text.as_bytes(), line: &line };
     let refused = RefCell::new(None);

@@ -167,11 +167,6 @@ impl Node {
         }
     }
 
-    /// Reads JSON.
-    pub fn from_json(text: &str) -> Result<Node, DesignError> {
-        super::json::read(text)
-    }
-
     /// The line of every path in the tree.
     pub fn lines(&self) -> Lines {
         let mut lines = Lines::default();

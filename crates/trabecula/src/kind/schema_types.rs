@@ -4,7 +4,7 @@
 //! of several schemas can stand side by side if their types differ, and a validator names what is wrong with the value that is there.
 //! `enum` and `const` hold for every type; they are put under a condition.
 
-use super::schema::{Defs, reference};
+use super::schema_defs::{Defs, reference};
 use super::{Node, Value};
 
 /// The JSON types that a schema allows.

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::primitive::{field, fill_rows, flat, joined, joined_gradient, rounded};
+use super::halfspace::flat;
+use super::primitive::{field, fill_rows, joined, joined_gradient, rounded};
 use super::{BuildRegion, Context, HalfSpace, Region, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};

@@ -3,9 +3,8 @@
 use core::f64::consts::PI;
 use std::sync::Arc;
 
-use super::primitive::{
-    along, apart, coordinate_axis, direction, field, fill_rows, flat, joined, joined_gradient, rounded,
-};
+use super::halfspace::flat;
+use super::primitive::{along, apart, coordinate_axis, direction, field, fill_rows, joined, joined_gradient, rounded};
 use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};

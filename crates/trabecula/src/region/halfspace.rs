@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::primitive::{along, coordinate_axis, direction, field, fill_rows, flat};
+use super::primitive::{along, coordinate_axis, direction, field, fill_rows};
 use super::{BuildRegion, Context, FARTHEST, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
-use crate::implicit::Surface;
+use crate::implicit::{Plane, Surface};
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
@@ -159,3 +159,13 @@ impl Shape for HalfSpace {
 }
 
 field!(HalfSpace);
+
+/// The solid below (or above) a coordinate of an axis.
+pub(super) fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Surface>) -> CsgTree {
+    let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
+    (point[axis], normal[axis]) = (at, if below { 1.0 } else { -1.0 });
+    let mut face = Surface::distance(Arc::new(HalfSpace { point, normal }));
+    face.plane = Some(Plane { axis, at, below });
+    out.push(face);
+    CsgTree::Leaf(out.len() - 1)
+}

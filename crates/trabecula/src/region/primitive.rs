@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{HalfSpace, Offset, Shape, one_surface};
+use super::{Offset, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::Block;
-use crate::implicit::{Plane, Surface};
+use crate::implicit::Surface;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, dot, scale, sub, unit};
 
@@ -73,16 +73,6 @@ pub(super) fn fill_rows(block: &Block, out: &mut [f32], f: impl Fn(Vec3) -> f64)
     }
 }
 
-/// The solid below (or above) a coordinate of an axis.
-pub(super) fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Surface>) -> CsgTree {
-    let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
-    (point[axis], normal[axis]) = (at, if below { 1.0 } else { -1.0 });
-    let mut face = Surface::distance(Arc::new(HalfSpace { point, normal }));
-    face.plane = Some(Plane { axis, at, below });
-    out.push(face);
-    CsgTree::Leaf(out.len() - 1)
-}
-
 /// A convex shape grown by `by`: its edges become round, so it has one face.
 pub(super) fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
     match Offset::new(of, by) {
@@ -125,7 +115,7 @@ pub(super) use field;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Cuboid, Cylinder, Sphere};
+    use super::super::{Cuboid, Cylinder, HalfSpace, Sphere};
     use super::*;
     use crate::field::Field;
     use crate::region::tests::check_shape;

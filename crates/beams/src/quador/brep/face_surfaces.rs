@@ -8,8 +8,8 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::hub::HalfBeam;
 use super::super::integral::unresolved_face;
+use super::super::perpendicular::perpendicular;
 use super::super::stereographic::{Stereographic, opposite_poles};
-use super::super::tessellation::perpendicular;
 use super::cuts::Plane;
 use super::{Bezier, Brep, Face, Frame, Kind, Surface};
 

@@ -14,7 +14,7 @@ use super::super::complex::{Complex, Face as HubFace};
 use super::super::hub::Hub;
 use super::super::hub_quadric::Quadric;
 use super::super::integral::unresolved_face;
-use super::super::tessellation::perpendicular;
+use super::super::perpendicular::perpendicular;
 use super::cuts::Plane;
 use super::{Brep, Face, Frame, Kind, NONE, Surface, Use};
 

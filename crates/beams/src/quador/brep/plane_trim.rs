@@ -11,8 +11,8 @@ use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 
 use super::super::hub_quadric::Quadric;
+use super::super::perpendicular::perpendicular;
 use super::super::slice::{DISPLACEMENTS, Plane};
-use super::super::tessellation::perpendicular;
 use super::cuts::Plane as Cut;
 use super::{Brep, Corner, Edge, Face, Frame, Kind, NONE, Surface, Use};
 

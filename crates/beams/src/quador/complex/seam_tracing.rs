@@ -9,8 +9,9 @@ use std::rc::Rc;
 
 use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
+use super::super::affine_function::AffineFunction;
 use super::super::conic::Conic;
-use super::super::hub::{AffineFunction, HalfBeam, Hub};
+use super::super::hub::{HalfBeam, Hub};
 use super::super::hub_quadric::{Piece, Quadric, piece};
 use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
 

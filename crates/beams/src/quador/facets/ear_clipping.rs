@@ -131,7 +131,7 @@ impl Facets<'_> {
 
 /// Triangulates the strip between a loop around an axis and the end circle, by azimuth.
 pub(super) fn strip(axis: Vec3, points: &[Vec3], inner: &[u32], ring: &[u32]) -> Vec<[u32; 3]> {
-    let side = super::super::tessellation::perpendicular(axis);
+    let side = super::super::perpendicular::perpendicular(axis);
     let other = cross(axis, side);
     let azimuth = |i: u32| dot(points[i as usize], other).atan2(dot(points[i as usize], side));
     let sorted = |of: &[u32]| {

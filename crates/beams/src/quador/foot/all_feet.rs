@@ -232,7 +232,7 @@ mod tests {
         for _ in 0..300 {
             let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -1.0 };
             for _ in 0..2 {
-                let g = crate::quador::hub::AffineFunction {
+                let g = crate::quador::affine_function::AffineFunction {
                     a: scale(random.direction(), 1.2 * random.next()),
                     b: random.next() - 0.7,
                 };

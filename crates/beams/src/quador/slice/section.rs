@@ -8,9 +8,10 @@
 
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
+use super::super::affine_function::AffineFunction;
 use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::complex::perturbation;
-use super::super::hub::{AffineFunction, HalfBeam, Hub};
+use super::super::hub::{HalfBeam, Hub};
 use super::super::hub_quadric::{Piece, Quadric, piece};
 use super::{Arc, Plane};
 

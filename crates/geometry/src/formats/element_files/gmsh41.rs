@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::gmsh_entities::{Surface, surfaces, write_periodic};
-use super::{FeField, FeText, lines, push};
-use crate::fe_mesh::FeMesh;
+use super::{FeText, lines, push};
+use crate::fe_mesh::{FeField, FeMesh};
 use crate::math::Aabb;
 use crate::tetmesh::EDGES;
 

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::{FeField, FeText, abaqus, lines, nastran, push};
-use crate::fe_mesh::ShellMesh;
+use super::{FeText, abaqus, lines, nastran, push};
+use crate::fe_mesh::{FeField, ShellMesh};
 use crate::formats::nastran_fields::{check_numbers, real};
 use crate::formats::vtu::Cells;
 

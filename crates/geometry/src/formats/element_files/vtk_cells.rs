@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use super::{FeField, FeText};
-use crate::fe_mesh::{FeMesh, MIDDLES};
+use super::FeText;
+use crate::fe_mesh::{FeField, FeMesh, MIDDLES};
 use crate::formats::vtu::{Array, Cells};
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {

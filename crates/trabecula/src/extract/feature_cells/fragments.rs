@@ -1,6 +1,11 @@
 //! A simplex cut by one plane after the other into convex fragments.
 
-use super::simplex_cut::CutVertex;
+/// A vertex while a simplex is cut: the corners of the face in which it lies and the surfaces that meet there, as bits.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(in crate::extract) struct CutVertex {
+    pub corners: u8,
+    pub surfaces: u64,
+}
 
 /// The convex fragments of a simplex, and their facets, as numbers of vertices. The buffers serve for one simplex after the
 /// other, as most have few fragments.

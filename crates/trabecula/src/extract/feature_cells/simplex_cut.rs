@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::FeatureCells;
-use super::fragments::Fragments;
+use super::fragments::{CutVertex, Fragments};
 use crate::extract::sign_words::bits;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, cross, dot, scale, sub};
@@ -13,13 +13,6 @@ use geometry::math::{Vec3, add, cross, dot, scale, sub};
 pub(in crate::extract) struct Simplex {
     pub nodes: [usize; 4],
     pub count: usize,
-}
-
-/// A vertex while a simplex is cut: the corners of the face in which it lies and the surfaces that meet there, as bits.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(in crate::extract) struct CutVertex {
-    pub corners: u8,
-    pub surfaces: u64,
 }
 
 /// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, as a multiple of the least distance

@@ -7,9 +7,9 @@ use rustc_hash::FxHashMap;
 
 use super::TracedEdges;
 use crate::csg_tree::CsgTree;
+use crate::extract::block_nodes::Nodes;
 use crate::extract::sampling_grid::LocalSolid;
 use crate::extract::sign_words::{Signs, bits};
-use crate::extract::tile::Nodes;
 
 /// The claimed cells of a block.
 #[derive(Default)]

@@ -6,100 +6,13 @@
 
 use std::ops::Range;
 
+use super::divided_faces::{CellFace, Corner, FaceScratch, FaceTriangle, Polygons};
 use super::polygon_triangulation::triangles;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex};
 use crate::extract::sign_words::bits;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
-use geometry::mesh::exact::{drop_axis, orient2d};
-
-/// A cell face, cut along its contours and into triangles. Its buffers serve for one block after the other.
-#[derive(Default)]
-pub(in crate::extract) struct CellFace {
-    /// Its nodes and the points in it.
-    pub(super) corners: Vec<Corner>,
-    pub(super) parts: Vec<FaceTriangle>,
-    /// The triangles cut by all other surfaces, as the faces of feature cells are: the ids of all corners of the fragments, and
-    /// for each fragment the surfaces that are negative in it and where its ids end.
-    names: Vec<VertexId>,
-    ends: Vec<(u64, usize)>,
-    /// The contours, with the points where other surfaces cross them, and where each ends.
-    along: Vec<VertexId>,
-    along_ends: Vec<usize>,
-    /// How many times it was divided again.
-    pub(super) tries: usize,
-}
-
-#[derive(Clone, Copy)]
-pub(super) struct Corner {
-    pub id: usize,
-    /// Nodes from 0, points of the four grid edges from 4 in pairs, corners of contours from 12.
-    pub code: usize,
-    pub key: VertexId,
-}
-
-/// A triangle of a cell face.
-#[derive(Clone, Copy)]
-pub(super) struct FaceTriangle {
-    /// Indices of its corners, by ascending code.
-    pub corners: [usize; 3],
-    /// Whether they run counter-clockwise about the face's axis.
-    pub left: bool,
-    /// Whether the surface is negative in it.
-    pub inside: bool,
-    /// Whether the edge opposite each corner is part of a contour.
-    pub on_contour: [bool; 3],
-}
-
-impl CellFace {
-    /// The fragments between all other surfaces: those that are negative, and the corners counter-clockwise about the face's
-    /// axis.
-    pub fn fragments(&self) -> impl Iterator<Item = (u64, &[VertexId])> {
-        let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
-        let each = starts.zip(&self.ends);
-        each.map(|(start, (negative, end))| (*negative, &self.names[start..*end]))
-    }
-
-    /// The contours, with the points where other surfaces cross them.
-    pub fn contours(&self) -> impl Iterator<Item = &[VertexId]> {
-        let starts = [0].into_iter().chain(self.along_ends.iter().copied());
-        starts.zip(&self.along_ends).map(|(start, end)| &self.along[start..*end])
-    }
-}
-
-const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-/// Polygons one after the other: the ids and positions of their corners; for each the surfaces that are negative in it and where
-/// its corners end.
-#[derive(Default)]
-pub(super) struct Polygons {
-    corners: Vec<(VertexId, Vec3)>,
-    ends: Vec<(u64, usize)>,
-}
-
-impl Polygons {
-    /// Whether all polygons of a face keep their orientation in single precision. Together they fill the face, so then they do
-    /// not overlap.
-    fn are_sound(&self, axis: usize) -> bool {
-        let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
-        let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
-        starts.zip(&self.ends).all(|(start, (_, end))| {
-            let ring = &self.corners[start..*end];
-            let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
-            (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
-        })
-    }
-}
-
-/// Buffers for the division of one face after the other.
-#[derive(Default)]
-pub(super) struct FaceScratch {
-    flat: Vec<[f64; 2]>,
-    polygon: Vec<usize>,
-    positions: Vec<[f64; 2]>,
-    parts: Vec<FaceTriangle>,
-    fragments: Polygons,
-}
+use geometry::mesh::exact::drop_axis;
 
 /// Most attempts to divide a face that self-intersects in single precision.
 const TRIES: usize = 8;

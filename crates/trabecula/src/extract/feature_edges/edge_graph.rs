@@ -1,6 +1,6 @@
 //! The graph of feature edges in a cell, which divides a patch.
 
-use super::surface_patch::{BoundaryLoop, Cell, Patch};
+use super::loop_patch::{BoundaryLoop, Cell, Patch};
 use crate::extract::feature_cells::middle;
 use geometry::math::{Vec3, add, cross, dot, norm, sub, unit};
 

@@ -1,8 +1,9 @@
 //! The surface in fitted cells: cones, subvolumes, or as a last resort the fallback fill.
 
 use super::boundary_loops::{Step, boundary_loops};
-use super::cell_faces::FaceTriangle;
-use super::surface_patch::{BoundaryLoop, Patch, Patches};
+use super::divided_faces::FaceTriangle;
+use super::loop_patch::{BoundaryLoop, Patch};
+use super::surface_patch::Patches;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle, section};
 use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;

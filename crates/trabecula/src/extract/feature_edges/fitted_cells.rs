@@ -9,89 +9,11 @@
 //! points inside a face or a cell their values lie between those of the nodes around. So no surface appears where an adjacent
 //! cell does not expect it.
 
-use rustc_hash::FxHashMap;
-
-use super::cell_faces::{CellFace, Corner, FaceScratch};
+use super::divided_faces::Corner;
 use super::{EdgeStore, OtherSurfaces, SurfaceContext};
 use crate::extract::feature_cells::FeatureCells;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
-
-/// The extra points of a block and the cell faces that they divide.
-#[derive(Default)]
-pub(in crate::extract) struct DividedFaces {
-    /// Number of live surfaces.
-    live: usize,
-    /// Positions of the points.
-    positions: Vec<Vec3>,
-    /// Values of all live surfaces at the points, point by point.
-    values: Vec<f64>,
-    /// For each point, the first one at the same position; the others have other values.
-    first: Vec<usize>,
-    /// The grid edge on which each point lies, if it does: lower node and axis.
-    lines: Vec<Option<(usize, usize)>>,
-    pub(super) numbers: FxHashMap<VertexId, usize>,
-    /// The numbers of divided faces, by their lowest node and the axis normal to them.
-    faces: FxHashMap<(usize, usize), usize>,
-    /// The divided faces, and others whose buffers are free.
-    list: Vec<CellFace>,
-    pub(super) scratch: FaceScratch,
-}
-
-impl DividedFaces {
-    /// Forgets all points and faces, for this number of live surfaces.
-    pub fn clear(&mut self, live: usize) {
-        self.live = live;
-        self.positions.clear();
-        self.values.clear();
-        self.first.clear();
-        self.lines.clear();
-        self.numbers.clear();
-        self.faces.clear();
-    }
-
-    /// The number of a divided face, by its lowest node and the axis normal to it.
-    pub(super) fn number(&self, face: (usize, usize)) -> Option<usize> {
-        self.faces.get(&face).copied()
-    }
-
-    pub(super) fn numbered(&self, number: usize) -> &CellFace {
-        &self.list[number]
-    }
-
-    /// A divided face, by its lowest node and the axis normal to it.
-    pub fn face(&self, face: (usize, usize)) -> Option<&CellFace> {
-        Some(self.numbered(self.number(face)?))
-    }
-
-    /// The face whose buffers are for the next one that is divided.
-    pub(super) fn take_next(&mut self) -> CellFace {
-        let next = self.faces.len();
-        self.list.get_mut(next).map(std::mem::take).unwrap_or_default()
-    }
-
-    /// Puts it back; it counts if it has a name.
-    pub(super) fn put_next(&mut self, face: CellFace, name: Option<(usize, usize)>) {
-        let next = self.faces.len();
-        match self.list.get_mut(next) {
-            Some(place) => *place = face,
-            None => self.list.push(face),
-        }
-        self.faces.extend(name.map(|name| (name, next)));
-    }
-
-    pub fn position(&self, point: usize) -> Vec3 {
-        self.positions[point]
-    }
-
-    pub fn value(&self, point: usize, surface: usize) -> f64 {
-        self.values[point * self.live + surface]
-    }
-
-    pub fn line(&self, point: usize) -> Option<(usize, usize)> {
-        self.lines[point]
-    }
-}
 
 impl EdgeStore {
     /// Whether the cell can use extra points on its faces and edges.

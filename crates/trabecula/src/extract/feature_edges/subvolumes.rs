@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use rustc_hash::FxHashMap;
 
 use super::fill_fitted::{Base, Tet};
-use super::surface_patch::Patch;
+use super::loop_patch::Patch;
 use crate::extract::feature_cells::{FeatureCells, middle};
 use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 

@@ -4,42 +4,15 @@
 //! since the loop is a simple curve on the boundary of a convex cell; several fans are tested after they are made.
 
 use super::edge_graph::EdgeGraph;
-use super::{EdgeStore, Grid, Nodes, nearest, within};
+use super::loop_patch::{BoundaryLoop, Cell, Patch};
+use super::{EdgeStore, nearest};
 use crate::extract::feature_cells::{FeatureCells, middle};
 use crate::extract::vertex_id::VertexId;
-use crate::field::Field;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
 /// Cells with more segments of feature edges than this are treated as if they had none: such segments are far shorter than a
 /// grid step.
 const MOST: usize = 128;
-
-/// A cell and the surface whose patch it contains.
-#[derive(Clone, Copy)]
-pub(super) struct Cell<'a> {
-    pub grid: &'a Grid,
-    nodes: &'a Nodes<'a>,
-    /// The lowest node.
-    node: usize,
-    surface: usize,
-    field: &'a dyn Field,
-}
-
-/// The boundary loop of a patch.
-pub(super) struct BoundaryLoop {
-    /// Its points, counter-clockwise seen from the void.
-    pub positions: Vec<Vec3>,
-    /// The faces of the cell on which each point lies, as bits; a contour corner lies on one.
-    pub faces: Vec<u8>,
-}
-
-/// Triangles that fill a loop. Indices below the number of its points are these; the others are `inner`.
-pub(super) struct Patch {
-    pub inner: Vec<Vec3>,
-    pub triangles: Vec<[usize; 3]>,
-    /// Polylines along the dividing feature edges, from one point of the loop to another.
-    pub routes: Vec<Vec<usize>>,
-}
 
 /// The candidates that fill a loop.
 pub(super) struct Patches {
@@ -51,29 +24,6 @@ pub(super) struct Patches {
 impl Patches {
     pub fn best(&self, divided: bool) -> &Patch {
         (self.divided.as_ref().filter(|_| divided)).unwrap_or(&self.cone)
-    }
-}
-
-impl Patch {
-    fn cone(boundary_loop: &BoundaryLoop, apex: Vec3) -> Patch {
-        let n = boundary_loop.positions.len();
-        Patch { inner: vec![apex], triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(), routes: Vec::new() }
-    }
-}
-
-impl Cell<'_> {
-    /// A point clamped to the interior of the cell.
-    pub fn within(&self, p: Vec3) -> Vec3 {
-        let at = self.nodes.at(self.node);
-        [0, 1, 2].map(|a| within(self.grid, self.nodes.axes[a], at[a], p[a]))
-    }
-
-    /// Sum of squared distances of the surface from the midpoints between a point and others.
-    pub fn off(&self, from: Vec3, to: &[Vec3]) -> f64 {
-        let middles: Vec<Vec3> = to.iter().map(|p| scale(add(from, *p), 0.5)).collect();
-        let mut off = vec![0.0; middles.len()];
-        self.field.values(&middles, &mut off);
-        off.iter().map(|d| d * d).sum()
     }
 }
 

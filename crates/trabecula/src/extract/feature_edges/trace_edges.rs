@@ -1,25 +1,10 @@
 //! Tracing feature edges through the grid: which edges are kept, and which cells and faces they pass.
 
-use std::collections::HashMap;
-
 use rustc_hash::FxHashMap;
 
-use crate::extract::sampling_grid::{Grid, TILE};
-use crate::extract::tile::Nodes;
+use crate::extract::block_nodes::{Nodes, PaddedNodes};
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, scale, sub};
-
-/// Straight edges of at least this many grid steps are kept, whatever their angle.
-const LONG: f64 = 3.0;
-/// Edges of at least this angle are kept whatever their length, radians (25°). Without them the surface is off by up to a tenth
-/// of a grid step.
-const SHARP: f64 = 0.436;
-
-/// The node coordinates of a block and of one more node on every side, and the number of nodes before the block.
-pub(in crate::extract) struct PaddedNodes<'a> {
-    pub axes: [&'a [f64]; 3],
-    pub before: [isize; 3],
-}
 
 /// The feature edges of a block's live surfaces, cell by cell.
 #[derive(Default)]
@@ -126,33 +111,4 @@ pub(super) fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
         cell[a] = above - 1;
     }
     Some(cell)
-}
-
-/// The segments of a surface's feature edges that are kept, by the tiles near which they pass.
-pub(in crate::extract) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
-    let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
-    let tiles = grid.tiles();
-    for (i, s) in (0..).zip(&creases.segments) {
-        let [p, q] = s.ends;
-        if s.turn < SHARP && s.run < LONG * grid.step {
-            continue;
-        }
-        let range = [0, 1, 2].map(|a| {
-            let axis = &grid.axes[a];
-            // The cells it passes, and two more on either side: as far beyond its border does a tile need edges.
-            let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
-            let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
-            let tile = |c: usize| (c / TILE).min(tiles[a] - 1);
-            tile(low.saturating_sub(2))..tile(high + 2) + 1
-        });
-        for k in range[2].clone() {
-            for j in range[1].clone() {
-                for t in range[0].clone() {
-                    let tile = t + tiles[0] * (j + tiles[1] * k);
-                    found.entry(tile).or_default().push(i);
-                }
-            }
-        }
-    }
-    found
 }

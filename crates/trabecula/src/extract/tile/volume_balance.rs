@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Nodes, Scratch, numbered};
+use super::{Nodes, Scratch};
 use crate::extract::sampling_grid::{Grid, LocalSolid};
+use crate::extract::vertex_numbers::numbered;
 use geometry::math::Vec3;
 
 /// A turn of more than 45 degrees within a triangle is an edge of the surface, not its curvature; the cosine.
