@@ -4,6 +4,7 @@
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
 mod beam_files;
+mod beams_in_region;
 mod build;
 mod build_beams;
 mod build_blend;
@@ -36,6 +37,7 @@ mod surface_net;
 mod tests;
 mod tiled_cell;
 mod unit_cell;
+mod varied;
 mod volume_error;
 mod warn;
 
@@ -448,7 +450,7 @@ impl Built {
     /// that holds it.
     pub fn whole_beams(&self, name: &str) -> bool {
         let found = self.beams.iter().find(|b| b.0 == name);
-        found.is_some_and(|(_, made)| build_beams::lone(self) && build_beams::held(made, self))
+        found.is_some_and(|(_, made)| beams_in_region::lone(self) && beams_in_region::held(made, self))
     }
 
     /// Whether files of its mesh are to have no caps on the region's boundary.

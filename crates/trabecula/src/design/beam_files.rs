@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::beams_in_region;
 use super::{Built, build_beams};
 use crate::report::BeamsFileReport;
 use crate::truss::{Beams, beams_in};
@@ -38,7 +39,7 @@ pub(super) fn written(built: &Built) -> Result<Written<'_>, Fault> {
         Fault::new("", message)
     };
     let (name, beams) = build_beams::only(built).map_err(refuse)?;
-    let cut = !build_beams::held(beams, built);
+    let cut = !beams_in_region::held(beams, built);
     let (mut graph, mut quadors) = match beams {
         Beams::Truss(t) => (Cow::Borrowed(&t.graph), t.quadors.clone()),
         Beams::Pattern(laid) => (Cow::Owned(laid.pattern().expanded()?), laid.expand()?),

@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::beams_in_region::{check_open, whole};
 use super::build_core;
 use super::build_pattern;
 use super::data::*;
-use super::sample;
 use super::warn::solved_map;
 use super::{Built, Warning};
 use crate::environment::Environment;
@@ -23,12 +23,12 @@ use crate::region::HalfSpace;
 use crate::truss::{self, Beams, Truss, fill};
 use ::beams::Plane;
 use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
-use ::beams::quador::{Fillet, Quadors};
+use ::beams::quador::Quadors;
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
 use geometry::progress::checkpoint;
 
-pub(super) use beam_report::{held, inside, lone, report, share};
+pub(super) use beam_report::report;
 use beam_report::{warn, warn_cleaned};
 use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
 pub(super) use wire::{given, key_of_fault};
@@ -86,7 +86,7 @@ pub(super) fn beams(
     checkpoint();
     let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
-    let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
+    let quadors = Quadors::new(&graph, spec.fillet.into()).map_err(fault)?;
     checkpoint();
     let inside = |p: Vec3| region.value(p) <= slack;
     let fillets: Vec<f64> = (0..quadors.len())
@@ -126,15 +126,6 @@ pub(super) fn beams(
     check_open(&*truss.quadors, environment)?;
     warn(&truss, spec, environment, warnings);
     Ok(Beams::Truss(Arc::new(truss)))
-}
-
-/// Whether all beams lie in a region.
-fn whole(quadors: &Quadors, region: &dyn Field) -> bool {
-    // A hub and its stubs lie within a box, and that within a ball.
-    (0..quadors.len()).into_par_iter().all(|i| {
-        let b = quadors.hub_bounds(i);
-        region.bound(&b).hi <= 0.0 || region.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
-    })
 }
 
 /// The beams that a design is made of, if of nothing else, for a mesh to a chord error.
@@ -296,36 +287,4 @@ fn frame(
     let reach = reach(radii, longest);
     let wire = fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
     Ok(Frame { wire, own: GivenRadii::default(), wavelength: made.wavelength(), reach })
-}
-
-pub(super) fn fillet(spec: FilletSpec) -> Fillet {
-    match spec {
-        FilletSpec::None => Fillet::None,
-        FilletSpec::Auto => Fillet::Auto,
-        FilletSpec::Radius(r) => Fillet::Radius(r),
-        FilletSpec::Tau(t) => Fillet::Tau(t),
-        FilletSpec::Alpha(a) => Fillet::Alpha(a),
-        FilletSpec::Beta(b) => Fillet::Beta(b),
-    }
-}
-
-/// Refuses beams that leave the region empty or fill it.
-pub(super) fn check_open(field: &dyn Field, environment: &Environment) -> Result<(), DesignError> {
-    let share = |points: &[Vec3]| {
-        let mut values = vec![0.0; points.len()];
-        field.values(points, &mut values);
-        values.iter().filter(|v| **v <= 0.0).count() as f64 / points.len().max(1) as f64
-    };
-    let mixed = |v: f64| v > 0.0 && v < 1.0;
-    if mixed(share(environment.points)) {
-        return Ok(());
-    }
-    match share(&sample::inside(environment.region, 10 * sample::COUNT).0) {
-        v if v >= 1.0 => Err(DesignError::new(
-            format!("{}.radius", environment.path),
-            "the beams are so thick that the region is solid everywhere: nothing is open",
-        )),
-        // All samples may miss a few thin beams.
-        _ => Ok(()),
-    }
 }

@@ -1,9 +1,9 @@
 //! Levels, which set how much is solid: data to [`Level`].
 
 use super::build_property;
-use super::built_report::Varied;
 use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
+use super::varied::Varied;
 use crate::cell::{Cell, Distance, NoPore, Part};
 use crate::environment::Environment;
 use crate::field::Field;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::build_beams::{check_open, fillet, given, inside, key_of_fault, share};
+use super::beams_in_region::{check_open, inside, share};
+use super::build_beams::{given, key_of_fault};
 use super::data::*;
 use super::{Built, Warning};
 use crate::environment::Environment;
@@ -64,7 +65,7 @@ pub(super) fn laid(
     }
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;
-    let laid = PatternField::new(pattern, fillet(spec.fillet)).map_err(|f| {
+    let laid = PatternField::new(pattern, spec.fillet.into()).map_err(|f| {
         // The number of a beam about one hub of each kind is none of the design.
         match f.at.strip_prefix("beams[").and_then(|rest| rest.split_once("].")) {
             Some((_, of)) => DesignError { path: below(key_of_fault(of, spec)), ..DesignError::fault(&at, f.clone()) },

@@ -4,9 +4,9 @@
 //! secant in logarithms. Where the amount varies, the function is found at a few fractions and interpolated in logarithms by monotone cubics
 //! (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238).
 
-use super::built_report::Varied;
 use super::data::AmountSpec;
 use super::unit_cell;
+use super::varied::Varied;
 use crate::cell::{Cell, Part};
 use crate::effective::{NoTensor, Resolution, UnitCell};
 use crate::environment::Environment;

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use super::built_report::Varied;
 use super::skin_kind::{OpenPlace, OpenSpec, SkinSpec};
+use super::varied::Varied;
 use super::{Design, Loader, sample};
 use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use super::build_cell::orbit_terms;
 use super::build_level::{check_mid, within_wavelength};
 use super::build_tets::{self, TetReport, rounded};
-use super::built_report::Varied;
 use super::data::*;
 use super::finish_tiling::{Finish, Finished};
-use super::joins::{Joins, joins};
+use super::joins::{Joins, Zoned, joins};
+use super::varied::Varied;
 use super::warn::gaps;
 use super::{CellZone, Design, Loader, Warning, ZoneNames, cell_zones, sample};
 use crate::cell::tet::{TetCell, named_tet_cell};
@@ -263,9 +263,6 @@ pub(super) struct Made {
     /// Which zones join, if there are any and it can be predicted.
     pub joins: Option<Joins>,
 }
-
-/// The cell of each zone.
-pub(super) type Zoned = BTreeMap<i64, Arc<TetCell>>;
 
 /// The lattice.
 pub(super) fn lattice(

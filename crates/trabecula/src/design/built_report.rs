@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use super::build_blend::Functions;
 use super::default_spacing::spacing;
+use super::varied::Varied;
 use super::{Blended, Built, Joins, Tiled, build_beams, sample};
 use crate::analysis::{self, Transition};
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
-use crate::lattice::{Lattice, Level};
+use crate::lattice::Lattice;
 use crate::map::{CoreFill, Distortion, Period, Phase, SingularLine, Spread};
 use crate::region::{CadMesh, Region};
 use crate::report::*;
@@ -19,69 +20,6 @@ use geometry::math::Mat3;
 
 /// How many times as many points a zone's fraction is sampled at as others.
 const ZONES: usize = 10;
-/// Fractions that differ by less are one; all else by this share.
-const SAME: f64 = 1e-6;
-
-/// The least and the greatest of a number over a region.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Varied {
-    pub min: f64,
-    pub max: f64,
-}
-
-impl Varied {
-    pub fn of(values: &[f64]) -> Varied {
-        let (min, max) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        Varied { min, max }
-    }
-
-    pub fn map(self, f: impl Fn(f64) -> f64) -> Varied {
-        if self.min == self.max { Varied::of(&[f(self.min)]) } else { Varied::of(&[f(self.min), f(self.max)]) }
-    }
-
-    /// The level t of the core at the points; half the thickness, where that is the level.
-    pub fn of_iso(lattice: &Lattice, points: &[[f64; 3]]) -> Varied {
-        if lattice.level.grade().constant().is_some() {
-            let mut t = [0.0];
-            lattice.isos(&points[..1], &mut t);
-            return Varied::of(&t);
-        }
-        Varied::of(&sample::values(points, |points, out| lattice.isos(points, out)))
-    }
-
-    /// The solid fraction of the cell at the points.
-    pub fn of_fraction(lattice: &Lattice, points: &[[f64; 3]]) -> Varied {
-        match &lattice.level {
-            Level::Fraction(g) => match g.constant() {
-                Some(v) => Varied { min: v, max: v },
-                None => Varied::of(&sample::values(points, |points, out| g.values(points, out))),
-            },
-            // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
-            Level::Thickness(_) if lattice.map.affine().is_none() => {
-                let found = Varied::of(&sample::values(points, |points, out| lattice.fractions(points, out)));
-                // Cells of a map that was solved are alike but for rounding.
-                if found.max - found.min < SAME { Varied { max: found.min, ..found } } else { found }
-            }
-            Level::Iso(_) | Level::Thickness(_) => Varied::of_iso(lattice, points).map(|t| lattice.fraction(t)),
-        }
-    }
-
-    fn varying(self) -> Varying {
-        if self.max - self.min <= SAME * self.max.abs() {
-            Varying::Number(self.min)
-        } else {
-            Varying::Range([self.min, self.max])
-        }
-    }
-}
-
-impl core::fmt::Display for Varied {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        // Adding zero takes the sign off a negative one.
-        let [min, max] = [self.min, self.max].map(|v| format!("{:.4}", (v * 1e4).round() / 1e4 + 0.0));
-        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
-    }
-}
 
 /// The solid share of the region and the region's volume.
 pub(super) fn expected(built: &Built) -> (f64, f64) {

@@ -1,10 +1,16 @@
 //! Connectivity of a lattice whose zones have different cells, predicted without making the surface.
 
-use super::{CellZone, Warning, build_tiling::Zoned};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::{CellZone, Warning};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
 use crate::report::ZoneJoin;
 use crate::tiling::{self, Connectivity, Tiling, ZonePair};
+
+/// The cell of each zone.
+pub(super) type Zoned = BTreeMap<i64, Arc<TetCell>>;
 
 /// Steps along the edge of a face on which ports are sampled.
 const STEPS: usize = 96;

@@ -12,7 +12,7 @@ use geometry::math::Vec3;
 use geometry::progress::Silent;
 use rayon::prelude::*;
 
-use super::built_report::Varied;
+use super::varied::Varied;
 use super::{Built, sample};
 use crate::extract;
 use crate::grade::Grade;

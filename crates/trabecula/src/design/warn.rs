@@ -1,7 +1,7 @@
 //! Refusals and warnings of a lattice in a region.
 
-use super::built_report::Varied;
 use super::data::*;
+use super::varied::Varied;
 use super::{Warning, sample};
 use crate::cell::Distance;
 use crate::environment::Environment;

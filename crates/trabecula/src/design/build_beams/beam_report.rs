@@ -1,6 +1,6 @@
 //! Warnings and figures of beams.
 
-use super::whole;
+use crate::design::beams_in_region::share;
 use crate::design::build_tets::rounded;
 use crate::design::data::*;
 use crate::design::{Built, Warning, build_pattern};
@@ -8,7 +8,6 @@ use crate::environment::Environment;
 use crate::report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, TrimmedReport};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
-use ::beams::pattern::PatternField;
 use ::beams::quador::{Fillet, Shortfall};
 use geometry::fault::{counted, number, position};
 
@@ -82,38 +81,6 @@ pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, w
             "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
             position(p)
         ));
-    }
-}
-
-/// Whether a design is one graph of beams and nothing else.
-pub(in crate::design) fn lone(built: &Built) -> bool {
-    built.beams.len() == 1 && built.lattices.is_empty() && built.tilings.is_empty() && built.solid.filled.is_empty()
-}
-
-/// Whether all beams lie in the region: of a large pattern, by the box that holds it.
-pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
-    match beams {
-        Beams::Truss(truss) => truss.whole,
-        Beams::Pattern(laid) => inside(laid, built),
-    }
-}
-
-/// As `held`, for a pattern.
-pub(in crate::design) fn inside(laid: &PatternField, built: &Built) -> bool {
-    let region = &*built.solid.region;
-    region.bound(&laid.bounds()).hi <= 0.0 || laid.expanded_if_small().is_some_and(|all| whole(&all, region))
-}
-
-/// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.
-pub(in crate::design) fn share(
-    volume: Option<f64>,
-    whole: bool,
-    built: &Built,
-    sampled: &dyn core::ops::Deref<Target = f64>,
-) -> (f64, bool) {
-    match (volume, built.solid.region.volume()) {
-        (Some(solid), Some(region)) if whole && lone(built) => (solid / region, true),
-        _ => (**sampled, false),
     }
 }
 

@@ -7,14 +7,14 @@
 use rayon::prelude::*;
 
 use super::wire::profile;
-use super::{fillet, whole};
+use crate::design::beams_in_region::whole;
 use crate::design::data::*;
 use crate::design::sample;
 use crate::environment::Environment;
 use crate::kind::DesignError;
 use crate::map::Map;
 use ::beams::graph::{GivenRadii, Graph, PeriodicGraph, Radii, Wireframe, with_radii};
-use ::beams::quador::{PeriodicCell, Quadors};
+use ::beams::quador::{Fillet, PeriodicCell, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Mat3, inverse, transpose};
 use geometry::roots::{Bracket, FalsePosition, try_bisect};
@@ -116,7 +116,7 @@ pub(super) fn of_cell(
     spec: &BeamsSpec,
     environment: &Environment,
 ) -> Result<f64, DesignError> {
-    let (profile, fillet) = (spec.profile.map(profile), fillet(spec.fillet));
+    let (profile, fillet) = (spec.profile.map(profile), Fillet::from(spec.fillet));
     let cells = cells(map, environment).into_iter().map(|edges| PeriodicCell { graph: net, edges, profile, fillet });
     let cells: Vec<PeriodicCell> = cells.collect();
     let value = |radius: f64| -> Result<Option<f64>, Fault> {
@@ -177,7 +177,7 @@ pub(super) fn of_frame(
         let radii = Radii { radius: Some(radius), hub: None, profile: spec.profile.map(profile) };
         with_radii(wire, &GivenRadii::default(), &radii, |radius, _, out| out.fill(*radius))
     };
-    let quadors = |radius: f64| Quadors::new(&graph(radius)?, fillet(spec.fillet));
+    let quadors = |radius: f64| Quadors::new(&graph(radius)?, spec.fillet.into());
     let share = || sample::inside(region, 10 * sample::COUNT).1 * region.bounds().size().iter().product::<f64>();
     let size = region.volume().unwrap_or_else(share);
     let exact = |radius: f64| -> Result<Option<f64>, Fault> {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{GradeSpec, MapKind};
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table, Unit};
+use ::beams::quador::Fillet;
 
 /// Graphs of beams, by name.
 #[derive(Clone, Debug, Default, PartialEq, Kind)]
@@ -384,6 +385,19 @@ pub enum FilletSpec {
     /// By β = 1/(4α): a larger one is a smaller fillet.
     #[kind(min = 0.5)]
     Beta(f64),
+}
+
+impl From<FilletSpec> for Fillet {
+    fn from(spec: FilletSpec) -> Fillet {
+        match spec {
+            FilletSpec::None => Fillet::None,
+            FilletSpec::Auto => Fillet::Auto,
+            FilletSpec::Radius(r) => Fillet::Radius(r),
+            FilletSpec::Tau(t) => Fillet::Tau(t),
+            FilletSpec::Alpha(a) => Fillet::Alpha(a),
+            FilletSpec::Beta(b) => Fillet::Beta(b),
+        }
+    }
 }
 
 /// Explains what a number alone lacks.
