@@ -203,7 +203,12 @@ impl Cell {
     pub fn thickness(&self, part: Part, iso: f64, to_phase: &Mat3) -> Option<f64> {
         match part {
             Part::Sheet => thickness::wall(&|u, v, g| self.gradients(u, v, g), iso, to_phase),
-            _ => thickness::neck(&self.series, part, iso, self.necks(part), to_phase),
+            _ => {
+                let neck = thickness::neck(&self.series, part, iso, self.necks(part), to_phase)?;
+                // The saddle of f need not be where a strut is narrowest: in the gyroid it is widest there.
+                let ball = if neck > 0.0 && self.resolves_pores() { self.pore(part, iso, to_phase) } else { 0.0 };
+                Some(if ball > 0.0 { neck.min(ball) } else { neck })
+            }
         }
     }
 

@@ -95,7 +95,8 @@ impl Lattice {
     pub fn folding(&self) -> Option<f64> {
         let d = self.distance.as_ref()?;
         let back = inverse(&self.map.typical());
-        let pressed = |j: &Mat3| spectral_norm(&product(j, &back));
+        // From millimetres to those of the unturned typical cell.
+        let pressed = |j: &Mat3| spectral_norm(&product(&back, j));
         let most = match self.map.affine() {
             Some(_) => 1.0,
             None => self.map.extremes().iter().map(pressed).fold(0.0, f64::max),

@@ -2,7 +2,8 @@
 
 use core::f64::consts::{FRAC_PI_4, PI, TAU};
 
-use geometry::math::{Mat3, norm, product, rotation, scale};
+use geometry::math::{Mat3, Vec3, add, dot, norm, product, rotation, scale, sub, unit};
+use geometry::random::random;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, Term, catalogue, named};
 use trabecula::design::{Built, Design, DesignError, NoFiles};
@@ -117,6 +118,68 @@ fn the_primitives_pore_is_its_neck() {
         assert!(
             (found - neck).abs() < 1e-8 * neck.max(diagonal) && found <= diagonal + 1e-9 && found > 0.98 * diagonal,
             "{t}: {found} {neck}"
+        );
+    }
+}
+
+/// The strut of the gyroid's network from (−1, −1, −1)/8 to (1, −3, −1)/8 is widest half-way, at the saddle of f, and its neck is the least
+/// over its cross-sections of the largest ball in one: by points of the surface, which leave a ball at most a thousandth too large.
+#[test]
+fn struts_are_measured_where_they_are_narrowest() {
+    let gyroid = cell("gyroid");
+    for fraction in [0.35, 0.484] {
+        let iso = gyroid.level(Part::Lower, fraction);
+        let (from, along) = ([-0.125; 3], [0.25, -0.25, 0.0]);
+        let [e1, e2] = [unit([1.0, 1.0, 0.0]), [0.0, 0.0, 1.0]];
+        let mut state = 7;
+        let mut u: Vec<Vec3> =
+            (0..150_000).map(|_| add(from, [0, 1, 2].map(|k| 0.5 * along[k] + 0.3 * random(&mut state)))).collect();
+        let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
+        for _ in 0..6 {
+            gyroid.gradients(&u, &mut v, &mut g);
+            for ((u, v), g) in u.iter_mut().zip(&v).zip(&g) {
+                *u = add(*u, scale(*g, (iso - v) / dot(*g, *g).max(0.1)));
+            }
+        }
+        gyroid.gradients(&u, &mut v, &mut g);
+        u = u.into_iter().zip(v).filter(|(_, v)| (v - iso).abs() < 1e-9).map(|(u, _)| u).collect();
+        // The largest ball about a point of the cross-section, by ever smaller moves.
+        let ball = |share: f64| {
+            let centre = add(from, scale(along, share));
+            let near: Vec<Vec3> = u.iter().copied().filter(|p| norm(sub(*p, centre)) < 0.35).collect();
+            let radius = |a: f64, b: f64| {
+                let x = add(centre, add(scale(e1, a), scale(e2, b)));
+                near.iter().map(|p| norm(sub(*p, x))).fold(f64::INFINITY, f64::min)
+            };
+            let (mut at, mut step) = ([0.0; 2], 0.02);
+            while step > 1e-4 {
+                let moves = [
+                    [1.0, 0.0],
+                    [-1.0, 0.0],
+                    [0.0, 1.0],
+                    [0.0, -1.0],
+                    [1.0, 1.0],
+                    [-1.0, -1.0],
+                    [1.0, -1.0],
+                    [-1.0, 1.0],
+                ];
+                let next = moves.map(|d| [at[0] + step * d[0], at[1] + step * d[1]]);
+                match next.into_iter().find(|n| radius(n[0], n[1]) > radius(at[0], at[1])) {
+                    Some(better) => at = better,
+                    None => step *= 0.5,
+                }
+            }
+            2.0 * radius(at[0], at[1])
+        };
+        let least = (4..=10).map(|i| ball(0.05 * f64::from(i))).fold(f64::INFINITY, f64::min);
+        let middle = ball(0.5);
+        let found = gyroid.thickness(Part::Lower, iso, &cubic(1.0)).expect("a neck");
+        println!("{fraction}: {found} {least} half-way {middle}");
+        assert!(middle > 1.03 * least && (found / least - 1.0).abs() < 3e-3, "{fraction}: {found} {least} {middle}");
+        let (turned, other) = (gyroid.pore(Part::Lower, iso, &cubic(1.0)), cell("gyroid_mirrored"));
+        assert!(
+            (found - turned).abs() < 1e-9
+                && (other.thickness(Part::Lower, iso, &cubic(1.0)).expect("a neck") - found).abs() < 1e-6
         );
     }
 }

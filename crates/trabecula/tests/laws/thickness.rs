@@ -8,6 +8,7 @@ use geometry::math::{Aabb, Mat3, Vec3, add, apply, dot, norm, scale, sub, transp
 use geometry::progress::Silent;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
+use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Grade, Linear};
@@ -158,6 +159,24 @@ fn walls_of_stretched_and_turned_lattices_are_as_thick_as_asked() {
                 within(&format!("{name} {wavelength:?} {rotate:?} {w:.3} mm"), found);
             }
         }
+    }
+}
+
+/// Cells of unequal edges have the same folding limit however they are turned, by a solved map too.
+#[test]
+fn folding_does_not_depend_on_how_cells_are_turned() {
+    let limit = |map: &str| {
+        let text = format!(
+            "schema = 1\nregion.sphere.radius = 5\n[lattice.core]\ncell = \"primitive\"\npart = \"sheet\"\nlevel.thickness = 0.3\n[lattice.core.map.{map}\nwavelength = [4.27, 3.54, 3.08]\n"
+        );
+        let built = Design::from_toml(&text).and_then(|d| d.build(&NoFiles)).unwrap_or_else(|e| panic!("{map}: {e}"));
+        built.report().lattices["core"].folding.expect("a limit")
+    };
+    let straight = limit("affine]");
+    for turn in ["[0, 0, 0]", "[20, 30, 40]", "[45, 0, 0]"] {
+        let found = limit(&format!("phase]\nrotate = {turn}"));
+        // The solved phases are those of the affine map to the tolerance of the solver, 1e-6 of a turn a step.
+        assert!((found / straight - 1.0).abs() < 1e-4, "{turn}: {found} {straight}");
     }
 }
 
