@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .solid import Solid
-
     Progress = Callable[[int, int], Any]
 
 __all__ = ["Carrier"]
@@ -39,10 +37,6 @@ class Carrier(VolumeMesh):
     """
 
     _make = staticmethod(_core.VolumeMesh.carrier)
-
-    def __init__(self, solid: Solid, plan: dict[str, Any], **how: Any):
-        super().__init__(solid, plan, **how)
-        self._found: dict[tuple[float, int], list[tuple[list[float], list[float]]]] = {}
 
     def __repr__(self) -> str:
         return super().__repr__().replace("VolumeMesh", "Carrier")
@@ -137,6 +131,10 @@ class Carrier(VolumeMesh):
             return found | {"stiffness": self.stiffness(nu, threads=threads).reshape(-1, 36)}
         constants = np.array([cubic for cubic, _ in self._of_domains(nu, 32, threads, progress)])[self.domain]
         return found | dict(zip(("C11", "C12", "C44"), constants.T, strict=True))
+
+    @cached_property
+    def _found(self) -> dict[tuple[float, int], list[tuple[list[float], list[float]]]]:
+        return {}
 
     def _of_domains(
         self, nu: float, n: int, threads: int | None, progress: Progress | None

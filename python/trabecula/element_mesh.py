@@ -25,7 +25,11 @@ class ElementMesh(ABC):
 
     #: What the elements are for other packages, by the number of their nodes.
     _kinds: Mapping[int, tuple[str, int]] = VOLUMES
-    nodes: NDArray[np.float64]
+
+    @property
+    @abstractmethod
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes (n, 3), mm."""
 
     def to_meshio(self) -> meshio.Mesh:
         """The mesh as a ``meshio.Mesh``: numbers of nodes and elements under the names that they have in .vtu, the named sets

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .resolution import Resolution
+
 __all__ = ["Quadors", "Slice"]
 
 
@@ -31,6 +33,7 @@ class Quadors(Reproducible):
 
     _make = staticmethod(_core.Solid.quadors)
     _core: _core.Quadors
+    _solid: Resolution
 
     def __len__(self) -> int:
         return self._core.hubs

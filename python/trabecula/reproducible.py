@@ -7,6 +7,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, ClassVar, TypeVar
 
+    from .resolution import Resolution
+
     Self = TypeVar("Self", bound="Reproducible")
 
 __all__ = ["Reproducible"]
@@ -19,8 +21,9 @@ class Reproducible:
 
     #: What makes it, of the core's part of the solid and the plan.
     _make: ClassVar[Callable[..., Any]]
+    _core: Any
 
-    def __init__(self, solid: Any, plan: dict[str, Any], **how: Any):
+    def __init__(self, solid: Resolution | Reproducible, plan: dict[str, Any], **how: Any):
         self._solid, self._plan = solid, plan
         self._core = self._make(solid._core, **plan, **how)
 

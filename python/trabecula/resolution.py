@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 from .errors import warn_caller
 
@@ -28,17 +29,39 @@ def sample_error(share: float) -> float:
     return 0.05 * share + 0.005
 
 
-class Resolution:
+class Resolution(ABC):
     """Solids that say which grids are too coarse for them."""
 
     _core: _core.Solid
-    _coarser: tuple[float, float, float] | None
-    _thinnest: dict[str, float]
-    skin: float | None
-    wavelength: float
-    bounds: list[list[float]]
+    _folder: str
 
     report: Callable[[], DesignReport]
+    spacing: Callable[..., float]
+
+    @property
+    @abstractmethod
+    def skin(self) -> float | None:
+        """The least thickness of the skin, mm."""
+
+    @property
+    @abstractmethod
+    def wavelength(self) -> float:
+        """The smallest wavelength, mm."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> list[list[float]]:
+        """Lower and upper corner of the region's bounds, mm."""
+
+    @property
+    @abstractmethod
+    def _thinnest(self) -> dict[str, float]:
+        """The thinnest wall or neck of each lattice or graph of beams, mm, by its path."""
+
+    @property
+    @abstractmethod
+    def _coarser(self) -> tuple[float, float, float] | None:
+        """The spacing that is used, where it is not the one that the walls need; that one; its triangles."""
 
     def _warn_coarser(self, edge: float | None, per_cell: float | None) -> None:
         """Tells of a spacing that nobody asked for and that is coarser than the walls need."""

@@ -7,6 +7,7 @@ import os
 from .camera import towards
 from .drawn import Drawn, Picture
 from .given import check_keywords, parameters, positions
+from .resolution import Resolution
 from .shown import look
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -18,21 +19,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Unpack
 
-    from . import _core
     from .drawn import Look
     from .mesh import Mesh
-    from .reports import DesignReport
     from .viewer import View
 
 __all__ = ["Seen"]
 
 
-class Seen(Picture):
+class Seen(Picture, Resolution):
     """Solids that say what they are at points, and show it."""
 
-    _core: _core.Solid
-
-    report: Callable[[], DesignReport]
     mesh: Callable[..., Mesh]
 
     def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:

@@ -12,7 +12,7 @@ from .carrier import Carrier
 from .errors import warn_caller
 from .given import flag, number, poisson, positive, thread_count, whole
 from .machine import fits, rounded_down
-from .resolution import sample_error
+from .resolution import Resolution, sample_error
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -45,17 +45,8 @@ def _order(given: int, of: str = "tetrahedra") -> int:
     return int(given)
 
 
-class Simulated:
+class Simulated(Resolution):
     """Solids that are meshed for solvers, or whose cell is solved for."""
-
-    _core: _core.Solid
-    _folder: str
-    skin: float | None
-    wavelength: float
-    bounds: list[list[float]]
-    _thinnest: dict[str, float]
-
-    spacing: Callable[..., float]
 
     def volume_mesh(
         self,

@@ -21,7 +21,6 @@ from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
-from .resolution import Resolution
 from .seen import Seen
 from .simulated import Simulated
 from .thickness import Thickness
@@ -70,7 +69,7 @@ SPOOLED = 24
 SMOOTHED = 200
 
 
-class Solid(Seen, Simulated, Resolution):
+class Solid(Seen, Simulated):
     """A region and the lattice in it. Made by ``Design.build``.
 
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
@@ -163,10 +162,9 @@ class Solid(Seen, Simulated, Resolution):
 
         ``neck`` (mm) is the lattice's narrowest wall or neck unless given; a ValueError where that is not known.
         """
-        own = min(self._thinnest.values(), default=None)
-        if neck is None and own is None:
+        narrowest = min(self._thinnest.values(), default=None) if neck is None else positive("neck", neck)
+        if narrowest is None:
             raise ValueError("the lattice's narrowest neck is not known: give neck, mm")
-        narrowest = own if neck is None else positive("neck", neck)
         return self._core.dangling(narrowest, thread_count(threads), progress)
 
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -238,8 +236,8 @@ class Solid(Seen, Simulated, Resolution):
     def _thinnest(self) -> dict[str, float]:
         """The thinnest wall or neck of each lattice or graph of beams, mm, by its path, where there is one."""
         report = self.report()
-        kinds = {"lattice": report.lattices, "beams": report.beams}
-        all_ = {f"{kind}.{name}": it.thickness for kind, of in kinds.items() for name, it in of.items()}
+        all_ = {f"lattice.{name}": it.thickness for name, it in report.lattices.items()}
+        all_ |= {f"beams.{name}": it.thickness for name, it in report.beams.items()}
         ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
         return {name: t for name, t in ends.items() if t}
 
@@ -282,16 +280,16 @@ class Solid(Seen, Simulated, Resolution):
         if not smooth:
             chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None:
-            need, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
+            count, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
             # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
-            fits(2 * TRIANGLE * need, f"{need:.3g} triangles", edge=chord, power=1, word="chord")
+            fits(2 * TRIANGLE * count, f"{count:.3g} triangles", edge=chord, power=1, word="chord")
             core, error = self._core.mesh_beams(chord, thread_count(threads), progress)
             return Mesh(core, self._core.region, chord_error=error)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
         memory = 2 * need.memory + (SMOOTHED * need.triangles if smooth else 0)
-        fits(memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
+        fits(memory, f"{need.triangles:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, thread_count(threads), progress, islands)
@@ -390,7 +388,7 @@ class Solid(Seen, Simulated, Resolution):
         need = self._need(spacing)
         # Each part has its own copy of what it shares; measuring and writing take as much again.
         most = 2 * len(chosen) * need.memory
-        fits(most, f"{need['triangles']:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
+        fits(most, f"{need.triangles:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_coarser(edge, per_cell)
         self._warn_thin(spacing)
         made = self._core.parts(chosen, spacing, thread_count(threads), progress, islands == "error")
@@ -415,8 +413,9 @@ class Solid(Seen, Simulated, Resolution):
         need, held = self._core.expected_beams(chord)
         fits(2 * TRIANGLE * held, f"{held:.3g} triangles of hubs that differ", edge=chord, power=1, word="chord")
         fits(file_size("stl", need), f"{need:.3g} triangles", path, chord, 1, "chord")
-        if special(os.fsdecode(path)):
-            return self._core.stream_beams(path, chord, thread_count(threads))
+        name = os.fsdecode(path)
+        if special(name):
+            return self._core.stream_beams(name, chord, thread_count(threads))
         with whole_file(path) as temporary:
             return self._core.stream_beams(temporary, chord, thread_count(threads))
 
@@ -579,6 +578,7 @@ class Solid(Seen, Simulated, Resolution):
 
     def _accept(self, made: SurfaceReport, words: str, spacing: float, accept: Callable[[SurfaceReport], Any]) -> None:
         """Warns of what may be wrong with a surface before its file gets its name."""
+        assert made.islands is not None  # on a grid they are looked for
         self._warn_coarse(made.volume + made.islands.dropped_volume, spacing, pieces=made.islands.found + 1)
         warn_islands(made.islands, words)
         accept(made)

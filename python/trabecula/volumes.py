@@ -7,6 +7,7 @@ import math
 import os
 import re
 import tempfile
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .record import Report
     from .reports import BeamMeshReport, ShellReport, VolumeReport, VoxelElementsReport
+    from .resolution import Resolution
 
     Progress = Callable[[int, int], Any]
 
@@ -70,13 +73,26 @@ class FiniteElements(Reproducible, ElementMesh):
     _writes: ClassVar[tuple[str, ...]]
     #: Those with fields.
     _with_fields: tuple[str, ...] = ("vtu", "xdmf")
-    elements: NDArray[np.uint32]
-    sets: Mapping[str, VolumeSet]
     _core: _core.VolumeMesh | _core.VoxelElements | _core.Shells | _core.BeamElements
+    _solid: Resolution
+
+    @property
+    @abstractmethod
+    def elements(self) -> NDArray[np.uint32]:
+        """Nodes of each element, in VTK's order."""
+
+    @property
+    @abstractmethod
+    def sets(self) -> Mapping[str, VolumeSet]:
+        """The named sets that are not empty."""
 
     @cached_property
     def _figures(self) -> Any:
         return self._core.report()
+
+    @abstractmethod
+    def report(self) -> Report:
+        """The figures."""
 
     @property
     def volume(self) -> float:
@@ -86,8 +102,8 @@ class FiniteElements(Reproducible, ElementMesh):
         return self._figures.volume
 
     def _named_sets(self) -> Mapping[str, VolumeSet]:
-        found = {name: VolumeSet(*map(fixed, self._core.set(name))) for name in self._core.sets}  # type: ignore[arg-type]
-        return MappingProxyType(found)
+        found = {name: self._core.set(name) for name in self._core.sets}
+        return MappingProxyType({name: VolumeSet(*map(fixed, arrays)) for name, arrays in found.items() if arrays})
 
     def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
@@ -154,7 +170,7 @@ class FiniteElements(Reproducible, ElementMesh):
         if kind == "xdmf":
             from .xdmf import write
 
-            return write(os.fsdecode(path), self, self._of_elements(), further)  # type: ignore[arg-type]
+            return write(os.fsdecode(path), self, further)
         count = self._figures.nodes
         arrays = [(name, v[0].size, len(v) == count, v.ravel().tolist()) for name, v in further.items()]
         moduli = self._materials(kind, E, nu)
@@ -209,7 +225,7 @@ class FiniteElements(Reproducible, ElementMesh):
 class VolumeMesh(FiniteElements):
     """Tetrahedra that conform to a solid's surfaces, edges and corners. Made by ``Solid.volume_mesh``."""
 
-    _make = staticmethod(_core.VolumeMesh.make)
+    _make: ClassVar[Callable[..., _core.VolumeMesh]] = staticmethod(_core.VolumeMesh.make)
     _with_fields = ("vtu", "xdmf", "msh")
     _core: _core.VolumeMesh
 

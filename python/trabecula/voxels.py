@@ -30,7 +30,7 @@ def fits_file(path: str | os.PathLike[str], count: int, step: float) -> None:
     fits(1000.0 + count, f"{count:.3g} voxels", path, step, 3, "step")
 
 
-def made_of(solid: _core.Solid, step: float, place: tuple[Sequence[float], float] | None = None, **how: Any) -> _core.Voxels:
+def made_of(solid: _core.Solid, step: float, place: tuple[list[float], float] | None = None, **how: Any) -> _core.Voxels:
     """The voxels of a solid, perhaps with another origin and step."""
     made = solid.voxels(step, **how)
     return made if place is None else made.placed(*place)
@@ -81,7 +81,7 @@ class Voxels(Reproducible):
         middle = vector_of("center", center)
         return self._placed([(a - c) * by + c for a, c in zip(self.origin, middle, strict=True)], self.step * by)
 
-    def _placed(self, origin: Sequence[float], step: float) -> Voxels:
+    def _placed(self, origin: list[float], step: float) -> Voxels:
         return self._like(self._core.placed(origin, step), place=(origin, step))
 
     @property

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from .volumes import VolumeMesh, VoxelElements
+    from .volumes import FiniteElements
 
 __all__ = ["write"]
 
@@ -24,11 +24,11 @@ NUMBERS = {"f": "Float", "u": "UInt"}
 ATTRIBUTES = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 
 
-def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray], fields: dict[str, NDArray]) -> None:
+def write(path: str, mesh: FiniteElements, fields: dict[str, NDArray]) -> None:
     """Writes ``path`` and, with the arrays, a file of the same name that ends in .h5.
 
-    ``cells`` are numbers of the elements, ``fields`` further numbers at nodes or in elements; each set is a field of nodes and
-    one of elements, 1 in it and 0 elsewhere.
+    ``fields`` are further numbers at nodes or in elements; each set is a field of nodes and one of elements, 1 in it and 0
+    elsewhere.
     """
     try:
         import h5py
@@ -38,7 +38,7 @@ def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray]
 
     heavy = os.path.splitext(path)[0] + ".h5"
     nodes, elements = mesh.nodes, mesh.elements
-    attributes = [(name, "Cell", values) for name, values in cells.items()]
+    attributes = [(name, "Cell", values) for name, values in mesh._of_elements().items()]
     for name, of in mesh.sets.items():
         for center, count, members in (("Node", len(nodes), of.nodes), ("Cell", len(elements), of.elements)):
             flags = np.zeros(count, dtype=np.uint8)
@@ -46,10 +46,10 @@ def write(path: str, mesh: VolumeMesh | VoxelElements, cells: dict[str, NDArray]
             attributes.append((name, center, flags))
     attributes += [(name, "Node" if len(v) == len(nodes) else "Cell", v) for name, v in fields.items()]
     lines = ['<Xdmf Version="3.0"><Domain><Grid Name="mesh" GridType="Uniform">']
-    if "domain" in cells:
+    if names := mesh._names_of_domains():
         # As meshio has names of numbers.
-        named = "".join(f'<map key="{name}" dim="3">{number}</map>' for number, name in enumerate(mesh.domains))
-        lines.append(f'<Information Name="domains" Value="{len(mesh.domains)}"><![CDATA[<main>{named}</main>]]></Information>')
+        named = "".join(f'<map key="{name}" dim="3">{number}</map>' for number, name in enumerate(names))
+        lines.append(f'<Information Name="domains" Value="{len(names)}"><![CDATA[<main>{named}</main>]]></Information>')
     with whole_file(heavy) as temporary, h5py.File(temporary, "w") as store:
 
         def item(name: str, values: np.ndarray) -> str:
