@@ -141,6 +141,7 @@ class Design:
     def build(self, folder: str | PathLike[str]) -> Solid: ...
 
 Section = tuple[float, float, float, list[NDArray[np.float64]], float]
+Raster = tuple[float, list[int], list[float]]
 
 class Layers:
     @property
@@ -167,7 +168,7 @@ class LayerRanges:
         suffix: str,
         title: str,
         binary: bool = False,
-        pixel: tuple[float, list[int], list[float]] | None = None,
+        pixel: Raster | None = None,
         exposure: list[float] = ...,
     ) -> LayerRanges: ...
     def save(self, path: str, threads: int | None = None, progress: Progress | None = None) -> LayersReport: ...
@@ -515,6 +516,13 @@ class Voxels:
     def placed(self, origin: list[float], step: float) -> Voxels: ...
     def write(self, path: str | PathLike[str], extension: str) -> None: ...
 
+Eye = tuple[int, int, float, float, bool]
+Cut = tuple[tuple[tuple[float, float, float], float] | None, bool, bool]
+Tint = tuple[str, Sequence[float], tuple[float, float], Sequence[float] | None]
+Shares = tuple[str, Sequence[str], Sequence[float]]
+Lines = tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float]
+Inside = tuple[Sequence[float], Sequence[Sequence[float]], Sequence[int], Sequence[float]]
+
 class Mesh:
     @staticmethod
     def read(bytes: bytes, extension: str, object: str | None = None) -> Mesh: ...
@@ -560,24 +568,24 @@ class Mesh:
     def write(self, path: str | PathLike[str], extension: str, title: str) -> None: ...
     def png(
         self,
-        seen: tuple[int, int, float, float, bool],
-        cut: tuple[tuple[tuple[float, float, float], float] | None, bool, bool],
+        seen: Eye,
+        cut: Cut,
         solid: Solid | None = None,
-        tint: tuple[str, Sequence[float], tuple[float, float], Sequence[float] | None] | None = None,
-        shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
-        lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
-        inside: tuple[Sequence[float], Sequence[Sequence[float]], Sequence[int], Sequence[float]] | None = None,
+        tint: Tint | None = None,
+        shares: Shares | None = None,
+        lines: Lines | None = None,
+        inside: Inside | None = None,
         background: str = "shaded",
         dpi: float | None = None,
     ) -> tuple[bytes, bool]: ...
     def svg(
         self,
-        seen: tuple[int, int, float, float, bool],
-        cut: tuple[tuple[tuple[float, float, float], float] | None, bool, bool],
+        seen: Eye,
+        cut: Cut,
         page: tuple[Sequence[float], str, float | None],
         solid: Solid | None = None,
-        tint: tuple[str, Sequence[float], tuple[float, float], Sequence[float] | None] | None = None,
-        shares: tuple[str, Sequence[str], Sequence[float]] | None = None,
-        lines: tuple[str, Sequence[str], Sequence[tuple[int, Sequence[Sequence[float]]]], float] | None = None,
-        inside: tuple[Sequence[float], Sequence[Sequence[float]], Sequence[int], Sequence[float]] | None = None,
+        tint: Tint | None = None,
+        shares: Shares | None = None,
+        lines: Lines | None = None,
+        inside: Inside | None = None,
     ) -> tuple[str, bool]: ...

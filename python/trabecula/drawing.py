@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .camera import NO_SCALE, VIEWS, section_plane, towards
-from .drawn import WALL
+from .drawn import WALL, pixels_of
 from .errors import Refused, WrongUsage
 from .files import check_place, kind_of, write_bytes
 from .formats import is_design
@@ -123,6 +123,6 @@ def turning(made: Mesh, args, pixels: tuple[float, float], angles: tuple[float, 
     with Progress("drawing", args.progress) as progress:
         for i in range(args.turn):
             azimuth = angles[0] + 360 * i / args.turn
-            frames.append(made.png(pixels, azimuth, angles[1], section=args.section, **shown))
+            frames.append(made.png(pixels_of(pixels), azimuth, angles[1], section=args.section, **shown))
             progress(i + 1, args.turn)
     write_bytes(args.output, animated(frames, args.seconds or 6.0))

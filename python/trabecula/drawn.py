@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
 
     from . import _core
+    from ._core import Cut, Eye, Inside, Lines, Shares, Tint
     from .mesh import Mesh
-    from .solid import Solid
+    from .seen import Seen
     from .viewer import View
 
     #: Numbers, or shares by name, at points (n, 3) in mm.
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
     #: A plane by its unit normal and offset.
     Plane = tuple[tuple[float, float, float], float]
 
-    class Look(TypedDict, total=False):
-        """How a picture looks: the keywords of ``Mesh.png``."""
+    class Style(TypedDict, total=False):
+        """How pictures and drawings look: the keywords that ``Mesh.png`` and ``Mesh.svg`` have in common."""
 
         color: ArrayLike | At | str | None
         label: str
@@ -42,14 +44,18 @@ if TYPE_CHECKING:
         lines: Mapping[str, Iterable[ArrayLike]] | None
         width: float | None
         section: str | None
-        background: str
         dpi: float | None
         projection: str
         scale_bar: bool
         axes: bool
-        solid: Solid | None
+        solid: Seen | None
         inside: At | None
         up: Sequence[float]
+
+    class Look(Style, total=False):
+        """How a picture looks: the keywords of ``Mesh.png``."""
+
+        background: str
 
 
 __all__ = ["NO_VALUE", "OVERHANG", "WALL", "Drawn", "Picture", "numbers", "scale_of", "scale_over"]
@@ -74,15 +80,27 @@ class Picture:
         return self._png
 
 
-class Drawn(Picture):
+class Drawn(Picture, ABC):
     """Meshes as they are drawn."""
 
     _core: _core.Mesh
 
-    counts: tuple[int, int]
-    bounds: list[list[float]]
-    vertices: NDArray[np.float64]
     thickness_at_vertices: Callable[[], NDArray[np.float64]]
+
+    @property
+    @abstractmethod
+    def counts(self) -> tuple[int, int]:
+        """Numbers of vertices and triangles."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> list[list[float]]:
+        """Lower and upper corner, mm."""
+
+    @property
+    @abstractmethod
+    def vertices(self) -> NDArray[np.float64]:
+        """Vertex positions, (n, 3), mm."""
 
     @named
     def png(
@@ -102,7 +120,7 @@ class Drawn(Picture):
         projection: str = "perspective",
         scale_bar: bool = False,
         axes: bool = False,
-        solid: Solid | None = None,
+        solid: Seen | None = None,
         inside: At | None = None,
         up: Sequence[float] = (0, 0, 1),
     ) -> bytes:
@@ -129,7 +147,7 @@ class Drawn(Picture):
         seen, cut = self._camera(size, azimuth, elevation, section, projection, scale_bar, axes)
         inch = None if dpi is None else positive("dpi", dpi)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
-        made, fits_foot = self._core.png(seen, cut, solid and solid._core, *colours, background, inch)
+        made, fits_foot = self._core.png(seen, cut, None if solid is None else solid._core, *colours, background, inch)
         if not fits_foot:
             _warn_small(seen, "legend, scale bar or axes" if scale_bar or axes else "its legend")
         return made
@@ -145,7 +163,7 @@ class Drawn(Picture):
         projection: str = "perspective",
         scale_bar: bool = False,
         axes: bool = False,
-        solid: Solid | None = None,
+        solid: Seen | None = None,
         color: ArrayLike | At | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,
@@ -170,7 +188,8 @@ class Drawn(Picture):
         seen, cut = self._camera(pixels, azimuth, elevation, section, projection, scale_bar, axes)
         colours = self._colours(cut[0], color, label, span, shares, lines, width, inside, up)
         stroke = None if line_width is None else positive("line_width", line_width)
-        made, fits_foot = self._core.svg(seen, cut, (*_paper((wide, high), dpi), stroke), solid and solid._core, *colours)
+        page, of_solid = (*_paper((wide, high), dpi), stroke), None if solid is None else solid._core
+        made, fits_foot = self._core.svg(seen, cut, page, of_solid, *colours)
         if not fits_foot:
             _warn_small(seen, "legend, scale bar or axes")
         return made
@@ -183,7 +202,7 @@ class Drawn(Picture):
         elevation: float = 25,
         background: str = "shaded",
         line_width: float | None = None,
-        **look: Unpack[Look],
+        **look: Unpack[Style],
     ) -> None:
         """Writes a picture to a .png file, see ``png``, whose keywords ``look`` are; or a line drawing to an .svg file, see
         ``svg``, without a background, its lines ``line_width`` wide.
@@ -196,7 +215,7 @@ class Drawn(Picture):
         elif line_width is not None:
             raise ValueError("line_width is for an .svg; a .png has no lines of its own")
         else:
-            made = self.png(size, azimuth, elevation, background=background, **look)
+            made = self.png(pixels_of(size), azimuth, elevation, background=background, **look)
         write_bytes(path, made)
 
     def view(self, values: ArrayLike | At | str | None = None, label: str = "", **look: Any) -> View:
@@ -218,9 +237,9 @@ class Drawn(Picture):
         projection: str,
         scale_bar: bool,
         axes: bool,
-    ) -> tuple[tuple, tuple]:
+    ) -> tuple[Eye, Cut]:
         """How a picture is seen, as pixels, angles and whether by parallel rays; the plane of its section, and its marks."""
-        wide, high = (whole("size", v, 1, 16384) for v in size)
+        wide, high = pixels_of(size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
         if not all(map(math.isfinite, angles)):
             raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
@@ -259,7 +278,7 @@ class Drawn(Picture):
         width: float | None,
         inside: At | None,
         up: Sequence[float],
-    ) -> tuple:
+    ) -> tuple[Tint | None, Shares | None, Lines | None, Inside | None]:
         """A scale, shares, named lines and the colours of a section, as the core takes them; None for what there is not."""
         import numpy as np
 
@@ -280,7 +299,7 @@ class Drawn(Picture):
         values = np.stack([numbers(f"inside[{name!r}]", found[name], many) for name in shares], axis=1)
         return tint, mixed, drawn, (*grid, values.ravel().tolist())
 
-    def _on(self, plane: Plane) -> tuple[NDArray[np.float64], tuple]:
+    def _on(self, plane: Plane) -> tuple[NDArray[np.float64], tuple[list[float], list[list[float]], list[int]]]:
         """Points of a grid in a plane across the bounds; the first point, the steps along and across rows, and the counts."""
         import numpy as np
 
@@ -299,9 +318,7 @@ class Drawn(Picture):
         places = np.clip((origin + rows * steps[1] + columns * steps[0]).reshape(-1, 3), low, high)
         return places, (origin.tolist(), steps.tolist(), counts)
 
-    def _tint(
-        self, color: ArrayLike | At | str, label: str, span: tuple[float, float] | None, up: Sequence[float]
-    ) -> tuple[str, list[float], tuple[float, float], list[float] | None]:
+    def _tint(self, color: ArrayLike | At | str, label: str, span: tuple[float, float] | None, up: Sequence[float]) -> Tint:
         import numpy as np
 
         direction, values = None, np.zeros(0)
@@ -325,7 +342,7 @@ class Drawn(Picture):
             raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
         return label, values.tolist(), scale_over(low, high), direction
 
-    def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> tuple:
+    def _shares(self, shares: Mapping[str, ArrayLike], label: str) -> Shares:
         import numpy as np
 
         if not shares:
@@ -334,7 +351,7 @@ class Drawn(Picture):
         values = np.stack([numbers(f"shares[{name!r}]", of, of_vertices) for name, of in shares.items()], axis=1)
         return label, list(shares), values.ravel().tolist()
 
-    def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> tuple:
+    def _lines(self, lines: Mapping[str, Iterable[ArrayLike]], label: str, width: float | None) -> Lines:
         import numpy as np
 
         found = []
@@ -348,6 +365,12 @@ class Drawn(Picture):
                 found.append((kind, points.tolist()))
         wide = math.dist(*self.bounds) / 100 if width is None else positive("width", width)
         return label, list(lines), found, wide / 2
+
+
+def pixels_of(size: tuple[float, float]) -> tuple[int, int]:
+    """The width and height of a picture, whole numbers."""
+    wide, high = (whole("size", v, 1, 16384) for v in size)
+    return wide, high
 
 
 def numbers(what: str, given: ArrayLike, many: tuple[int, str]) -> NDArray[np.float64]:
@@ -387,6 +410,6 @@ def _paper(pixels: tuple[float, float], dpi: float | None) -> tuple[list[float],
     return [wide, max(high, 0.01)], "mm"
 
 
-def _warn_small(seen: tuple, what: str) -> None:
+def _warn_small(seen: Eye, what: str) -> None:
     words = f"a picture of {seen[0]} × {seen[1]} pixels is too small for {what}: none is drawn"
     warn_caller(words)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .mesh import Mesh
-    from .solid import Solid
+    from .seen import Seen
 
     #: Of a mesh of the solid and the direction to the eye: the arguments of ``Mesh.png`` that show it.
     Look = Callable[[Mesh, tuple[float, float, float]], dict[str, Any]]
@@ -38,15 +38,15 @@ def _number(at: Callable[[NDArray], NDArray], label: str) -> Look:
     return lambda *_: {"color": at, "label": label}
 
 
-def _error(key: str, label: str) -> Callable[[Solid], Look]:
-    def prepared(solid: Solid) -> Look:
+def _error(key: str, label: str) -> Callable[[Seen], Look]:
+    def prepared(solid: Seen) -> Look:
         name = solid._solved(None)
         return _number(lambda points: solid.map_error(points, name)[key], label)
 
     return prepared
 
 
-def _fraction(solid: Solid) -> Look:
+def _fraction(solid: Seen) -> Look:
     def at(points: NDArray) -> NDArray:
         return fields_at(solid, ["fraction"], points)["solid_fraction"]
 
@@ -55,7 +55,7 @@ def _fraction(solid: Solid) -> Look:
     return _number(at, "solid fraction of the cell")
 
 
-def _stiffness(solid: Solid, threads: int | None = None) -> Look:
+def _stiffness(solid: Seen, threads: int | None = None) -> Look:
     """Young's modulus by the law of the cell: of cubes, told by their fraction alone."""
     import numpy as np
 
@@ -73,8 +73,8 @@ def _stiffness(solid: Solid, threads: int | None = None) -> Look:
     low, high = np.broadcast_to(solid.report().lattices[name].fraction, 2)
     # Fractions a twentieth apart: between them the law is a monotone cubic. One alone has another close by.
     start, stop = (float(low), float(high)) if high > 1.01 * low else (0.99 * float(low), min(1.01 * float(high), 0.999))
-    count, how = 2 + int(20 * (stop - start)), {"n": VOXELS, "properties": ["stiffness"], "threads": threads}
-    found = law(given["cell"], given["part"], start, stop, count, **how)
+    count = 2 + int(20 * (stop - start))
+    found = law(given["cell"], given["part"], start, stop, count, VOXELS, properties=["stiffness"], threads=threads)
     found.at("E", start)  # a ValueError where it falls apart
     error = 100 * float(np.nanmax(found.columns["E_error"]))
     for fraction, (said, *_) in list(found.notes.items())[:1]:
@@ -90,7 +90,7 @@ def _stiffness(solid: Solid, threads: int | None = None) -> Look:
     return _number(at, f"E along the cell's axes over the solid's (error {error:.2g} %)")
 
 
-def _check_cubes(solid: Solid, name: str) -> None:
+def _check_cubes(solid: Seen, name: str) -> None:
     """Raises ValueError where cells are no cubes."""
     import numpy as np
 
@@ -105,20 +105,20 @@ def _check_cubes(solid: Solid, name: str) -> None:
         raise ValueError(f"stiffness is by the law of cubic cells; the cells of lattice.{name} are none: {found}")
 
 
-def _lattices_of(solid: Solid, what: str) -> list[str]:
+def _lattices_of(solid: Seen, what: str) -> list[str]:
     names = list(solid.report().lattices)
     if not names:
         raise ValueError(f"{what} is that of a lattice's cell; the design has no lattice")
     return names
 
 
-def _corner(solid: Solid) -> NDArray:
+def _corner(solid: Seen) -> NDArray:
     import numpy as np
 
     return np.array([solid.bounds[0]])
 
 
-def _lattices(solid: Solid) -> Look:
+def _lattices(solid: Seen) -> Look:
     solid.shares(_corner(solid))
     return lambda mesh, _: {
         "shares": solid.shares(mesh.vertices),
@@ -127,7 +127,7 @@ def _lattices(solid: Solid) -> Look:
     }
 
 
-def _singularities(solid: Solid) -> Look:
+def _singularities(solid: Seen) -> Look:
     solid._solved(None)
     found = [line for it in solid.report().lattices.values() for line in it.singular or []]
     turns = sorted({line.turn for line in found})
@@ -138,7 +138,7 @@ def _singularities(solid: Solid) -> Look:
     return lambda *_: {"lines": lines, "label": caption, "width": STRONG * _diagonal(solid)}
 
 
-def _axes(solid: Solid) -> Look:
+def _axes(solid: Seen) -> Look:
     import numpy as np
 
     name = solid._solved(None)
@@ -154,14 +154,14 @@ def _axes(solid: Solid) -> Look:
     return drawn
 
 
-def _trajectories(solid: Solid) -> Look:
+def _trajectories(solid: Seen) -> Look:
     import numpy as np
 
-    name, region = solid._solved(None), solid._core.region
+    name, region, (low, high) = solid._solved(None), solid._core.region, solid.bounds
 
     def axes(points: NDArray) -> NDArray:
         # Steps and differences may reach a little beyond the bounds, where there is no map.
-        asked = solid.map_asked(np.clip(points, *solid.bounds), name)
+        asked = solid.map_asked(np.clip(points, low, high), name)
         return asked / np.linalg.norm(asked, axis=2, keepdims=True)
 
     def drawn(_: Mesh, eye: tuple[float, float, float]) -> dict[str, Any]:
@@ -173,11 +173,15 @@ def _trajectories(solid: Solid) -> Look:
     return drawn
 
 
+def _of_mesh(drawn: dict[str, Any]) -> Callable[[Seen], Look]:
+    return lambda _: lambda *_: drawn
+
+
 #: What a mesh shows without its design.
 OF_MESH: dict[str, dict[str, Any]] = {"thickness": {"color": "thickness"}, "overhang": {"color": "overhang"}}
 
 #: What can be shown: of a solid (a ValueError where it has none) the look of its meshes.
-SHOWN: dict[str, Callable[[Solid], Look]] = {
+SHOWN: dict[str, Callable[[Seen], Look]] = {
     "fraction": _fraction,
     "stiffness": _stiffness,
     "angle": _error("angle", "angle off, degrees"),
@@ -187,11 +191,11 @@ SHOWN: dict[str, Callable[[Solid], Look]] = {
     "trajectories": _trajectories,
     "singularities": _singularities,
     "lattice": _lattices,
-    **{name: lambda _, drawn=drawn: lambda *_: drawn for name, drawn in OF_MESH.items()},
+    **{name: _of_mesh(drawn) for name, drawn in OF_MESH.items()},
 }
 
 
-def look(solid: Solid, show: str, threads: int | None = None) -> Look:
+def look(solid: Seen, show: str, threads: int | None = None) -> Look:
     """The look of meshes of a solid that shows ``show``, found by ``threads``; a ValueError where the solid has none, or
     there is no such thing.
     """
@@ -200,11 +204,11 @@ def look(solid: Solid, show: str, threads: int | None = None) -> Look:
     return _stiffness(solid, threads) if show == "stiffness" else SHOWN[show](solid)
 
 
-def _diagonal(solid: Solid) -> float:
+def _diagonal(solid: Seen) -> float:
     return math.dist(*solid.bounds)
 
 
-def _seen(solid: Solid, eye: tuple[float, float, float], step: float) -> NDArray:
+def _seen(solid: Seen, eye: tuple[float, float, float], step: float) -> NDArray:
     """Places on the region's surface that the eye sees, ``step`` (mm) apart in the picture, by sphere tracing."""
     import numpy as np
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from .mesh import Mesh
     from .seen import Seen
-    from .solid import Solid
     from .widget import Widget
 
     Progress = Callable[[int, int], Any]
@@ -60,7 +59,7 @@ THICKNESS = "thickness"
 
 
 def view(
-    shape: Mesh | Solid,
+    shape: Mesh | Seen,
     values: ArrayLike | At | str | None = None,
     label: str = "",
     edge: float | None = None,
@@ -158,14 +157,14 @@ class View:
     ):
         self.mesh = mesh
         self._computed = isinstance(values, str)
-        if self._computed and values != THICKNESS:
+        if isinstance(values, str) and values != THICKNESS:
             words = f'numbers, one for each vertex, a function of points, or "{THICKNESS}"'
             raise ValueError(f'values is "{values}"; it must be {words}')
         self.label = label or (WALL if self._computed else "")
         self._at: At | None = values if callable(values) else None
-        known = values is None or self._computed or self._at is not None
-        self._values = None if known else numbers("values", values, (mesh.counts[0], "vertex"))
-        if self._values is not None:
+        self._values: NDArray[np.float64] | None = None
+        if not (values is None or isinstance(values, str) or callable(values)):
+            self._values = numbers("values", values, (mesh.counts[0], "vertex"))
             scale_of("values", self._values)
         self._solid: Seen | None = None
         self._progress = progress
