@@ -18,15 +18,26 @@ from .reproducible import Reproducible
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any, overload
+    from typing import Any, NoReturn, TypedDict, overload
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from ._core import Raster
     from .reports import LayersReport
     from .solid import Solid
 
     Progress = Callable[[int, int], Any]
+
+    class LayerFile(TypedDict):
+        """What a file of layers is: the arguments of ``_core.LayerRanges.of``."""
+
+        suffix: str
+        title: str
+        binary: bool
+        pixel: Raster | None
+        exposure: list[float]
+
 
 __all__ = ["Layer", "Layers"]
 
@@ -73,6 +84,8 @@ class Layers(Reproducible, Sequence["Layer"]):
     """The layers of a solid, made when they are asked for. Made by ``Solid.layers``."""
 
     _make = staticmethod(_core.Layers.of)
+    _core: _core.Layers
+    _solid: Solid
 
     def __init__(self, solid: Solid, plan: dict[str, Any], threads: int | None = None):
         super().__init__(solid, plan)
@@ -163,7 +176,7 @@ class Layers(Reproducible, Sequence["Layer"]):
         title = os.path.splitext(os.path.basename(os.fsdecode(path)))[0]
         if raster:
             self._check_room(kind, path, raster[1], raster[0])
-        file = {"suffix": kind, "title": title, "binary": binary, "pixel": raster, "exposure": times}
+        file: LayerFile = {"suffix": kind, "title": title, "binary": binary, "pixel": raster, "exposure": times}
         if resume or cluster or new:
             from . import ranges
 
@@ -171,7 +184,7 @@ class Layers(Reproducible, Sequence["Layer"]):
         with whole_file(path) as temporary:
             return _core.LayerRanges.of(self._core, **file).save(temporary, self._threads, progress)
 
-    def _raster(self, kind: str, pixel: float | None, size: tuple[int, int] | None) -> tuple:
+    def _raster(self, kind: str, pixel: float | None, size: tuple[int, int] | None) -> Raster:
         """Edge of a pixel, numbers of pixels and the lower left corner of pictures."""
         if pixel is None:
             raise ValueError(f"a .{kind} holds pictures: give pixel, the edge of a pixel in mm")
@@ -179,20 +192,18 @@ class Layers(Reproducible, Sequence["Layer"]):
         low, high = self._solid.bounds
         extents = [high[a] - low[a] for a in (0, 1)]
         needed = [max(1, math.ceil(e / edge - 1e-9)) for e in extents]
-        if size is None:
-            size = (needed[0], needed[1])
-        elif len(size) != 2:
+        if size is not None and len(size) != 2:
             raise ValueError(f"size is the width and height of a picture in pixels, found {len(size)} numbers")
-        size = tuple(whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in size)
-        if any(n < m for n, m in zip(size, needed, strict=True)):
+        pixels = [whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in size or needed]
+        if any(n < m for n, m in zip(pixels, needed, strict=True)):
             raise ValueError(
-                f"pictures of {size[0]} x {size[1]} pixels of {edge:g} mm are smaller than the part: it needs "
+                f"pictures of {pixels[0]} x {pixels[1]} pixels of {edge:g} mm are smaller than the part: it needs "
                 f"{needed[0]} x {needed[1]}; use a larger pixel, or turn or divide the part"
             )
-        origin = [low[a] - 0.5 * (size[a] * edge - extents[a]) for a in (0, 1)]
-        return edge, list(size), origin
+        origin = [low[a] - 0.5 * (pixels[a] * edge - extents[a]) for a in (0, 1)]
+        return edge, pixels, origin
 
-    def _check_room(self, kind: str, path, size: list[int], pixel: float) -> None:
+    def _check_room(self, kind: str, path: str | os.PathLike[str], size: list[int], pixel: float) -> None:
         """Refuses pictures that neither memory nor disk can hold."""
         count = size[0] * size[1]
         threads = self._threads or os.cpu_count() or 1
@@ -202,9 +213,9 @@ class Layers(Reproducible, Sequence["Layer"]):
             fits(float(count) * len(self), f"{len(self)} pictures of {size[0]} x {size[1]} pixels", path, pixel, 2, "pixel")
 
 
-def _too_many(count: int, edge: float) -> int:
+def _too_many(count: int, edge: float) -> NoReturn:
     raise ValueError(f"pixel {edge:g} mm makes {count:.3g} pixels along an edge; at most {MOST_PIXELS} are possible")
 
 
-def _layer(made: tuple) -> Layer:
+def _layer(made: _core.Section) -> Layer:
     return Layer(*made)

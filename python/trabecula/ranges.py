@@ -28,7 +28,7 @@ from .unfinished import Shards, Unfinished
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from .islands import Islands
-    from .layers import Layers
+    from .layers import LayerFile, Layers
     from .reports import IslandsReport, LayersReport, MeshReport, QualityReport, SurfaceReport
     from .solid import Solid
 
@@ -169,7 +169,7 @@ def save_voxels(
 def save_layers(
     layers: Layers,
     path: str,
-    file: dict[str, Any],
+    file: LayerFile,
     threads: int | None = None,
     progress: Progress | None = None,
     cluster: str | None = None,

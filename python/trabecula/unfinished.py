@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from itertools import accumulate
@@ -44,7 +44,7 @@ class Shards(NamedTuple):
     kind: str
     most: int
     #: What precedes and what follows the records, and what the manifest says of them.
-    frame: Callable[[int, int], tuple[bytes, bytes]]
+    frame: Callable[[int, int], Sequence[bytes]]
     of: Callable[[int, int], dict[str, Any]]
 
 
