@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Part", "read"]
 
-#: The arrays of a part that was read.
-KEYS = ("points", "triangles", "faces", "facts")
-
 #: Bytes of memory that reading takes at most: of the interpreter with OCP, and for each byte of the file.
 BASE, PER_BYTE = 6e9, 2000.0
 
@@ -94,7 +91,7 @@ def _read(
     size = about[0]
     seconds = 60 + 2e-5 * size if limit is None else limit
     given = json.dumps({"path": name, "chord": chord, "angle": angle, "solid": solid})
-    arrays = children.arrays("cad", KEYS, [given], shown, "OCP", BASE + PER_BYTE * size, seconds)
+    arrays = children.arrays("cad", [given], shown, "OCP", BASE + PER_BYTE * size, seconds)
     points, triangles, faces, facts = arrays
     said = json.loads(facts.tobytes().decode())
     return Part(points, triangles, faces, **said | {"labels": [tuple(label) for label in said["labels"]]})
@@ -143,7 +140,7 @@ def child(given: str, made: str, memory: str) -> None:
     except Exception as error:
         words = " ".join(str(error).split())[:200]
         sys.exit(f"OCP does not read it ({type(error).__name__}: {words}); is it damaged?")
-    np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+    np.savez(made, *arrays)
 
 
 def tessellated(path: str, chord: float | None, angle: float, solid: str | None) -> tuple[NDArray, ...]:

@@ -9,6 +9,10 @@ import sys
 import tempfile
 import threading
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 __all__ = ["arrays", "bound", "python", "run", "stop"]
 
@@ -51,8 +55,8 @@ def run(command: list[str], folder: str, limit: float) -> str | None:
         return f"failed: {lines[-1] if lines else f'exit status {status}'}"
 
 
-def arrays(module: str, keys: Sequence[str], given: Sequence[str], name: str, reader: str, memory: float, limit: float) -> list:
-    """The arrays ``keys`` that a module of this package makes of what is ``given``, as a child of at most ``limit`` seconds and
+def arrays(module: str, given: Sequence[str], name: str, reader: str, memory: float, limit: float) -> list[NDArray]:
+    """The arrays that a module of this package makes of what is ``given``, as a child of at most ``limit`` seconds and
     ``memory`` bytes: it is run with these texts, the file that it writes them to, and the bytes. Raises ValueError with one
     sentence on ``name``, the file that the package ``reader`` reads.
     """
@@ -65,7 +69,7 @@ def arrays(module: str, keys: Sequence[str], given: Sequence[str], name: str, re
             failed, words = outcome.startswith("failed: "), outcome.removeprefix("failed: ")
             raise ValueError(f"{name} cannot be read: {words if failed else f'{reader} {words}; is it damaged?'}")
         with np.load(made) as found:
-            return [found[key] for key in keys]
+            return [found[key] for key in found.files]
 
 
 def bound(memory: float) -> None:

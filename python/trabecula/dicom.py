@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["read"]
 
-#: The arrays of a series that was read.
-KEYS = ("shape", "origin", "step", "values")
-
 #: Bytes of memory that reading takes at most: of the interpreter with its packages, and for each byte of the files, which may
 #: be compressed.
 BASE, PER_BYTE = 2e9, 200.0
@@ -59,7 +56,7 @@ def read(path: str | os.PathLike[str], limit: float | None = None) -> tuple[list
         with open(names, "w", encoding="utf-8", errors="surrogateescape") as out:
             out.write("\0".join(files))
         memory = BASE + PER_BYTE * size
-        shape, origin, step, values = children.arrays("dicom", KEYS, [names], name, "pydicom", memory, seconds)
+        shape, origin, step, values = children.arrays("dicom", [names], name, "pydicom", memory, seconds)
     return shape.tolist(), origin.tolist(), step.tolist(), values
 
 
@@ -106,7 +103,7 @@ def child(names: str, made: str, memory: str) -> None:
         sys.exit(
             f"pydicom does not read it ({type(error).__name__}); is it damaged, or compressed in a way that needs a plug-in?"
         )
-    np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+    np.savez(made, *arrays)
 
 
 def series(files: list[str]) -> list[Picture]:
@@ -186,7 +183,7 @@ def grid(held: list[Picture]) -> tuple[NDArray, ...]:
     back = np.flatnonzero(along < 0)
     origin = held[0].position + (directions[back] * (steps * (counts - 1))[back, None]).sum(axis=0)
     order = np.argsort(axes)
-    values = np.flip(values, 2 - back).transpose(2 - order[::-1])
+    values = np.flip(values, tuple(2 - back)).transpose(2 - order[::-1])
     return counts[order], origin, steps[order], np.ascontiguousarray(values).reshape(-1)
 
 

@@ -52,9 +52,6 @@ HDF5 = ("med", "cgns")
 #: The number of a zone and one of its names.
 Named = tuple[int, str]
 
-#: The arrays of a file that was read.
-KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names", "sets")
-
 #: Bytes of memory that reading takes at most: of the interpreter with its packages, and for each byte of the file. A digit
 #: of a text may become a list's number of 32 bytes and its place in the list, twice over while lists grow.
 BASE, PER_BYTE = 3e9, 100.0
@@ -98,17 +95,18 @@ def read(
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     needed(kind)
     found = arrays_of(name, limit)
-    *arrays, named, names, _ = found
+    points, connectivity, ends, kinds, zones, named, names, _ = found
     if kept is not None:
         kept[:] = found
-    return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
+    return points, connectivity, ends, kinds, zones, list(zip(named.tolist(), names.tolist(), strict=True))
 
 
 @contextlib.contextmanager
 def keeping() -> Iterator[list[NDArray]]:
-    """A list in which are, once a file has been read within, the arrays ``KEYS`` that the core took the corners of."""
+    """A list in which are, once a file has been read within, the ``arrays_of`` it, of which the core took the corners."""
     global kept
-    kept = found = []
+    found: list[NDArray] = []
+    kept = found
     try:
         yield found
     finally:
@@ -116,11 +114,11 @@ def keeping() -> Iterator[list[NDArray]]:
 
 
 def arrays_of(path: str, limit: float | None = None) -> list[NDArray]:
-    """The arrays ``KEYS`` of a file that meshio reads, which is there."""
+    """What ``read`` gives of a file that is there, numbers and names of zones apart, and the sets as text."""
     name = os.path.abspath(path)
     size = os.path.getsize(name)
     seconds = 20 + 2e-6 * size if limit is None else limit
-    return children.arrays("elements", KEYS, [name], name, "meshio", BASE + PER_BYTE * size, seconds)
+    return children.arrays("elements", [name], name, "meshio", BASE + PER_BYTE * size, seconds)
 
 
 def child(name: str, made: str, memory: str) -> None:
@@ -148,7 +146,7 @@ def child(name: str, made: str, memory: str) -> None:
     except (Exception, SystemExit) as error:
         # What else goes wrong quotes the file, which may be another than was meant.
         sys.exit(f"meshio finds no mesh in it ({type(error).__name__}); is it damaged?")
-    np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+    np.savez(made, *arrays)
 
 
 def sets_of(mesh: meshio.Mesh, name: str, kind: str) -> dict[str, dict[str, int]]:
@@ -361,9 +359,9 @@ def write(
         return
     # HDF5 locks its files, and would not open one that is locked already.
     with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
-        own = os.path.join(folder, f"mesh.{kind}")
-        meshio.write(own, mesh, **more)
-        shutil.copyfile(own, path)
+        made = os.path.join(folder, f"mesh.{kind}")
+        meshio.write(made, mesh, **more)
+        shutil.copyfile(made, path)
 
 
 if __name__ == "__main__":

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+from functools import partial
 from typing import TYPE_CHECKING
 
 from .results import TENSOR, Array, Mesh, Unreadable, selected
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 __all__ = ["read"]
@@ -44,7 +47,7 @@ def read(name: str, wanted: str) -> Mesh:
     for block in range(1, sizes.get("num_el_blk", 0) + 1):
         cells = variables.get(f"connect{block}")
         kind = KINDS.get(str(getattr(cells, "elem_type", ""))[:3].upper())
-        if kind is not None:
+        if cells is not None and kind is not None:
             blocks.append((kind, cells[:].astype(np.int64) - 1))
             numbers.append(block)
     steps = list(range(1, sizes.get("time_step", 0) + 1))
@@ -59,6 +62,9 @@ def read(name: str, wanted: str) -> Mesh:
         missing = [np.full(len(cells), np.nan) for _, cells in blocks]
         return np.concatenate([m if v is None else v[step] for v, m in zip(found, missing, strict=True)])
 
+    def columns(numbers_of: Callable[[int, int], NDArray], places: list[int], step: int) -> NDArray:
+        return np.column_stack([numbers_of(place, step) for place in places])
+
     arrays = []
     for key, of_cells, numbers_of in (("name_nod_var", False, of_nodes), ("name_elem_var", True, of_elements)):
         names = [row.tobytes().decode("utf-8", "replace").strip("\0 ") for row in variables[key][:]] if key in variables else []
@@ -66,11 +72,7 @@ def read(name: str, wanted: str) -> Mesh:
             if not steps:
                 continue
             step, here = selected(wanted, title, steps)
-
-            def rows(places=places, step=step, numbers_of=numbers_of) -> NDArray:
-                return np.column_stack([numbers_of(place, step) for place in places])
-
-            arrays.append(Array(here, of_cells, len(places), rows))
+            arrays.append(Array(here, of_cells, len(places), partial(columns, numbers_of, places, step)))
     return Mesh(points, blocks, arrays)
 
 

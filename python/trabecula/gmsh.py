@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from typing import TYPE_CHECKING
 
 from .results import Array, Mesh, Unreadable, selected
@@ -10,7 +11,7 @@ from .results import Array, Mesh, Unreadable, selected
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
+    from numpy.typing import DTypeLike, NDArray
 
 __all__ = ["groups", "read"]
 
@@ -78,7 +79,7 @@ class Numbers:
         if not source.binary:
             self.text, self.place = np.array(source.data[source.at : end].split(), dtype=np.float64), 0
 
-    def take(self, count: int, kind: str) -> NDArray:
+    def take(self, count: int, kind: DTypeLike) -> NDArray:
         """The next numbers, of this type where they are binary."""
         import numpy as np
 
@@ -127,7 +128,8 @@ def read(name: str, wanted: str) -> Mesh:
 
     with open(name, "rb") as file:
         source = Source(file.read())
-    nodes, elements, found = None, [], {}
+    nodes, elements = None, []
+    found: dict[tuple[bool, str], list[tuple[int, int, NDArray, NDArray]]] = {}
     for section in sections(source):
         if section == "Nodes":
             nodes = (nodes_41 if source.new else nodes_22)(source)
@@ -145,8 +147,7 @@ def read(name: str, wanted: str) -> Mesh:
     for (of_cells, key), steps in found.items():
         chosen, title = selected(wanted, key, [step for step, *_ in steps])
         _, components, numbers, rows = steps[chosen]
-        placed = spread(cells if of_cells else tags, numbers, rows)
-        arrays.append(Array(title, of_cells, components, lambda placed=placed: placed))
+        arrays.append(Array(title, of_cells, components, partial(spread, cells if of_cells else tags, numbers, rows)))
     return Mesh(points, [(kind, places(tags, corners)) for kind, _, corners in volumes], arrays)
 
 
@@ -225,7 +226,8 @@ def elements_22(source: Source) -> list[tuple[int, NDArray, NDArray]]:
     import numpy as np
 
     count = int(source.line())
-    numbers, done, rows = source.section("Elements"), 0, {}
+    numbers, done = source.section("Elements"), 0
+    rows: dict[int, list[NDArray]] = {}
     while done < count:
         # In text each element is a block of one, which begins with its number.
         head = numbers.take(3, "i4")
@@ -258,12 +260,14 @@ def groups(name: str) -> dict[str, dict[str, int]]:
     """The physical groups of surfaces and volumes that have a name: how many faces and elements are in each."""
     with open(name, "rb") as file:
         source = Source(file.read())
-    names, physical, counts = {}, {}, Counter()
+    names: dict[tuple[int, int], str] = {}
+    physical: dict[tuple[int, int], set[int]] = {}
+    counts: Counter[tuple[int, int]] = Counter()
     for section in sections(source):
         if section == "PhysicalNames":
             for _ in range(int(source.line())):
-                dimension, tag, text = source.line().split(maxsplit=2)
-                names[int(dimension), int(tag)] = text.strip('"')
+                plane, group, text = source.line().split(maxsplit=2)
+                names[int(plane), int(group)] = text.strip('"')
         elif section == "Entities":
             physical = entities(source)
         elif section == "Elements" and source.new:
@@ -295,7 +299,8 @@ def entities(source: Source) -> dict[tuple[int, int], set[int]]:
 
 def members_22(source: Source) -> Counter[tuple[int, int]]:
     """How many elements each physical group has, by its dimension and number."""
-    count, counts, done = int(source.line()), Counter(), 0
+    count, done = int(source.line()), 0
+    counts: Counter[tuple[int, int]] = Counter()
     if source.binary:
         numbers = source.section("Elements")
         while done < count:

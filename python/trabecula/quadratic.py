@@ -35,11 +35,11 @@ def found_in(path: str, corners: int, arrays: list[NDArray]) -> Found | None:
 
     if not arrays:  # a .vtu, which the core reads
         with open(path, "rb") as file:
-            points = sum(map(int, re.findall(rb'NumberOfPoints="(\d+)"', file.read(4096))))
-        if points <= corners:
+            count = sum(map(int, re.findall(rb'NumberOfPoints="(\d+)"', file.read(4096))))
+        if count <= corners:
             return None
         if importlib.util.find_spec("meshio") is None:
-            return Found(points, None)
+            return Found(count, None)
         arrays = elements.arrays_of(path)
     points, connectivity, ends, kinds = arrays[:4]
     if not np.isin(kinds, (QUADRATIC, *OTHERS)).any():
@@ -49,10 +49,10 @@ def found_in(path: str, corners: int, arrays: list[NDArray]) -> Found | None:
         return Found(used, None)
     starts = ends - np.diff(ends, prepend=np.uint64(0))
     volume = 0.0
-    for kind, count in ((LINEAR, 4), (QUADRATIC, 10)):
+    for kind, each in ((LINEAR, 4), (QUADRATIC, 10)):
         of = starts[kinds == kind].astype(np.int64)
         for at in range(0, len(of), CHUNK):
-            nodes = points[connectivity[of[at : at + CHUNK, None] + np.arange(count)]]
+            nodes = points[connectivity[of[at : at + CHUNK, None] + np.arange(each)]]
             volume += float((linear(nodes) if kind == LINEAR else curved(nodes)).sum())
     return Found(used, abs(volume))
 

@@ -15,14 +15,12 @@ from .formats import RESULT_READS, dotted, kind_of
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["Unreadable", "read"]
 
 #: The package that reads each format, which is not needed otherwise; Gmsh's is read here.
 PACKAGES = {"med": "h5py", "rmed": "h5py", "e": "netCDF4", "exo": "netCDF4"}
-#: The arrays that the child writes.
-KEYS = ("points", "connectivity", "ends", "kinds", "names", "of_cells", "components", "chosen", "values")
 #: Places of a symmetric tensor's components in VTK's order, by the ends of their names.
 TENSOR = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yx": 3, "yz": 4, "zy": 4, "xz": 5, "zx": 5}
 
@@ -84,7 +82,7 @@ def read(path: str | os.PathLike[str], array: str, limit: float | None = None) -
     size = os.path.getsize(name)
     seconds = 20 + 2e-6 * size if limit is None else limit
     memory = BASE + PER_BYTE * size
-    found = children.arrays("results", KEYS, [name, array], name, package or "the reader", memory, seconds)
+    found = children.arrays("results", [name, array], name, package or "the reader", memory, seconds)
     *elements, names, of_cells, components, chosen, values = found
     listed = [(str(n), bool(c), int(k)) for n, c, k in zip(names, of_cells, components, strict=True)]
     return (*elements, listed, int(chosen) if chosen >= 0 else None, values)
@@ -110,7 +108,7 @@ def child(name: str, wanted: str, made: str, memory: str) -> None:
             sys.exit(without_contents(str(error)) or "no such format")
         # What else goes wrong quotes the file, which may be another than was meant.
         sys.exit(f"no result is found in it ({type(error).__name__}); is it damaged?")
-    np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+    np.savez(made, *arrays)
 
 
 def reader(kind: str) -> Callable[[str, str], Mesh]:
@@ -119,7 +117,7 @@ def reader(kind: str) -> Callable[[str, str], Mesh]:
     return by_meshio if own is None else importlib.import_module(f"trabecula.{own}").read
 
 
-def taken(mesh: Mesh, wanted: str) -> tuple:
+def taken(mesh: Mesh, wanted: str) -> tuple[ArrayLike, ...]:
     """What the child writes."""
     import numpy as np
 
@@ -132,10 +130,10 @@ def taken(mesh: Mesh, wanted: str) -> tuple:
         raise Unreadable("a cell names a point that is not there")
     kinds = np.concatenate([np.full(len(cells), kind, dtype=np.uint8) for kind, cells in mesh.blocks])
     chosen = next((i for i, array in enumerate(mesh.arrays) if array.name == wanted), -1)
-    values = np.zeros(0)
+    values: NDArray[np.float64] = np.zeros(0)
     if chosen >= 0:
         array = mesh.arrays[chosen]
-        values = np.array(array.rows(), dtype=np.float64).reshape(-1, array.components)
+        values = np.asarray(array.rows(), dtype=np.float64).reshape(-1, array.components)
         count, what = (len(ends), "volumes") if array.of_cells else (len(points), "points")
         if len(values) != count:
             raise Unreadable(f"the array has {len(values)} rows for {count} {what}")
