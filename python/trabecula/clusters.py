@@ -13,7 +13,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from typing import Any
@@ -155,7 +155,7 @@ def version() -> str:
     return _core.__version__
 
 
-def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Iterator[dict[str, Any]]:
+def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Generator[dict[str, Any]]:
     """The rows of numbered points of a sweep as they are done. Files that the design reads go by their content once to each
     worker.
 

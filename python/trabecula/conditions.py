@@ -14,7 +14,8 @@ COMPARISONS = {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, a
 COMPARISONS |= {ast.Eq: operator.eq, ast.NotEq: operator.ne}
 ARITHMETIC = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 ARITHMETIC |= {ast.Pow: math.pow, ast.Mod: operator.mod}
-FUNCTIONS = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "log": math.log, "exp": math.exp}
+FUNCTIONS: dict[str, Callable[..., float]] = {"min": min, "max": max, "abs": abs}
+FUNCTIONS |= {"sqrt": math.sqrt, "log": math.log, "exp": math.exp}
 WORDS = "numbers, names, + - * / ** %, comparisons, and, or, not, " + ", ".join(FUNCTIONS)
 
 

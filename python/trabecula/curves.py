@@ -9,6 +9,11 @@ from html import escape
 
 from .chart import FAINT, FONT, INK, label, ticks
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .given import Vector
+    from .laws import Law
+
 __all__ = ["Curve", "Panel", "law_plots", "panels"]
 
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 460, 320, 64, 112, 34, 44
@@ -25,11 +30,11 @@ class Curve:
 
     name: str
     #: Where it was found.
-    x: Sequence[float]
-    y: Sequence[float]
+    x: Vector
+    y: Vector
     #: Positions of a line, and the values there.
-    along: Sequence[float] = ()
-    values: Sequence[float] = ()
+    along: Vector = ()
+    values: Vector = ()
 
 
 @dataclass
@@ -120,7 +125,7 @@ def _decades(low: float, high: float) -> list[float]:
     return [float(f"{m:.12g}") for m in marks if below[-1] <= m <= above[0]]
 
 
-def law_plots(law) -> str:
+def law_plots(law: Law) -> str:
     """The plots of a law: each column with its interpolation, and powers of the fraction as lines of their own."""
     import numpy as np
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from . import _core
 from . import beams as unit_cells
-from .cell import tet as tet_cell
 from .cell import tet_facts, tet_names
-from .design import Beams, Design, Lattice
+from .design import Design
 from .errors import DesignError, DesignWarning
 from .files import extension, write_text
 from .formats import LAW_WRITES
@@ -257,14 +256,16 @@ def _part_of(cell: str, part: str | None, tet: bool) -> str:
 def _solid(cell: str, part: str, fraction: float, tet: bool) -> Solid:
     """A cell of wavelength 1, or about 1 in tetrahedra, at a fraction."""
     if tet:
-        core = Lattice(tet_cell(cell), part, tets(size=1), {"fraction": fraction})
-        design = Design(box(size=[2, 2, 2]), core)
+        core = {"cell": {"tet": {"name": cell}}, "part": part, "map": tets(size=1), "level": {"fraction": fraction}}
+        design = Design(box(size=[2, 2, 2]), {"core": core})
     elif part == "beams":
-        shape = np.array(unit_cells.cell(cell)["aspect"])
-        shape = [float(v) for v in shape / shape[0]]
-        design = Design(box(size=shape), beams=Beams(cell, affine(wavelength=shape), fraction=fraction))
+        edges = unit_cells.cell(cell)["aspect"]
+        shape = [v / edges[0] for v in edges]
+        beams = {"cell": cell, "map": affine(wavelength=shape), "fraction": fraction}
+        design = Design(box(size=shape), beams={"core": beams})
     else:
-        design = Design(box(size=[1, 1, 1]), Lattice(cell, part, affine(wavelength=1.0), {"fraction": fraction}))
+        core = {"cell": cell, "part": part, "map": affine(wavelength=1.0), "level": {"fraction": fraction}}
+        design = Design(box(size=[1, 1, 1]), {"core": core})
     with warnings.catch_warnings():
         # That a cell falls apart is said by its properties, in ``notes``.
         warnings.simplefilter("ignore", DesignWarning)
@@ -293,7 +294,7 @@ def _unit(solid: Solid) -> float:
     return (solid._cell.volume / np.sqrt(2)) ** (1 / 3) if tilings else 1.0
 
 
-def _mean(values: Sequence[float]) -> float:
+def _mean(values: Sequence[float] | np.ndarray) -> float:
     return float(np.mean(values))
 
 

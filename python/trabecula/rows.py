@@ -126,15 +126,14 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
         reported: list[str] = []
         failed: list[str] = []
         figures |= _asked(solid)
-        resolution = {"edge": job.edge, "per_cell": job.per_cell}
         if job.meshes or job.pictures:
-            mesh = solid.mesh(**resolution, threads=job.threads)
+            mesh = solid.mesh(job.edge, job.per_cell, threads=job.threads)
             measured = mesh.measure()
             for pattern, write in ((job.meshes, mesh.write), (job.pictures, lambda path: mesh.render(path, solid=solid))):
                 if pattern:
                     write(named(pattern, number))
         else:
-            measured = solid.measure(**resolution, threads=job.threads)
+            measured = solid.measure(job.edge, job.per_cell, threads=job.threads)
         whole = (measured.solid_fraction, measured.volume, measured.area, measured.pieces)
         figures |= dict(zip(MEASURED, whole, strict=True))
         for name, settings in job.properties.items():

@@ -23,7 +23,7 @@ ROOM = 14
 
 
 def scatter(
-    columns: Mapping[str, Sequence], x: str, y: str, colour: str | None = None, front: tuple[str, str] | None = None
+    columns: Mapping[str, Sequence], x: str, y: str, colour: str | None = None, *, front: tuple[str, str] | None = None
 ) -> str:
     """The drawing. A ``colour`` of texts has a colour for each text. ``front`` says which of x and y is better, "min" or "max"
     each, and draws the Pareto front.

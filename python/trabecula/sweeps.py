@@ -7,7 +7,7 @@ import inspect
 import itertools
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -172,7 +172,7 @@ def prepared(
     return Job(given.design, edge, per_cell, meshes, pictures, settings_of(properties)), points
 
 
-def run(job: Job, tasks: list[tuple[int, dict[str, Any]]], jobs: int, cluster: str | None = None) -> Iterator[dict[str, Any]]:
+def run(job: Job, tasks: list[tuple[int, dict[str, Any]]], jobs: int, cluster: str | None = None) -> Generator[dict[str, Any]]:
     """The rows of numbered points, as they are done."""
     jobs = min(whole("jobs", jobs, 1, 4096), max(len(tasks), 1))
     if cluster:

@@ -13,7 +13,7 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from typing import Any
 
 from .rows import Job, row_of
@@ -80,13 +80,13 @@ class _Worker:
         process, self.process = self.process, None
         if process is not None:
             process.kill()
-            for pipe in (process.stdin, process.stdout):
+            for pipe in filter(None, (process.stdin, process.stdout)):
                 with contextlib.suppress(OSError):
                     pipe.close()
             process.wait()
 
 
-def rows_by_processes(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], jobs: int) -> Iterator[dict[str, Any]]:
+def rows_by_processes(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], jobs: int) -> Generator[dict[str, Any]]:
     """The rows of numbered points as they are done, by this many processes of one thread each.
 
     A generator that is closed or thrown into ends its workers at once.
@@ -131,7 +131,7 @@ def rows_by_processes(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], job
             worker.end()
 
 
-def rows_here(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]]) -> Iterator[dict[str, Any]]:
+def rows_here(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]]) -> Generator[dict[str, Any]]:
     """The same in this process, one after the other."""
     for number, values in tasks:
         yield row_of(job, number, values)
