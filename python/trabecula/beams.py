@@ -73,5 +73,6 @@ def read(path: str | os.PathLike[str]) -> dict[str, NDArray]:
         nodes, radii, beams, beam_radii, _, _ = _core.read_graph(_core.read_file(os.fsdecode(path)), kind)
     except ValueError as error:
         raise ValueError(f"{os.fsdecode(path)}: {error}") from None
-    found = {"nodes": nodes, "beams": beams, "radii": radii, "beam_radii": beam_radii}
-    return {name: values for name, values in found.items() if values is not None}
+    found: dict[str, NDArray] = {"nodes": nodes, "beams": beams}
+    more = {"radii": radii, "beam_radii": beam_radii}
+    return found | {name: values for name, values in more.items() if values is not None}

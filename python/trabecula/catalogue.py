@@ -19,7 +19,7 @@ def cell_facts(name: str) -> dict[str, Any]:
 
     Raises KeyError for the name of no cell.
     """
-    known = {c[0]: c for c in _core.cells()}
+    known: dict[str, tuple[str, str, str, str, str]] = {c[0]: c for c in _core.cells()}
     name, title, formula, group, source = known[name]
     span, parts = _core.cell_facts(name)
     whole = {part: [list(w) for w in found] for part, found in parts}

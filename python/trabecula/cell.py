@@ -149,8 +149,10 @@ def __getattr__(name: str) -> Callable[[], CellName]:
         hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
         raise AttributeError(f"trabecula.cell has no cell {name}{hint if known else ''}")
 
-    def make() -> str:
-        return name
+    ready = known[known.index(name)]
+
+    def make() -> CellName:
+        return ready
 
     make.__name__ = make.__qualname__ = name
     make.__module__ = __name__

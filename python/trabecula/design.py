@@ -282,7 +282,7 @@ def spartan(
     """
     from . import level, map
 
-    cells = {"diamond": "diamond", "gyroid": "gyroid_mirrored", "gyroid_mirrored": "gyroid_mirrored"}
+    cells: dict[str, CellName] = {"diamond": "diamond", "gyroid": "gyroid_mirrored", "gyroid_mirrored": "gyroid_mirrored"}
     if name not in cells:
         raise ValueError(f'spartan: the note has "gyroid" and "diamond", found {name!r}')
     waves = three("wavelength", wavelength)
@@ -304,7 +304,12 @@ def in_memory_in(data: Any) -> list[InMemory]:
 def files_in(data: Any) -> list[str]:
     """The files that plain data names: what stands under ``path``, or as a table of beams; in a sweep every value of it."""
     found: list[str] = []
-    _moved(data, lambda name: found.append(name) or name)
+
+    def noted(name: str) -> str:
+        found.append(name)
+        return name
+
+    _moved(data, noted)
     return found
 
 
@@ -314,7 +319,7 @@ def _moved(data: Any, turn: Callable[[str], str]) -> Any:
         return [_moved(item, turn) for item in data]
     if not isinstance(data, dict):
         return data
-    out = {}
+    out: dict[str, Any] = {}
     for key, item in data.items():
         # In a sweep a key is the path of one, and its values are a list.
         names = key.rpartition(".")[2] in PATHS

@@ -77,7 +77,7 @@ class LayerRow(NamedTuple):
 
 
 #: The formats of layers by suffix.
-LAYERS = {suffix: LayerRow(*row) for suffix, *row in _core.layer_formats()}
+LAYERS = {suffix: LayerRow(title, *has) for suffix, title, *has in _core.layer_formats()}
 LAYER_WRITES = tuple(LAYERS)
 #: The formats of volume meshes: suffix, what it is.
 VOLUMES = {**dict(_core.volume_formats()), "xdmf": "XDMF with HDF5", "foam": "OpenFOAM, next to the folder constant/polyMesh"}

@@ -14,7 +14,7 @@ from .errors import DesignError
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, TypeVar
+    from typing import Any, ParamSpec, TypeAlias, TypeVar, overload
 
     import meshio
     import numpy as np
@@ -32,9 +32,10 @@ if TYPE_CHECKING:
     Points = Iterable[Vector] | str | os.PathLike[str]
 
     #: A mesh in memory: ours, one of another package, or vertices and triangles.
-    MeshLike = Mesh | trimesh.Trimesh | pyvista.PolyData | meshio.Mesh | tuple[ArrayLike, ArrayLike]
+    MeshLike: TypeAlias = Mesh | trimesh.Trimesh | pyvista.PolyData | meshio.Mesh | tuple[ArrayLike, ArrayLike]
 
-    Builder = TypeVar("Builder", bound=Callable[..., Any])
+    P = ParamSpec("P")
+    Made = TypeVar("Made")
 
 __all__ = [
     "QUEUES",
@@ -64,9 +65,17 @@ __all__ = [
 DEPTH = 64
 
 
-def named(builder: Builder) -> Builder:
+if TYPE_CHECKING:
+
+    @overload
+    def named(builder: type[Made]) -> type[Made]: ...
+    @overload
+    def named(builder: Callable[P, Made]) -> Callable[P, Made]: ...
+
+
+def named(builder: Any) -> Any:
     """The function or data class; a keyword that it does not have is refused with the nearest that it has."""
-    function = builder.__init__ if isinstance(builder, type) else builder
+    function = vars(builder)["__init__"] if isinstance(builder, type) else builder
     known = parameters(function)
 
     @functools.wraps(function)
@@ -75,7 +84,7 @@ def named(builder: Builder) -> Builder:
         return function(*args, **given)
 
     if isinstance(builder, type):
-        builder.__init__ = call
+        builder.__init__ = call  # type: ignore[misc]  # its own, of no subclass
         return builder
     return call
 

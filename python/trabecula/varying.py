@@ -16,18 +16,18 @@ __all__ = ["check_values", "explained", "overlapping"]
 NO_NUMBER = re.compile(r"(?<![\w.\"'])[+-]?(?:nan|inf|null|NaN|Infinity)(?![\w.\"'])")
 
 
-def check_values(sweep: Mapping[str, Any] | None, text: str = "", name: str = "") -> None:
+def check_values(sweep: Mapping[str, Any], text: str = "", name: str = "") -> None:
     """Refuses what is no value in a sweep: NaN and the like in a list, a number of values where the sampling takes none, and
     paths of which one lies in another; with the line of the ``text`` that it was read from, of the file ``name``.
     """
-    if both := overlapping(sweep or {}):
+    if both := overlapping(sweep):
         raise _error(
             f"sweep.{both[1]}", f"it lies in {both[0]}, which varies too; vary one of them", _line_of(both[1], text), name
         )
-    for path, of in (sweep or {}).items():
+    for path, of in sweep.items():
         line = _line_of(path, text)
         if isinstance(of, Mapping):
-            if (sweep or {}).get("sampling", "grid") != "grid" and of.get("count") is not None and "from" in of:
+            if sweep.get("sampling", "grid") != "grid" and of.get("count") is not None and "from" in of:
                 message = (
                     f'count = {of["count"]} is of a grid, and sampling is "{sweep["sampling"]}": leave it out; the number of '
                     "designs is the sweep's own count"
