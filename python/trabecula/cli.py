@@ -6,7 +6,8 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from .camera import BACKGROUNDS, PROJECTIONS, VIEWS
 from .completion import SHELLS, script
@@ -209,17 +210,17 @@ def front(text: str) -> tuple[str, str]:
     return ways[0], ways[1]
 
 
-def ending(known: tuple[str, ...], stdin: bool = False):
-    """A check of file names: one of the known suffixes, or ``-`` for standard input."""
+class Ending(NamedTuple):
+    """A check of file names: one of these suffixes, by which shells complete it, or ``-`` for standard input."""
 
-    def check(text: str) -> str:
-        if kind_of(text) not in known and not (stdin and text == STDIN):
+    suffixes: tuple[str, ...]
+    stdin: bool = False
+
+    def __call__(self, text: str) -> str:
+        if kind_of(text) not in self.suffixes and not (self.stdin and text == STDIN):
             found = os.path.basename(text)
-            raise argparse.ArgumentTypeError(f"the name must end in {dotted(known)}; found {found!r}")
+            raise argparse.ArgumentTypeError(f"the name must end in {dotted(self.suffixes)}; found {found!r}")
         return text
-
-    check.suffixes = known  # as shells complete it
-    return check
 
 
 # --- options ---------------------------------------------------------------------------------------------------------
@@ -232,7 +233,7 @@ def option(*names: str, **more):
 
 def file(name: str, known: tuple[str, ...], text: str, metavar: str = "FILE", stdin: bool = False, **more):
     """A file by its position on the command line, or after an option."""
-    return option(*name.split(), type=ending(known, stdin), metavar=metavar, help=text, **more)
+    return option(*name.split(), type=Ending(known, stdin), metavar=metavar, help=text, **more)
 
 
 def output(known: tuple[str, ...], text: str, required: bool = True):
@@ -561,8 +562,8 @@ COMMANDS = {
             help=f"what else is computed of each design, by commas: {', '.join(PROPERTIES)}",
         ),
         option("--n", type=VOXELS, metavar="N", help="voxels along a cell for these properties"),
-        option("--meshes", type=ending(MESH_WRITES), metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
-        option("--pictures", type=ending(("png",)), metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
+        option("--meshes", type=Ending(MESH_WRITES), metavar="NAMES", help="write the meshes, such as parts/{design}.3mf"),
+        option("--pictures", type=Ending(("png",)), metavar="NAMES", help="write pictures, such as pictures/{design}.png"),
         option("--plot", nargs="+", metavar=("X", "Y"), help="draw column Y against X, a third as colour, to OUT with .svg"),
         option(
             "--front", type=front, metavar="BETTER", help="with the Pareto front: min or max of X and of Y, such as min,max"
@@ -694,7 +695,7 @@ COMMANDS = {
         "  trabecula law diamond --part lower --from 0.2 --to 0.5 --count 7 --properties stiffness --json",
         option("cell", metavar="CELL", help="a cell by its name, as `trabecula cells` and `trabecula cells --beams` list them"),
         option(
-            "-o", "--output", nargs="+", type=ending(LAW_WRITES), metavar="OUT", help=f"files to write ({dotted(LAW_WRITES)})"
+            "-o", "--output", nargs="+", type=Ending(LAW_WRITES), metavar="OUT", help=f"files to write ({dotted(LAW_WRITES)})"
         ),
         option(
             "--part",
@@ -877,7 +878,8 @@ def serve(argv: list[str] | None) -> int:
     if args.command == "completion":
         from . import beams, cell
 
-        known = {"cell": cell.names(), "beams": beams.names(), "name": [*cell.names(), *beams.names()]}
+        known: dict[str, Sequence[str]] = {"cell": cell.names(), "beams": beams.names()}
+        known["name"] = [*cell.names(), *beams.names()]
         print(script(top, args.shell, known), end="")
         return 0
     if args.command == "simplify" and args.tolerance is None and args.triangles is None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from . import _core, cell
 from . import beams as unit_cells
+from .carrier import Carrier
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render
 from .errors import DesignError, Refused, WrongUsage
@@ -33,7 +35,7 @@ from .slicing import slice
 from .starter import starter
 from .terminal import Progress, figure, put_json, say, settle, warned
 from .texts import counted
-from .volumes import check_case, check_order, check_solver, check_steps
+from .volumes import FiniteElements, check_case, check_order, check_solver, check_steps
 from .voxels import fits_file
 
 # fmt: off
@@ -104,12 +106,12 @@ def faces(args) -> None:
 
     part = read(args.file, solid=args.solid)
     settle()
-    listed = [{"number": i, "name": name, "color": color, "area": area} for i, (name, color, area) in enumerate(part.labels, 1)]
     if args.json:
+        listed = [{"number": i, "name": name, "color": color, "area": a} for i, (name, color, a) in enumerate(part.labels, 1)]
         return put_json({"solids": part.solids, "volume": part.volume, "faces": listed})
     print(f"{'face':>5}  {'name':20} {'colour':8} {'area (mm²)':>12}")
-    for row in listed:
-        print(f"{row['number']:5}  {row['name'] or '-':20} {row['color'] or '-':8} {figure(row['area']):>12}")
+    for i, (name, color, area) in enumerate(part.labels, 1):
+        print(f"{i:5}  {name or '-':20} {color or '-':8} {figure(area):>12}")
     within = "" if part.volume is None else f", volume {figure(part.volume)} mm³"
     print(f"{counted(len(part.solids), 'solid')}: {', '.join(name or '-' for name in part.solids)}{within}")
 
@@ -147,6 +149,8 @@ def voxels(args) -> None:
 
 def volume(args) -> None:
     """``trabecula volume``."""
+    import numpy as np
+
     (check_case if kind_of(args.output) == "foam" else check_place)(args.output)
     keep_file(args.design, args.output)
     if args.order is None:
@@ -157,10 +161,11 @@ def volume(args) -> None:
     carried = args.of == "carrier"
     named = [name for name in args.fields or () if not (carried and name == "stiffness")]
     try:
-        fields_at(solid, named, solid.bounds)
+        fields_at(solid, named, np.array(solid.bounds))
     except ValueError as error:
         raise Refused(f"--fields: {error}") from None
     start = time.perf_counter()
+    made: FiniteElements
     with Progress("meshing", args.progress) as progress:
         if args.voxels is not None:
             share = {} if args.least is None else {"least": args.least}
@@ -178,7 +183,7 @@ def volume(args) -> None:
     if missing:
         raise Refused(f"--sets: {missing[0]} is empty; the mesh has {', '.join(made.report().sets)}")
     fields = fields_at(solid, named, made.nodes)
-    if len(named) < len(args.fields or ()):
+    if isinstance(made, Carrier) and "stiffness" in (args.fields or ()):
         with Progress("stiffness", args.progress) as progress:
             fields |= made.materials(args.nu, kind_of(args.output), args.threads, progress)
     settle()
@@ -261,7 +266,7 @@ def check_sets(args) -> None:
     known = [*own, "X0", "X1", "Y0", "Y1", "Z0", "Z1", *(design.set or ())]
     if not surface and args.of not in ("shell", "beams"):
         known += ["SKIN"] if design.skin else []
-        known += ["NET"] if any("tets" in (it.map or {}) for it in (design.lattice or {}).values()) else []
+        known += ["NET"] if any("tets" in it["map"] for it in design.to_dict().get("lattice", {}).values()) else []
         known += [f"KEEP_{name}" for name in design.keep or ()]
     for option, name in named:
         if name not in known and not name.startswith("CORE_"):
@@ -281,12 +286,12 @@ def sweep(args) -> None:
         check_place(name)
         keep_file(args.study, name)
     if kind_of(args.study) in SWEEP_WRITES:
-        if not args.plot:
+        if not drawing:
             raise Refused(f"{args.study} is a table already; say with --plot X Y what to draw of it")
         return draw(args.study, args, drawing)
     start = time.perf_counter()
     figures = table_of(design_of(args.study), args)
-    if args.plot:
+    if drawing:
         draw(args.output, args, drawing)
     figures["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
@@ -354,6 +359,9 @@ def schema(args) -> None:
 
 def cells(args) -> None:
     """``trabecula cells``."""
+    names: Sequence[str]
+    facts: Callable[[str], dict[str, Any]]
+    words: Callable[[dict], Iterator[str]]
     tet, beams = args.tet, args.beams
     if args.name and not (tet or beams) and args.name not in cell.names():
         # A name of one of the other lists says itself which is meant.

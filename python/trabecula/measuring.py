@@ -66,12 +66,12 @@ def measure(args) -> None:
         figures |= (
             {"edge": edge, "volume_error": solid.volume_error(edge)} if off is None else {"edge": None, "chord_error": off}
         )
-    if args.dangling:
-        with Progress("looking for fragments", args.progress) as progress:
-            figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
+        if args.dangling:
+            with Progress("looking for fragments", args.progress) as progress:
+                figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
     settle()
     draw(found, args.transitions)
-    if args.thickness:
+    if held is not None and args.thickness:
         with Progress("fitting balls", args.progress) as progress:
             balls = held.thickness(args.step, args.threads, progress)
         figures |= balls.measure()

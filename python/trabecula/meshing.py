@@ -18,6 +18,12 @@ from .solid import OPEN_IN_RANGES, Solid
 from .terminal import Progress, figure, put_json, say, settle, warn, warned
 from .texts import counted, voids
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Literal
+
+    from .reports import SimplifyReport
+
 __all__ = ["mesh", "simplify"]
 
 
@@ -117,8 +123,8 @@ def mesh_beams(args) -> None:
 
 def mesh_implicit(args) -> None:
     """``trabecula mesh --implicit``."""
-    names = ("no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord")
-    names += ("protocol", "assembly")
+    names = ["no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord"]
+    names += ["protocol", "assembly"]
     refuse_others(args, names, ("drop-small",), "--implicit: the file has a function, and no triangles")
 
     def words(made: dict) -> str:
@@ -173,7 +179,7 @@ def mesh_parts(args) -> None:
     solid = build(args.design)
     for name in files.values():
         keep_inputs(args.design, name)
-    islands = "error" if args.islands == "error" else "keep"
+    islands: Literal["keep", "error"] = "error" if args.islands == "error" else "keep"
     with Progress("meshing", args.progress) as progress:
         parts = solid.parts(args.edge, args.per_cell, args.parts, args.threads, progress, islands)
     if "wall" in parts and parts["wall"].voids:
@@ -181,19 +187,20 @@ def mesh_parts(args) -> None:
     settle()
     write_parts(args.output, parts)
     edge = solid.spacing(args.edge, args.per_cell)
-    made = {"parts": {}, "edge": edge, "region_volume": solid.region_volume(edge)}
-    for name, mesh in parts.items():
-        share = {"solid_fraction": mesh.volume / made["region_volume"], "file": files[name]}
-        made["parts"][name] = mesh.summary().to_dict() | share
-    made["seconds"] = round(time.perf_counter() - start, 3)
+    region = solid.region_volume(edge)
+    made = {
+        name: it.summary().to_dict() | {"solid_fraction": it.volume / region, "file": files[name]} for name, it in parts.items()
+    }
+    seconds = round(time.perf_counter() - start, 3)
     if args.json:
-        return put_json(made | {"warnings": warned()})
-    for name, it in made["parts"].items():
+        figures = {"parts": made, "edge": edge, "region_volume": region, "seconds": seconds}
+        return put_json(figures | {"warnings": warned()})
+    for name, it in made.items():
         say(
             f"{name}: {it['triangles']} triangles, volume {figure(it['volume'])} mm³, {it['solid_fraction']:.4f} of the "
             f"region, area {figure(it['area'])} mm², {counted(it['pieces'])}; {it['file']}"
         )
-    say(f"edge {edge:g} mm, {made['seconds']:.2f} s")
+    say(f"edge {edge:g} mm, {seconds:.2f} s")
 
 
 def meshed_file(solid: Solid, args, progress: Progress) -> dict:
@@ -208,8 +215,8 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     if apart is not None:
         if whole:
             if out := given_of(args):
-                made = "--resume, --cluster and --shards make a surface in ranges of tiles, as it is"
-                raise WrongUsage(f"{made}: leave out {out}")
+                why = "--resume, --cluster and --shards make a surface in ranges of tiles, as it is"
+                raise WrongUsage(f"{why}: leave out {out}")
             raise Refused(OPEN_IN_RANGES)
         if kind_of(args.output) != "stl":
             raise WrongUsage(f"{args.output}: --resume, --cluster and --shards write .stl only; name one, or leave them out")
@@ -236,7 +243,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
             f"smoothed: the smallest angle of 19 in 20 triangles is {it.smallest_angle_p05:.3g}° or more, before "
             f"{it.smallest_angle_p05_before:.3g}°; of all {it.smallest_angle:.2g}°, before {it.smallest_angle_before:.2g}°"
         )
-    surface = simplified(surface, args) if lighter else surface
+    surface = simplified(surface, args)[0] if lighter else surface
     made = surface.summary().to_dict() | asked | error
     if not asked:
         made["voids"] = [v.to_dict() for v in surface.voids]
@@ -284,20 +291,21 @@ def simplify(args) -> None:
         # Of a tolerance the triangles are not known before they are made.
         triangles = min(args.triangles, len(mesh.triangles))
         fits(file_size(extension(args.output, MESH_WRITES), triangles), f"{triangles:.3g} triangles", args.output)
-    made = simplified(mesh, args)
+    made, found = simplified(mesh, args)
     made.write(args.output)
     if args.json:
-        put_json(made.simplification.to_dict() | {"seconds": round(time.perf_counter() - start, 3)})
+        put_json(found.to_dict() | {"seconds": round(time.perf_counter() - start, 3)})
 
 
-def simplified(mesh: Mesh, args) -> Mesh:
-    """The lighter mesh, and a message on what was done."""
+def simplified(mesh: Mesh, args) -> tuple[Mesh, SimplifyReport]:
+    """The lighter mesh and its figures, and a message on what was done."""
     with Progress("simplifying", args.progress) as progress:
         made = mesh.simplified(args.tolerance, args.triangles, progress)
     it = made.simplification
+    assert it is not None  # it was made lighter
     if args.triangles and it.triangles_before <= args.triangles:
         say(f"{it.triangles} triangles are no more than {args.triangles} already: left as they are")
-        return made
+        return made, it
     if args.triangles and not args.tolerance and it.triangles > args.triangles:
         warn(f"{it.triangles} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
     change = 100 * (it.volume / it.volume_before - 1)
@@ -305,4 +313,4 @@ def simplified(mesh: Mesh, args) -> Mesh:
         f"simplified from {it.triangles_before} to {it.triangles} triangles, nowhere farther than "
         f"{it.deviation:.2g} mm from the first; volume {change:+.2g} %"
     )
-    return made
+    return made, it

@@ -19,17 +19,6 @@ __all__ = [
     *("say", "settle", "span", "warn", "warned"),
 ]
 
-TYPE_CHECKING = False  # as type checkers know it, without the import
-if TYPE_CHECKING:
-    from typing import TypedDict
-
-    class Notice(TypedDict):
-        """A warning, and the path of the key that it is about, or nothing."""
-
-        path: str
-        message: str
-
-
 #: The share between two times that the pace is taken from.
 FINE = 0.002
 
@@ -116,7 +105,7 @@ class _Voice:
     def __init__(self, quiet: bool = False, strict: bool = False):
         self.quiet = quiet
         self.strict = strict
-        self.notices: list[Notice] = []
+        self.notices: list[dict[str, str]] = []
         self.progress: Progress | None = None
 
 
@@ -129,8 +118,8 @@ def listen(quiet: bool, strict: bool) -> None:
     _voice = _Voice(quiet, strict)
 
 
-def warned() -> list[Notice]:
-    """What has been warned of, each text once."""
+def warned() -> list[dict[str, str]]:
+    """What has been warned of, each text once, as {path, message}: the path of a key, or nothing."""
     return list(_voice.notices)
 
 
@@ -154,7 +143,7 @@ def say(text: str) -> None:
 
 def warn(message: str, path: str = "", shown: bool = True) -> None:
     """Warns, once with each text; with ``strict`` it is an error, and shown even if ``quiet``."""
-    notice: Notice = {"path": path, "message": message}
+    notice = {"path": path, "message": message}
     if notice in _voice.notices:
         return
     _voice.notices.append(notice)

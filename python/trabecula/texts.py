@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from .record import Report
 from .terminal import figure, span
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .reports import (
+        BlendReport,
+        DesignReport,
+        DistortionReport,
+        FitReport,
+        LatticeReport,
+        PeriodReport,
+        SingularLineReport,
+        TetMeshReport,
+        TilingReport,
+        TransitionReport,
+        ZoneReport,
+    )
 
 __all__ = ["counted", "intervals", "point", "table", "text", "voids"]
 
@@ -19,7 +35,7 @@ SHOWN = 6
 
 def text(report: Report) -> str:
     """A report in words, line by line."""
-    write = {
+    writers: dict[str, Callable[[Any], Iterator[str]]] = {
         "BeamsReport": _beams,
         "BlendReport": _blend,
         "DesignReport": _design,
@@ -28,7 +44,8 @@ def text(report: Report) -> str:
         "TetMeshReport": _tet_mesh,
         "TilingReport": _tiling,
         "TransitionReport": _transition,
-    }.get(type(report).__name__)
+    }
+    write = writers.get(type(report).__name__)
     return "\n".join(write(report)) if write else table(report, "none")
 
 
@@ -51,7 +68,7 @@ def intervals(of: list[list[float]]) -> str:
     return " and ".join(f"{a:.4f} to {b:.4f}" for a, b in of)
 
 
-def _design(it: Report) -> Iterator[str]:
+def _design(it: DesignReport) -> Iterator[str]:
     low, high = it.region.bounds
     extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
     about = "" if it.region.volume_exact else "about "
@@ -62,9 +79,9 @@ def _design(it: Report) -> Iterator[str]:
         off = 100 * (volume / described - 1)
         yield f"region  {extent} mm, {figure(described)} mm³, of which tetrahedra have {figure(volume)} mm³ ({off:+.1f} %)"
     for part in it.region.tessellated or ():
-        off = "" if part.volume_error is None else f", its volume to {100 * part.volume_error:+.2g} %"
+        error = "" if part.volume_error is None else f", its volume to {100 * part.volume_error:+.2g} %"
         name = os.path.basename(part.path)
-        yield f"  {name}: {part.triangles} triangles within {figure(part.chord)} mm of {part.faces} faces{off}"
+        yield f"  {name}: {part.triangles} triangles within {figure(part.chord)} mm of {part.faces} faces{error}"
     for name, lattice in it.lattices.items():
         ends = dict.fromkeys(figure(w) for w in lattice.wavelengths or [lattice.wavelength])
         yield f"lattice {name}: {lattice.part}, wavelength {' to '.join(ends)} mm"
@@ -80,7 +97,7 @@ def _design(it: Report) -> Iterator[str]:
         yield f"grid    spacing {it.spacing:.3g} mm unless another is asked for"
 
 
-def _lattice(it: Report) -> Iterator[str]:
+def _lattice(it: LatticeReport) -> Iterator[str]:
     neck = "thinnest wall" if it.part == "sheet" else "narrowest neck"
     yield f"  iso        {span(it.iso)}{'' if it.folding is None else ' (constant-level sheet of equal fraction)'}"
     yield f"  fraction   {span(it.fraction)}"
@@ -149,14 +166,14 @@ def _shortfalls(them: list[Report]) -> Iterator[str]:
         yield f"             hub {it.hub} at {point(it.position)} mm: {got}"
 
 
-def _finished(it: Report) -> str:
+def _finished(it: ZoneReport | TilingReport) -> str:
     """The solid fraction of the finished part where that is not the one of flat tetrahedra alone, and this."""
     if it.finished_fraction is None:
         return f"{it.solid_fraction:.4f}"
     return f"{it.finished_fraction:.4f} finished, {it.solid_fraction:.4f} in flat tetrahedra without ends"
 
 
-def _tiling(it: Report) -> Iterator[str]:
+def _tiling(it: TilingReport) -> Iterator[str]:
     yield f"  method     {it.method}, " + (
         "in each tetrahedron apart" if it.method == "explicit" else f"on a grid over the part: {it.method_reason}"
     )
@@ -186,7 +203,7 @@ def _tiling(it: Report) -> Iterator[str]:
         yield f"  creases    {it.creases.mean:.0f}° on average, {it.creases.max:.0f}° at most at faces of tetrahedra{smooth}"
 
 
-def _distortion(it: Report) -> Iterator[str]:
+def _distortion(it: DistortionReport) -> Iterator[str]:
     mean, most = max(a.mean for a in it.angle), max(a.max for a in it.angle)
     where = "at the points sampled, each of the axis where that is greatest"
     yield f"  angle      off by {mean:.1f}° on average, {most:.1f}° at most {where}"
@@ -199,7 +216,7 @@ def _distortion(it: Report) -> Iterator[str]:
     yield f"  turn       {it.turn:.1f}° per cell at most"
 
 
-def _singular(lines: list[Report]) -> Iterator[str]:
+def _singular(lines: list[SingularLineReport]) -> Iterator[str]:
     for line in lines[:3]:
         a, b = line.points[0], line.points[-1]
         place = f"from {point(a)} to {point(b)} mm" if a != b else f"closed, through {point(a)} mm"
@@ -209,27 +226,27 @@ def _singular(lines: list[Report]) -> Iterator[str]:
         yield f"             and {counted(len(more), 'shorter one')}"
 
 
-def _period(it: Report) -> str:
+def _period(it: PeriodReport) -> str:
     axes = zip(("first", "second", "third"), it.cells, it.asked, strict=True)
     round_it = [f"{n} cells along the {axis} axis ({asked:.2f} asked for)" for axis, n, asked in axes if n or abs(asked) > 0.05]
     return f"  hole       at {point(it.at)} mm along {point(it.along)}: {', '.join(round_it) or 'no cells go round'}"
 
 
-def _blend(it: Report) -> Iterator[str]:
+def _blend(it: BlendReport) -> Iterator[str]:
     phases = f", phases {it.phases}" if it.phases else ""
     yield f"blend of {', '.join(it.lattices)} by {it.by}{phases}"
     for f in it.rbf:
         yield f"  {f.path}: {f.points} points, delta {figure(f.delta)} mm, condition {f.condition:.2g}"
 
 
-def _transition(it: Report) -> Iterator[str]:
+def _transition(it: TransitionReport) -> Iterator[str]:
     from .transition import off
 
     yield f"transition {it.between[0]} to {it.between[1]}: {figure(it.volume)} mm³"
     worst = off(it)
     error = "" if worst is None else f", off by {worst:+.4f} at most"
-    found = [row.found for row in it.fractions]
-    yield f"  fraction   {span([min(found), max(found)])}{error}"
+    fractions = [row.found for row in it.fractions]
+    yield f"  fraction   {span([min(fractions), max(fractions)])}{error}"
     yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm, on which walls under two steps may seem broken"
     neck = "none: not connected across the transition"
     if it.neck:
@@ -240,7 +257,7 @@ def _transition(it: Report) -> Iterator[str]:
         yield f"  {word:10} {bodies.bodies}" + (f", {figure(bodies.volume)} mm³" if bodies.bodies else "")
 
 
-def _tet_mesh(it: Report) -> Iterator[str]:
+def _tet_mesh(it: TetMeshReport) -> Iterator[str]:
     q, fit, angles = it.quality, it.fit, it.quality.dihedral
     extent = " × ".join(figure(b - a) for a, b in zip(*q.bounds, strict=True))
     yield f"tetrahedra  {q.tets}, {q.nodes} nodes, {counted(q.pieces)}, by {it.mesher}"
@@ -258,7 +275,7 @@ def _tet_mesh(it: Report) -> Iterator[str]:
         yield from _fit(fit)
 
 
-def _fit(it: Report) -> Iterator[str]:
+def _fit(it: FitReport) -> Iterator[str]:
     for word, off in (("to part", it.to_part), ("from part", it.from_part)):
         yield f"{word:10} {off.mean:.2g} mm on average, 99 % within {off.p99:.2g} mm, {off.max:.2g} mm at most"
     yield f"left out   {100 * it.uncovered:.2g} % of the region, up to {it.uncovered_depth:.2g} mm deep"

@@ -36,7 +36,7 @@ class Transitions(Sequence):
     @property
     def warnings(self) -> list[dict[str, str]]:
         """The transitions that no solid leads across, each with ``path`` and ``message``, like ``Solid.warnings``."""
-        return [{"path": "blend", "message": _torn(it)} for it in self if it.gap]
+        return [{"path": "blend", "message": _torn(it, it.gap)} for it in self if it.gap]
 
     def svg(self) -> str:
         """The fraction found along each transition as bars, what was asked for as a line across each: an SVG file's text."""
@@ -55,9 +55,9 @@ class Transitions(Sequence):
         write_svg(path, self.svg)
 
 
-def _torn(it: TransitionReport) -> str:
+def _torn(it: TransitionReport, gap: list[float]) -> str:
     first, second = it.between
-    place = ", ".join(f"{x:.4g}" for x in it.gap)
+    place = ", ".join(f"{x:.4g}" for x in gap)
     return (
         f'no solid leads from "{first}" to "{second}" on a grid of {it.step:.3g} mm: that of "{first}" ends at ({place}) mm; '
         f"give one of them another `offset` in its map, widen the transition, or raise the fraction"
