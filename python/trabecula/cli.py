@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from .camera import BACKGROUNDS, PROJECTIONS, VIEWS
 from .completion import SHELLS, script
@@ -63,7 +63,7 @@ UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
 class Parser(argparse.ArgumentParser):
     """argparse with errors of one line."""
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         """Leaves with status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
@@ -71,10 +71,12 @@ class Parser(argparse.ArgumentParser):
 # --- words on the command line ---------------------------------------------------------------------------------------
 
 
-def number(what: str, ok: Callable[[float], bool] = lambda v: True, allowed: str = "", kind: type = float):
+def number(
+    what: str, ok: Callable[[float], bool] = lambda v: True, allowed: str = "", kind: type = float
+) -> Callable[[str], float]:
     """A check of numbers on the command line: ``what`` names one, ``allowed`` says which are ``ok``."""
 
-    def check(text: str):
+    def check(text: str) -> float:
         shown = text if len(text) <= 40 else f"{text[:37]}..."
         try:
             value = kind(text)
@@ -226,22 +228,31 @@ class Ending(NamedTuple):
 # --- options ---------------------------------------------------------------------------------------------------------
 
 
-def option(*names: str, **more):
+#: What ``add_argument`` takes.
+Option = tuple[tuple[str, ...], dict[str, Any]]
+
+
+def option(*names: str, **more: Any) -> Option:
     """What ``add_argument`` takes."""
     return names, more
 
 
-def file(name: str, known: tuple[str, ...], text: str, metavar: str = "FILE", stdin: bool = False, **more):
+def command(line: str, more: str, *options: Option | list[Option]) -> tuple[str, str, tuple[Option | list[Option], ...]]:
+    """A command: its line of help, what follows its options there, and these; of those in a list one at most."""
+    return line, more, options
+
+
+def file(name: str, known: tuple[str, ...], text: str, metavar: str = "FILE", stdin: bool = False, **more: Any) -> Option:
     """A file by its position on the command line, or after an option."""
     return option(*name.split(), type=Ending(known, stdin), metavar=metavar, help=text, **more)
 
 
-def output(known: tuple[str, ...], text: str, required: bool = True):
+def output(known: tuple[str, ...], text: str, required: bool = True) -> Option:
     """The file that a command writes."""
     return file("-o --output", known, text, "OUT", required=required)
 
 
-def spacing(word: str = "--edge", *more):
+def spacing(word: str = "--edge", *more: Option) -> list[Option]:
     """The spacing of the grid; of these options one at most."""
     edge = option(
         word, type=LENGTH, metavar="MM", dest="edge", help="grid spacing in mm; without it what the walls need, as `check` says"
@@ -250,7 +261,7 @@ def spacing(word: str = "--edge", *more):
     return [edge, option("--per-cell", type=SAMPLES, metavar="N", help=text), *more]
 
 
-def of_cell(known: tuple[str, ...]):
+def of_cell(known: tuple[str, ...]) -> tuple[Option, ...]:
     """The options of what is found of a periodic cell."""
     return (
         file("-o --output", known, f"files to write ({dotted(known)})", "OUT", nargs="+", action="extend"),
@@ -311,7 +322,7 @@ APART = (
 )
 
 
-def shards(folder: str, more: str):
+def shards(folder: str, more: str) -> Option:
     """Several files instead of one."""
     text = f"a folder with the name of OUT {folder}, of files of about this size and a manifest: as --resume{more}"
     return option("--shards", type=GIGABYTES, metavar="GB", help=text)
@@ -321,7 +332,7 @@ TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the
 
 #: For each command: one line, examples and more, options; of a list of options one at most may be given.
 COMMANDS = {
-    "new": (
+    "new": command(
         "Write a commented design to start from.",
         "examples:\n  trabecula new first.toml --cell diamond\n"
         "  trabecula new stem.toml --part stem.stl --beams octet --skin 0.8",
@@ -335,12 +346,12 @@ COMMANDS = {
         option("--schema", action="store_true", help="also write design-schema.json, by which editors complete and check keys"),
         option("--force", action="store_true", help="replace the file if it exists"),
     ),
-    "check": (
+    "check": command(
         "Build a design and print its level, fraction, wall thickness and warnings, without meshing.",
         "example:\n  trabecula check part.toml --json",
         *(DESIGN, JSON, TRANSITIONS, *NOTICES),
     ),
-    "mesh": (
+    "mesh": command(
         "Mesh a design: closed, oriented, free of self-intersection.",
         f"The name of OUT decides the format: {WRITTEN}; or .step, for CAD systems, the exact surface\n"
         "of uncut beams alone, or smooth patches on lattices in a box, within --tolerance (default: a thousandth of the\n"
@@ -418,7 +429,7 @@ COMMANDS = {
         ),
         *(JSON, *NOTICES),
     ),
-    "simplify": (
+    "simplify": command(
         "Make a mesh file lighter: fewer triangles, every guarantee and sharp edges kept; the change of volume is printed.",
         "The distance between the two surfaces is at most the tolerance; with --triangles it is printed.\n"
         "The mesh must be closed and free of self-intersection.\n\n"
@@ -427,7 +438,7 @@ COMMANDS = {
         file("file", PART_READS, "a mesh file, mm"),
         *(output(MESH_WRITES, "the mesh to write"), *LIGHTER, PROGRESS, JSON),
     ),
-    "volume": (
+    "volume": command(
         "Mesh the inside of a design: tetrahedra with named sets, for finite elements and flow.",
         "The name of OUT decides the format: .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .vtu (ParaView),\n"
         ".xdmf (with .h5), .bdf (Nastran), .mesh (Medit), or .foam: OpenFOAM's mesh, in m, in the folder constant/polyMesh of\n"
@@ -495,7 +506,7 @@ COMMANDS = {
         option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
-    "voxels": (
+    "voxels": command(
         "Write the solid as cubic voxels.",
         "The name of OUT decides the format: .npy (indexed [x, y, z], 1 is solid) or .vti (for ParaView).\n\n"
         "example:\n  trabecula voxels part.toml -o part.vti --step 0.2",
@@ -504,7 +515,7 @@ COMMANDS = {
         shards("without its ending", "; of .vti also all.pvti, by which ParaView opens them as one"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
-    "tets": (
+    "tets": command(
         "Make or check the tetrahedral mesh that carries a lattice; print its quality; write it.",
         "FILE is a design with [lattice.NAME.map.tets], of which only the region and that table are read, or a file of\n"
         "tetrahedra: vtu, vtk, or with the extra fe (pip install 'trabecula[fe]') msh, inp, med, mesh and others.\n\n"
@@ -517,7 +528,7 @@ COMMANDS = {
         option("--split", action="store_true", help="split a file's hexahedra, wedges and pyramids into tetrahedra"),
         *(THREADS, JSON),
     ),
-    "sweep": (
+    "sweep": command(
         "Build and measure many designs of one: a table with a row for each.",
         "The design has a table [sweep] of keys that vary, each with a list of values or a range, as in\n"
         "  [sweep]\n"
@@ -572,7 +583,7 @@ COMMANDS = {
         option("--yes", action="store_true", help="make more than a million designs"),
         *(PROGRESS, JSON, NOTICES[0]),
     ),
-    "slice": (
+    "slice": command(
         "Slice a design into layers for a machine, from its field and without a mesh; or at one height.",
         "The name of OUT decides the format: .cli (--binary or text), .svg, .3mf (slices), or pictures of a --pixel in .zip\n"
         "(PNG), .sl1 (resin printers), .tif or .npy. Contours are within the tolerance of the section in the middle of each\n"
@@ -604,7 +615,7 @@ COMMANDS = {
         option("--chord", type=LENGTH, metavar="MM", help="chord error of drawn arcs, mm (default: 0.01)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
-    "measure": (
+    "measure": command(
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
         "A design is measured while it is meshed, tile by tile; with --region or --thickness it is held in memory.\n"
         "A mesh file has a solid fraction and pores only against a region.\n"
@@ -639,7 +650,7 @@ COMMANDS = {
         ),
         *(TRANSITIONS, JSON, *NOTICES),
     ),
-    "faces": (
+    "faces": command(
         "List the faces of a STEP or IGES file: by these names a design opens its skin, keeps places solid and holds sets.",
         "A face goes by its name, its colour or its number; faces of one name go together.\n"
         "Needs pip install 'trabecula[cad]'.\n\n"
@@ -648,7 +659,7 @@ COMMANDS = {
         option("--solid", metavar="NAME", help="of this solid alone"),
         JSON,
     ),
-    "cells": (
+    "cells": command(
         "List the named cells: formula, space group, range, fractions in one piece, source.",
         "In a formula s = sin 2πx and c = cos 2πx; s2x = sin 4πx. x, y, z are phases in turns.\n\n"
         "examples:\n  trabecula cells\n  trabecula cells gyroid --json\n  trabecula cells --tet\n  trabecula cells --beams",
@@ -657,7 +668,7 @@ COMMANDS = {
         option("--beams", action="store_true", help="the unit cells of beams instead: group, nodes, valence, Maxwell count"),
         JSON,
     ),
-    "stiffness": (
+    "stiffness": command(
         "Find how stiff the periodic cell of a design is, in every direction, and how sure that is.",
         "The cell is that of one lattice under map.affine at one level, or of beams by a unit cell; the region plays no part.\n"
         "C is the limit of three grids, n, n/2 and n/4 voxels along the cell, each voxel by its exact solid fraction.\n"
@@ -669,14 +680,14 @@ COMMANDS = {
         option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid (default: 1)"),
         option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
     ),
-    "conductivity": (
+    "conductivity": command(
         "Find how well the periodic cell of a design conducts heat or electricity, relative to its solid.",
         "As `stiffness`. With --pore the pore conducts too, this many times as well as the solid.\n\n"
         "examples:\n  trabecula conductivity part.toml\n  trabecula conductivity part.toml --pore 0.026 --json",
         *(DESIGN, *of_cell(CONDUCTIVITY_WRITES), PLAIN),
         option("--pore", type=SHARE, default=0.0, metavar="K", help="conductivity of the pore by the solid's (default: 0)"),
     ),
-    "permeability": (
+    "permeability": command(
         "Find how permeable the pore of the periodic cell of a design is to creeping flow, in every direction.",
         "The cell is that of `stiffness`. k, in mm², is the limit of three grids, n, n/2 and n/4 nodes along the cell:\n"
         "mean flux over the whole cell = -k grad p / viscosity. With hydraulic diameter, tortuosity and Kozeny's constant.\n"
@@ -685,7 +696,7 @@ COMMANDS = {
         *(DESIGN, *of_cell(PERMEABILITY_WRITES)),
         option("--side", choices=("lower", "upper"), help="the pore on one side of a sheet (default: both)"),
     ),
-    "law": (
+    "law": command(
         "Find what a cell does by its solid fraction: stiffness, conductivity, permeability, area of the wall.",
         "At each fraction the limit of grids of n, n/2 and n/4 voxels along the cell; between them monotone cubics, and\n"
         "powers of the fraction fitted (Gibson and Ashby). Stiffness and conductivity are relative to the solid's, lengths\n"
@@ -721,36 +732,36 @@ COMMANDS = {
         ),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
-    "doctor": (
+    "doctor": command(
         "Say what is installed, and what is missing: versions, processors, memory, extras.",
         "example:\n  trabecula doctor",
         JSON,
     ),
-    "completion": (
+    "completion": command(
         "Print the script by which a shell completes the command.",
         "examples:\n  trabecula completion bash > ~/.local/share/bash-completion/completions/trabecula\n"
         "  trabecula completion zsh > ~/.zfunc/_trabecula     (a folder of $fpath)\n"
         "  trabecula completion fish > ~/.config/fish/completions/trabecula.fish",
         option("shell", choices=tuple(SHELLS), help="bash, zsh or fish"),
     ),
-    "schema": (
+    "schema": command(
         "Print the JSON Schema of designs, by which an editor completes and checks them.",
         "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"
         "example:\n  trabecula schema > design.json",
     ),
-    "studio": (
+    "studio": command(
         "Design in the browser: a page of this machine with live picture, figures, mesh and files.",
         "The page needs no network.\n\nexamples:\n  trabecula studio\n  trabecula studio part.toml",
         file("design", DESIGNS, "design file to open (.toml, .json)", "DESIGN", nargs="?"),
         *SERVED,
     ),
-    "view": (
+    "view": command(
         "Open a design in the studio, to turn it, cut it and change it.",
         "The same as `trabecula studio DESIGN`.\n\nexample:\n  trabecula view part.toml",
         file("design", DESIGNS, "design file to open (.toml, .json)", "DESIGN"),
         *SERVED,
     ),
-    "report": (
+    "report": command(
         "Write a report of a design as one HTML page: the part to turn, with sections; figures, wall thickness, warnings.",
         "The page needs no network. Beside the mesh, which is measured whole, it holds a lighter one to look at.\n\n"
         "example:\n  trabecula report part.toml -o part.html",
@@ -764,7 +775,7 @@ COMMANDS = {
         ),
         *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),
-    "render": (
+    "render": command(
         "Draw a design or a mesh file as PNG, or as SVG in lines.",
         "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25\n"
         "  trabecula render part.toml -o figure.svg --size 85mm --section x=0\n"
@@ -826,7 +837,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="store_true", help="print the version and exit")
     commands = top.add_subparsers(dest="command", metavar="COMMAND")
     plain = argparse.RawDescriptionHelpFormatter
-    for name, (line, more, *options) in COMMANDS.items():
+    for name, (line, more, options) in COMMANDS.items():
         one = commands.add_parser(name, help=line, description=line, epilog=more, formatter_class=plain)
         for some in options:
             group = one.add_mutually_exclusive_group() if isinstance(some, list) else one

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -51,7 +52,7 @@ LONGEST = 80
 SCHEMA_FILE = "design-schema.json"
 
 
-def new(args) -> None:
+def new(args: Namespace) -> None:
     """``trabecula new``."""
     known_cell(args.cell, cell.names())
     if args.beams:
@@ -81,7 +82,7 @@ def holds(name: str, text: str) -> bool:
         return file.read() == text.encode()
 
 
-def check(args) -> None:
+def check(args: Namespace) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
@@ -100,7 +101,7 @@ def check(args) -> None:
     print("\n".join(map(str, [report, *expect, *found])))
 
 
-def faces(args) -> None:
+def faces(args: Namespace) -> None:
     """``trabecula faces``."""
     from .cad import read
 
@@ -116,7 +117,7 @@ def faces(args) -> None:
     print(f"{counted(len(part.solids), 'solid')}: {', '.join(name or '-' for name in part.solids)}{within}")
 
 
-def voxels(args) -> None:
+def voxels(args: Namespace) -> None:
     """``trabecula voxels``."""
     import numpy  # noqa: F401  wanted in the end; see `terminal` for why no import waits until then
 
@@ -147,7 +148,7 @@ def voxels(args) -> None:
     )
 
 
-def volume(args) -> None:
+def volume(args: Namespace) -> None:
     """``trabecula volume``."""
     import numpy as np
 
@@ -208,7 +209,7 @@ def volume(args) -> None:
     )
 
 
-def check_elements(args) -> None:
+def check_elements(args: Namespace) -> None:
     """Refuses options of ``volume`` that do not go together, before any work is done."""
     kind = kind_of(args.output)
     if args.fields and kind not in ("vtu", "xdmf") and (kind != "msh" or args.voxels is not None):
@@ -255,7 +256,7 @@ def check_elements(args) -> None:
         raise Refused(f"{args.output}: the name of voxels must end in {dotted(VOXEL_ELEMENT_WRITES)}")
 
 
-def check_sets(args) -> None:
+def check_sets(args: Namespace) -> None:
     """Refuses names of sets to hold or to load that no mesh of this design has."""
     named = [("--hold", name) for name in args.hold or ()] + [("--load", name) for name, _ in args.load or ()]
     if not named:
@@ -273,7 +274,7 @@ def check_sets(args) -> None:
             raise Refused(f"{option}: no mesh of this design has a set {name}; it may have {', '.join(known)}")
 
 
-def sweep(args) -> None:
+def sweep(args: Namespace) -> None:
     """``trabecula sweep``."""
     from .sweeping import draw, table_of
 
@@ -301,7 +302,7 @@ def sweep(args) -> None:
     say(f"{args.output}: {counted(figures['rows'], 'design')}{failed}{taken}, {figures['seconds']:g} s")
 
 
-def tets(args) -> None:
+def tets(args: Namespace) -> None:
     """``trabecula tets``."""
     import numpy  # noqa: F401  wanted by all but vtu; see `terminal` for why no import waits until then
 
@@ -329,7 +330,7 @@ def tets(args) -> None:
         say(f"{args.output}: {report.quality.tets} tetrahedra, {seconds:.2f} s")
 
 
-def report(args) -> None:
+def report(args: Namespace) -> None:
     """``trabecula report``."""
     from .part_page import part_page
     from .viewer import write_page
@@ -352,12 +353,12 @@ def report(args) -> None:
     say(f"{args.output}: {os.path.getsize(args.output) / 1e6:.2g} MB, {made.counts[1]} triangles measured")
 
 
-def schema(args) -> None:
+def schema(args: Namespace) -> None:
     """``trabecula schema``."""
     print(_core.schema().rstrip("\n"))
 
 
-def cells(args) -> None:
+def cells(args: Namespace) -> None:
     """``trabecula cells``."""
     names: Sequence[str]
     facts: Callable[[str], dict[str, Any]]
@@ -385,22 +386,22 @@ def cells(args) -> None:
         print("\n".join(f"  {line}" for line in words(it)))
 
 
-def stiffness(args) -> None:
+def stiffness(args: Namespace) -> None:
     """``trabecula stiffness``."""
     of_cell(args)
 
 
-def conductivity(args) -> None:
+def conductivity(args: Namespace) -> None:
     """``trabecula conductivity``."""
     of_cell(args)
 
 
-def permeability(args) -> None:
+def permeability(args: Namespace) -> None:
     """``trabecula permeability``."""
     of_cell(args)
 
 
-def law(args) -> None:
+def law(args: Namespace) -> None:
     """``trabecula law``."""
     import numpy  # noqa: F401  wanted later; see `terminal` for why no import waits until then
 
@@ -412,7 +413,7 @@ def law(args) -> None:
     print("\n".join(effective.lines_of_law(found)))
 
 
-def of_cell(args) -> None:
+def of_cell(args: Namespace) -> None:
     """A figure of the periodic cell, by the name of the command."""
     import numpy  # noqa: F401  wanted later; see `terminal` for why no import waits until then
 
@@ -424,7 +425,7 @@ def of_cell(args) -> None:
     print("\n".join(effective.LINES[args.command](found)))
 
 
-def studio(args) -> None:
+def studio(args: Namespace) -> None:
     """``trabecula studio``."""
     import webbrowser
 
@@ -441,12 +442,12 @@ def studio(args) -> None:
             say("ended")
 
 
-def view(args) -> None:
+def view(args: Namespace) -> None:
     """``trabecula view``: the studio with a design."""
     studio(args)
 
 
-def doctor(args) -> None:
+def doctor(args: Namespace) -> None:
     """``trabecula doctor``."""
     from .doctor import state, words
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+
 from .camera import NO_SCALE, VIEWS, section_plane, towards
 from .drawn import WALL, pixels_of
 from .errors import Refused, WrongUsage
@@ -18,7 +20,7 @@ MOST_PIXELS = 16384
 __all__ = ["render"]
 
 
-def render(args) -> None:
+def render(args: Namespace) -> None:
     """``trabecula render``."""
     check_place(args.output)
     angles = camera(args)
@@ -58,7 +60,7 @@ def render(args) -> None:
     )
 
 
-def resolution(args) -> tuple[tuple[float, float], float | None]:
+def resolution(args: Namespace) -> tuple[tuple[float, float], float | None]:
     """Pixels across and down, of a drawing also parts of one, and how many are an inch, if that is said."""
     wide, high, unit = args.size
     if unit == "px":
@@ -74,7 +76,7 @@ def resolution(args) -> tuple[tuple[float, float], float | None]:
     return (across, down), dpi
 
 
-def drawn_in_lines(args) -> bool:
+def drawn_in_lines(args: Namespace) -> bool:
     """Whether a line drawing is asked for; refused with what it cannot show."""
     if kind_of(args.output) != "svg":
         if args.line_width is not None:
@@ -86,7 +88,7 @@ def drawn_in_lines(args) -> bool:
     return True
 
 
-def camera(args) -> tuple[float, float]:
+def camera(args: Namespace) -> tuple[float, float]:
     """Azimuth and elevation; the section with the side that is kept. Refused: what does not go together, or cannot be read."""
     if args.view and (args.azimuth is not None or args.elevation is not None):
         raise WrongUsage("--view says from where; leave out --azimuth and --elevation")
@@ -110,7 +112,7 @@ def camera(args) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def turning(made: Mesh, args, pixels: tuple[float, float], angles: tuple[float, float], shown: dict) -> None:
+def turning(made: Mesh, args: Namespace, pixels: tuple[float, float], angles: tuple[float, float], shown: dict) -> None:
     """Pictures from all round as one that is animated."""
     from .turntable import animated
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 
 from .cards import CARDS
@@ -11,7 +12,12 @@ from .formats import kind_of
 from .inputs import build, keep_file
 from .moduli import SURFACE_WRITES, write_surface
 from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
+from .solid import Solid
 from .terminal import Progress, figure, say, warn
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .laws import Law
 
 __all__ = ["LINES", "conductivity", "law", "lines_of_law", "permeability", "stiffness"]
 
@@ -22,7 +28,7 @@ Found = StiffnessReport | ConductivityReport | PermeabilityReport
 AXES = ("11", "22", "33", "23", "13", "12")
 
 
-def stiffness(args) -> StiffnessReport:
+def stiffness(args: Namespace) -> StiffnessReport:
     """The stiffness that is asked for; written where a file is named."""
     solid = placed(args)
     with Progress("stiffness", args.progress) as progress:
@@ -40,7 +46,7 @@ def stiffness(args) -> StiffnessReport:
     return found
 
 
-def conductivity(args) -> ConductivityReport:
+def conductivity(args: Namespace) -> ConductivityReport:
     """The conductivity that is asked for; written where a file is named."""
     solid = placed(args)
     with Progress("conductivity", args.progress) as progress:
@@ -51,7 +57,7 @@ def conductivity(args) -> ConductivityReport:
     return found
 
 
-def permeability(args) -> PermeabilityReport:
+def permeability(args: Namespace) -> PermeabilityReport:
     """The permeability that is asked for; written where a file is named."""
     solid = placed(args)
     with Progress("permeability", args.progress) as progress:
@@ -62,8 +68,8 @@ def permeability(args) -> PermeabilityReport:
     return found
 
 
-def law(args):
-    """The law that is asked for, a `laws.Law`; written where files are named."""
+def law(args: Namespace) -> Law:
+    """The law that is asked for; written where files are named."""
     from . import laws
 
     for name in args.output or ():
@@ -80,7 +86,7 @@ def law(args):
     return found
 
 
-def placed(args):
+def placed(args: Namespace) -> Solid:
     """The solid of the design, after the outputs' places have been checked."""
     for name in args.output or ():
         check_place(name)
@@ -88,7 +94,7 @@ def placed(args):
     return build(args.design, tell=not args.json)
 
 
-def say_found(found: Found, args) -> None:
+def say_found(found: Found, args: Namespace) -> None:
     """Says warnings and what was written."""
     for warning in found.warnings:
         warn(warning["message"], warning["path"], not args.json)
@@ -190,7 +196,7 @@ def lines_of_permeability(found: PermeabilityReport) -> list[str]:
 PRINTED = ("fraction", "E", "G", "nu", "zener", "k", "K", "tortuosity", "area")
 
 
-def lines_of_law(found) -> list[str]:
+def lines_of_law(found: Law) -> list[str]:
     """The figures for people."""
     shown = [name for name in PRINTED if name in found.columns]
     rows = [[figure(v, 0) for v in row] for row in zip(*(found.columns[name] for name in shown), strict=True)]

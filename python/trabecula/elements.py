@@ -17,6 +17,8 @@ from .errors import warn_caller
 from .formats import MESHIO_READS, MESHIO_WRITES, TET_READS, dotted, kind_of
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     import meshio
     import numpy as np
     from numpy.typing import NDArray
@@ -61,7 +63,7 @@ BASE, PER_BYTE = 3e9, 100.0
 kept: list[NDArray] | None = None
 
 
-def needed(kind: str = ""):
+def needed(kind: str = "") -> ModuleType:
     """The package meshio; one clear error if it, or what it needs for files of this ``kind``, is missing."""
     try:
         import meshio

@@ -36,7 +36,7 @@ class DesignError(ValueError):
         self.found = found
         self.nearest = nearest
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         return (type(self), (str(self), self.path, self.line, self.message, self.found, self.nearest))
 
 
@@ -51,7 +51,7 @@ class DesignWarning(UserWarning):
         self.message = message
         self.path = path
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         return (type(self), (self.message, self.path))
 
 

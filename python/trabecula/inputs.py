@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from argparse import Namespace
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
@@ -49,7 +51,7 @@ def keep_inputs(design: str, output: str) -> None:
 
 
 @contextmanager
-def quietly(category: type[Warning]):
+def quietly(category: type[Warning]) -> Iterator[None]:
     """Without warnings of this category."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", category)
@@ -83,7 +85,7 @@ def build(path: str, tell: bool = True) -> Solid:
     return solid
 
 
-def resolution(args) -> dict:
+def resolution(args: Namespace) -> dict:
     """The resolution that was asked for."""
     if getattr(args, "chord", None) is not None:
         return {"chord": args.chord}
@@ -92,7 +94,7 @@ def resolution(args) -> dict:
     return {"per_cell": args.per_cell}
 
 
-def surface(args) -> Mesh:
+def surface(args: Namespace) -> Mesh:
     """The mesh of a design or a mesh file."""
     if is_design(args.file):
         return meshed(build(args.file), args)
@@ -101,7 +103,7 @@ def surface(args) -> Mesh:
     return Mesh.read(args.file, solid=getattr(args, "solid", None))
 
 
-def meshed(solid: Solid, args) -> Mesh:
+def meshed(solid: Solid, args: Namespace) -> Mesh:
     """The mesh of a solid, to be measured or drawn: its connected components are in the result, so nothing warns of them."""
     with Progress("meshing", args.progress) as progress, quietly(IslandsWarning):
         return solid.mesh(threads=args.threads, progress=progress, **resolution(args))

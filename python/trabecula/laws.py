@@ -27,6 +27,11 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from .solid import Solid
 
+    #: The number of threads, and what is called as the work goes on.
+    Work = tuple[int | None, Callable[[int, int], Any] | None]
+    #: What is found by column, and what was warned of.
+    Found = tuple[dict[str, float | None], list[str]]
+
 __all__ = ["PROPERTIES", "Law", "law", "monotone"]
 
 #: What a law may have, and the columns of each, with what they are. Lengths are in units of the wavelength; of tetrahedral
@@ -298,10 +303,10 @@ def _mean(values: Sequence[float] | np.ndarray) -> float:
     return float(np.mean(values))
 
 
-def _stiffness(solid, n: int, nu: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+def _stiffness(solid: Solid, n: int, nu: float, work: Work) -> Found:
     found = solid.stiffness(n, 1.0, nu, None, False, *work)
     c = np.array(found.C)
-    made = {
+    made: dict[str, float | None] = {
         "C11": _mean(c[[0, 1, 2], [0, 1, 2]]),
         "C12": _mean(c[[0, 0, 1], [1, 2, 2]]),
         "C44": _mean(c[[3, 4, 5], [3, 4, 5]]),
@@ -309,19 +314,19 @@ def _stiffness(solid, n: int, nu: float, work: tuple) -> tuple[dict[str, float |
         "zener": found.zener,
         "bulk": found.bulk,
     }
-    if found.E is not None:
+    if found.E and found.G and found.nu and found.E_error and found.G_error:
         made |= {"E": _mean(found.E), "G": _mean(found.G), "nu": _mean(found.nu)}
         made |= {"E_error": max(found.E_error), "G_error": max(found.G_error)}
     return made, [f"stiffness: {w['message']}" for w in found.warnings]
 
 
-def _conductivity(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+def _conductivity(solid: Solid, n: int, _: float, work: Work) -> Found:
     found = solid.conductivity(n, 0.0, False, *work)
     made: dict[str, float | None] = {"k": _mean(np.diag(found.k)), "k_error": max(found.axis_errors)}
     return made, [f"conductivity: {w['message']}" for w in found.warnings]
 
 
-def _permeability(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+def _permeability(solid: Solid, n: int, _: float, work: Work) -> Found:
     found = solid.permeability(n, None, *work)
     unit = _unit(solid)
     made = {
@@ -333,11 +338,16 @@ def _permeability(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float
     return made, [f"permeability: {w['message']}" for w in found.warnings]
 
 
-def _area(solid, n: int, _: float, work: tuple) -> tuple[dict[str, float | None], list[str]]:
+def _area(solid: Solid, n: int, _: float, work: Work) -> Found:
     return {"area": solid._cell.area(n, work[0]) / solid._cell.volume * _unit(solid)}, []
 
 
-_FOUND = {"stiffness": _stiffness, "conductivity": _conductivity, "permeability": _permeability, "area": _area}
+_FOUND: dict[str, Callable[[Solid, int, float, Work], Found]] = {
+    "stiffness": _stiffness,
+    "conductivity": _conductivity,
+    "permeability": _permeability,
+    "area": _area,
+}
 
 
 def _power(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:

@@ -9,6 +9,8 @@ from . import _core
 from .given import number
 
 if TYPE_CHECKING:
+    from typing import Any
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -21,7 +23,7 @@ __all__ = ["fraction", "iso"]
 def iso(cell: str | dict, fraction: float, part: PartName = "sheet") -> float: ...
 @overload
 def iso(cell: str | dict, fraction: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
-def iso(cell, fraction, part="sheet"):
+def iso(cell: str | dict, fraction: Any, part: PartName = "sheet") -> Any:
     """The level t at which this part of the cell has this solid fraction; numbers or arrays."""
     return _levels(cell, fraction, part, True)
 
@@ -30,12 +32,12 @@ def iso(cell, fraction, part="sheet"):
 def fraction(cell: str | dict, iso: float, part: PartName = "sheet") -> float: ...
 @overload
 def fraction(cell: str | dict, iso: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
-def fraction(cell, iso, part="sheet"):
+def fraction(cell: str | dict, iso: Any, part: PartName = "sheet") -> Any:
     """The solid fraction of this part of the cell at level t; numbers or arrays."""
     return _levels(cell, iso, part, False)
 
 
-def _levels(cell, values, part, to_iso):
+def _levels(cell: str | dict, values: Any, part: PartName, to_iso: bool) -> float | NDArray[np.float64]:
     if isinstance(values, str) or not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
         return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
     import numpy as np

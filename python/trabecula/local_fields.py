@@ -39,9 +39,11 @@ def _shares(solid: Seen, nodes: NDArray[np.float64]) -> dict[str, NDArray[np.flo
 
 def _fraction(solid: Seen, nodes: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """The mean of the lattices' fractions by their shares."""
+    import numpy as np
+
     shares = _shares(solid, nodes)
     of = {name: solid.cell_at(nodes, name)["fraction"] for name in shares}
-    return {"solid_fraction": sum(share * of[name] for name, share in shares.items())}  # type: ignore[dict-item]
+    return {"solid_fraction": sum((share * of[name] for name, share in shares.items()), np.zeros(len(nodes)))}
 
 
 def _of_greatest(solid: Seen, nodes: NDArray[np.float64], what: str) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import warnings
+from argparse import Namespace
 
 from . import _core
 from .errors import DesignWarning, Refused, WrongUsage
@@ -15,6 +16,7 @@ from .inputs import build, keep_inputs, meshed, same_file, surface
 from .solid import Solid
 from .terminal import Progress, figure, put_json, settle, warn, warned
 from .texts import table, voids
+from .transition import Transitions
 
 __all__ = ["draw", "measure", "transitions"]
 
@@ -22,7 +24,7 @@ __all__ = ["draw", "measure", "transitions"]
 NEEDS = "that of curved ones is known of tetrahedra alone, of a .vtu with meshio: pip install 'trabecula[fe]'"
 
 
-def measure(args) -> None:
+def measure(args: Namespace) -> None:
     """``trabecula measure``."""
     check_measure(args)
     if kind_of(args.file) in VOLUME_READS:
@@ -34,7 +36,7 @@ def measure(args) -> None:
         raise WrongUsage("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
     if solid is None and args.transitions is not None:
         raise WrongUsage("--transitions is for designs with a blend; this is a mesh")
-    found = () if solid is None else transitions(solid, args.transitions, args.file)
+    found = Transitions([]) if solid is None else transitions(solid, args.transitions, args.file)
     held, figures = None, None
     apart = apart_of(args)
     if solid is None or args.region or args.thickness or closely(solid, args):
@@ -94,7 +96,7 @@ def objects_of(file: str) -> list[str]:
     return _core.Mesh.objects(_core.read_file(file))
 
 
-def apart_of(args) -> dict | None:
+def apart_of(args: Namespace) -> dict | None:
     """How the figures are to be taken in ranges, if they are."""
     if not (args.resume or args.cluster or args.new):
         return None
@@ -103,7 +105,7 @@ def apart_of(args) -> dict | None:
     return {"cluster": args.cluster, "new": args.new, "design_file": args.file if args.resume or args.new else None}
 
 
-def measure_tets(args) -> None:
+def measure_tets(args: Namespace) -> None:
     """``trabecula measure`` of a file of tetrahedra: volume, dihedral angles, sets."""
     import numpy as np
 
@@ -158,7 +160,7 @@ def measure_tets(args) -> None:
         print(f"set {name}: {', '.join(f'{of[what]} {what}' for what in ('nodes', 'elements', 'faces') if what in of)}")
 
 
-def check_measure(args) -> None:
+def check_measure(args: Namespace) -> None:
     """Refuses options of ``measure`` that do not go together, before any work is done."""
     if not args.thickness and (args.step is not None or args.histogram is not None):
         raise WrongUsage("--step and --histogram belong to --thickness; add it")
@@ -170,7 +172,7 @@ def check_measure(args) -> None:
             raise Refused(f"{args.histogram} is read by this command; name another picture")
 
 
-def closely(solid: Solid, args) -> bool:
+def closely(solid: Solid, args: Namespace) -> bool:
     """Whether a design is beams alone that are meshed without a grid."""
     return solid._chord_of(None, args.edge, args.per_cell, "drop-small") is not None
 
@@ -197,7 +199,7 @@ def warn_measured(name: str, figures: dict) -> None:
         warn(voids(figures["voids"]))
 
 
-def transitions(solid: Solid, picture: str | None, design: str | None = None, tell: bool = True):
+def transitions(solid: Solid, picture: str | None, design: str | None = None, tell: bool = True) -> Transitions:
     """The transitions of a blend, if one is asked for with a picture that can be written."""
     found = solid.transitions()
     for warning in found.warnings:
@@ -212,7 +214,7 @@ def transitions(solid: Solid, picture: str | None, design: str | None = None, te
     return found
 
 
-def draw(found, picture: str | None) -> None:
+def draw(found: Transitions, picture: str | None) -> None:
     """Draws the transitions to ``picture`` if one is asked for."""
     if picture is not None:
         found.render(picture)

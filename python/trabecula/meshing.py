@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 
 from .errors import Refused, WrongUsage
@@ -22,12 +23,12 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Literal
 
-    from .reports import SimplifyReport
+    from .reports import SimplifyReport, SurfaceReport
 
 __all__ = ["mesh", "simplify"]
 
 
-def mesh(args) -> None:
+def mesh(args: Namespace) -> None:
     """``trabecula mesh``."""
     if args.beams:
         return mesh_beams(args)
@@ -80,7 +81,7 @@ def mesh(args) -> None:
     )
 
 
-def mesh_step(args) -> None:
+def mesh_step(args: Namespace) -> None:
     """``trabecula mesh -o OUT.step``."""
     names = ("parts", "open", "smooth", "chord", "edge", "per_cell", "triangles")
     why = "a STEP file: it has smooth faces, and all components"
@@ -103,7 +104,7 @@ def mesh_step(args) -> None:
     without_mesh(args, save, words)
 
 
-def mesh_beams(args) -> None:
+def mesh_beams(args: Namespace) -> None:
     """``trabecula mesh --beams``."""
     kind = kind_of(args.output)
     names = ["implicit", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "protocol", "assembly"]
@@ -121,7 +122,7 @@ def mesh_beams(args) -> None:
     without_mesh(args, save, words)
 
 
-def mesh_implicit(args) -> None:
+def mesh_implicit(args: Namespace) -> None:
     """``trabecula mesh --implicit``."""
     names = ["no_mesh", "parts", "open", "smooth", "edge", "per_cell", "tolerance", "triangles", "chord"]
     names += ["protocol", "assembly"]
@@ -133,7 +134,7 @@ def mesh_implicit(args) -> None:
     without_mesh(args, lambda solid: solid.save_implicit(args.output), words)
 
 
-def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) -> None:
+def refuse_others(args: Namespace, names: Sequence[str], islands: Sequence[str], why: str) -> None:
     """Refuses options that do not go with a file without triangles; ``islands`` are what --islands may be."""
     names = [*names, "resume", "cluster", "new", "shards"]
     given = ["--" + name.replace("_", "-") for name in names if getattr(args, name)]
@@ -143,7 +144,7 @@ def refuse_others(args, names: Sequence[str], islands: Sequence[str], why: str) 
         raise WrongUsage(f"{given[0]} does not go with {why}; leave it out")
 
 
-def without_mesh(args, save: Callable[[Solid], dict], words: Callable[[dict], str]) -> None:
+def without_mesh(args: Namespace, save: Callable[[Solid], dict], words: Callable[[dict], str]) -> None:
     """Saves a solid to a file that has no triangles; ``words`` puts its figures into words."""
     check_place(args.output)
     start = time.perf_counter()
@@ -157,7 +158,7 @@ def without_mesh(args, save: Callable[[Solid], dict], words: Callable[[dict], st
     say(f"{args.output}: {words(made)}, {made['seconds']:.2f} s")
 
 
-def mesh_parts(args) -> None:
+def mesh_parts(args: Namespace) -> None:
     """``trabecula mesh --parts``."""
     others = {
         "--open": args.open,
@@ -203,7 +204,7 @@ def mesh_parts(args) -> None:
     say(f"edge {edge:g} mm, {seconds:.2f} s")
 
 
-def meshed_file(solid: Solid, args, progress: Progress) -> dict:
+def meshed_file(solid: Solid, args: Namespace, progress: Progress) -> dict:
     """Meshes a solid into a file, streamed where it can be; gives the figures."""
     lighter = args.tolerance is not None or args.triangles is not None
     options = {**resolution(args), "threads": args.threads, "progress": progress, "islands": args.islands}
@@ -224,7 +225,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     if streams and not whole:
         given = {"edge": None, "per_cell": None, "chord": None} | options
 
-        def accept(found) -> None:
+        def accept(found: SurfaceReport) -> None:
             if found.cavities:
                 warn(
                     f"{counted(found.cavities, 'closed void')}, from which powder or resin cannot drain; "
@@ -267,20 +268,20 @@ def files_in(name: str) -> list[str]:
     return [os.path.join(name, one) for one in os.listdir(name)] if os.path.isdir(name) else [name]
 
 
-def apart_of(args) -> dict | None:
+def apart_of(args: Namespace) -> dict | None:
     """How a surface is to be made in ranges of tiles, if it is."""
     shards = shard_bytes(args.shards)
     apart = args.resume or args.cluster or args.new or shards
     return {"cluster": args.cluster, "new": args.new, "shards": shards} if apart else None
 
 
-def given_of(args) -> str:
+def given_of(args: Namespace) -> str:
     """The options by which a surface is held in memory as a whole."""
     names = {"--tolerance": args.tolerance, "--triangles": args.triangles, "--smooth": args.smooth, "--open": args.open}
     return ", ".join(name for name, value in names.items() if value)
 
 
-def simplify(args) -> None:
+def simplify(args: Namespace) -> None:
     """``trabecula simplify``."""
     check_place(args.output)
     start = time.perf_counter()
@@ -297,7 +298,7 @@ def simplify(args) -> None:
         put_json(found.to_dict() | {"seconds": round(time.perf_counter() - start, 3)})
 
 
-def simplified(mesh: Mesh, args) -> tuple[Mesh, SimplifyReport]:
+def simplified(mesh: Mesh, args: Namespace) -> tuple[Mesh, SimplifyReport]:
     """The lighter mesh and its figures, and a message on what was done."""
     with Progress("simplifying", args.progress) as progress:
         made = mesh.simplified(args.tolerance, args.triangles, progress)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from argparse import Namespace
 
 from .errors import Refused, WrongUsage
 from .files import check_place
@@ -19,7 +20,7 @@ LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exp
 WORDS = {"start": "from", "stop": "to"}
 
 
-def slice(args) -> None:
+def slice(args: Namespace) -> None:
     """``trabecula slice``: layers, or one section."""
     import numpy  # noqa: F401  wanted by drawings; see `terminal` for why no import waits until then
 
@@ -43,7 +44,7 @@ def slice(args) -> None:
     section(solid, args)
 
 
-def layers(solid: Solid, args) -> None:
+def layers(solid: Solid, args: Namespace) -> None:
     """``trabecula slice --layer``."""
     start = time.perf_counter()
     wanted = (args.layer, args.tolerance, args.start, args.stop, args.step, args.threads, args.adaptive, args.least)
@@ -61,7 +62,7 @@ def layers(solid: Solid, args) -> None:
     say(f"{args.output}: written in {seconds:g} s")
 
 
-def section(solid: Solid, args) -> None:
+def section(solid: Solid, args: Namespace) -> None:
     """``trabecula slice --z`` of any design."""
     low, high = solid.bounds
     if not low[2] <= args.z <= high[2]:
@@ -80,7 +81,7 @@ def section(solid: Solid, args) -> None:
         say(f"{args.output}: written, {args.tolerance:g} mm off at most")
 
 
-def arcs(solid: Solid, args) -> None:
+def arcs(solid: Solid, args: Namespace) -> None:
     """``trabecula slice --z`` of beams, exactly."""
     quadors = solid.quadors(args.beams)
     chord = args.chord or 0.01

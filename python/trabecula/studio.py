@@ -67,7 +67,7 @@ class Studio(ThreadingHTTPServer):
         """The address of the page."""
         return f"http://{HOME}:{self.server_port}/" + ("?design" if self.design is not None else "")
 
-    def handle_error(self, request, client_address) -> None:
+    def handle_error(self, request: object, client_address: object) -> None:
         """A browser that went away is nothing to report."""
 
     def found(self, path: str) -> tuple[bytes, str] | None:
@@ -109,5 +109,5 @@ class Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def log_message(self, *_) -> None:
+    def log_message(self, *_: object) -> None:
         """Says nothing of each request."""

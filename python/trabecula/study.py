@@ -47,7 +47,7 @@ class Study:
 
     design: Design
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.design.sweep:
             raise ValueError(
                 'nothing varies: the design has no [sweep]; give it one, such as "lattice.core.level.fraction" = [0.2, 0.3]'

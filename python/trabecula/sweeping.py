@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any
@@ -24,7 +25,7 @@ from .terminal import Progress, left, say
 __all__ = ["draw", "table_of"]
 
 
-def table_of(design: Design, args) -> dict[str, Any]:
+def table_of(design: Design, args: Namespace) -> dict[str, Any]:
     """Makes the table and writes it; the numbers of rows, of failed ones and of those from an earlier run."""
     if kind_of(args.output) == "svg":
         raise Refused(f"{args.output} is a drawing; name a table (.csv or .parquet), the drawing gets its name")
@@ -62,7 +63,9 @@ def table_of(design: Design, args) -> dict[str, Any]:
     return {"rows": len(made), "failed": len(failed), "resumed": resumed}
 
 
-def make(job: Job, points: list[dict[str, Any]], journal: Journal, add: Callable[[dict[str, Any]], None], args) -> None:
+def make(
+    job: Job, points: list[dict[str, Any]], journal: Journal, add: Callable[[dict[str, Any]], None], args: Namespace
+) -> None:
     """Makes the rows that are not there yet; after any other end says where those are that are."""
     tasks = [(number, point) for number, point in enumerate(points) if number not in journal.rows]
     try:
@@ -88,7 +91,7 @@ def check_plot(job: Job, points: list[dict[str, Any]], wanted: Sequence[str]) ->
             raise Refused(f'--plot: the column "{name}" holds no numbers and has no place on an axis; it can be the colour')
 
 
-def draw(table: str, args, drawing: str) -> None:
+def draw(table: str, args: Namespace, drawing: str) -> None:
     """Draws two columns of a table, or three, and says so."""
     columns = columns_of_table(table)
     try:

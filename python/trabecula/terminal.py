@@ -19,6 +19,11 @@ __all__ = [
     *("say", "settle", "span", "warn", "warned"),
 ]
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
 #: The share between two times that the pace is taken from.
 FINE = 0.002
 
@@ -43,7 +48,7 @@ class Progress:
         _voice.progress = self
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.clear()
         _voice.progress = None
 
@@ -89,7 +94,7 @@ def figure(v: float, nothing: float = 1e-12) -> str:
     return f"{v:.6g}" if abs(v) > nothing else "0" if v == v else "-"
 
 
-def span(v) -> str:
+def span(v: float | list[float] | None) -> str:
     """A number, a range, or none."""
     if v is None:
         return "none"
@@ -123,7 +128,7 @@ def warned() -> list[dict[str, str]]:
     return list(_voice.notices)
 
 
-def put_json(figures) -> None:
+def put_json(figures: object) -> None:
     """Figures as JSON on stdout."""
     print(json.dumps(figures, indent=2))
 
@@ -188,7 +193,7 @@ def interrupts_raise() -> None:
     _install(_raise, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
 
-def _install(handler, *signals) -> None:
+def _install(handler: Callable[[int, FrameType | None], object], *signals: signal.Signals) -> None:
     try:
         for which in signals:
             if signal.getsignal(which) is not signal.SIG_IGN:  # started in the background, or by nohup
@@ -197,7 +202,7 @@ def _install(handler, *signals) -> None:
         pass
 
 
-def _leave(*_) -> None:
+def _leave(*_: object) -> None:
     try:  # noqa: SIM105  contextlib takes time to import
         os.write(2, f"{outcome()}\n".encode(errors="replace"))
     except OSError:
@@ -205,5 +210,5 @@ def _leave(*_) -> None:
     os._exit(130)
 
 
-def _raise(*_) -> None:
+def _raise(*_: object) -> None:
     raise KeyboardInterrupt

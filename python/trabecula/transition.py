@@ -10,12 +10,14 @@ from .files import extension, write_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from typing import Any, overload
+
     from .reports import TransitionReport
 
 __all__ = ["Transitions"]
 
 
-class Transitions(Sequence):
+class Transitions(Sequence["TransitionReport"]):
     """The transitions of a blend, each a ``reports.TransitionReport``. Made by ``Solid.transitions``."""
 
     def __init__(self, found: list[TransitionReport]):
@@ -24,7 +26,14 @@ class Transitions(Sequence):
     def __len__(self) -> int:
         return len(self._found)
 
-    def __getitem__(self, index):
+    if TYPE_CHECKING:
+
+        @overload
+        def __getitem__(self, index: int) -> TransitionReport: ...
+        @overload
+        def __getitem__(self, index: slice) -> list[TransitionReport]: ...
+
+    def __getitem__(self, index: Any) -> Any:
         return self._found[index]
 
     def __iter__(self) -> Iterator[TransitionReport]:

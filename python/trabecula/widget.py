@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import anywidget
 import traitlets
 
@@ -57,5 +60,5 @@ class Widget(anywidget.AnyWidget):
         self.observe(lambda change: view.look.update({change["name"]: change["new"]}), list(NAMES))
 
     @traitlets.validate(*NAMES)
-    def _checked(self, proposal):
+    def _checked(self, proposal: Mapping[str, Any]) -> Any:
         return checked(self._view, proposal["trait"].name, proposal["value"])
