@@ -102,6 +102,14 @@ def test_code_has_the_types_that_it_should(tmp_path):
     assert found == [(n, line.rpartition("# ")[2]) for n, line in enumerate(TYPED.splitlines(), 1) if "# " in line]
 
 
+def test_package_has_the_types_that_it_says(tmp_path):
+    """mypy finds nothing in the package itself, by its settings in pyproject.toml."""
+    pytest.importorskip("mypy")
+    words = ["--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(tmp_path)]
+    done = subprocess.run([sys.executable, "-m", "mypy", *words], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_report_classes_are_those_of_the_core():
     """python/trabecula/reports.py is what scripts/report_classes.py makes."""
     script = Path(__file__).parent.parent / "scripts" / "report_classes.py"

@@ -1,7 +1,9 @@
 """Tetrahedral meshes: made, read, written, judged; other people's formats and meshers."""
 
+import copy
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -60,6 +62,21 @@ def test_a_ball_is_meshed_face_to_face():
     assert report["fit"]["to_part"]["max"] < 1.5**2 / 8
     assert np.isclose(mesh.least_dihedral.min(), report["quality"]["dihedral"]["min"])
     assert np.allclose(mesh.sizes, np.cbrt(72**0.5 * of))
+
+
+def test_meshes_are_pickled_and_copied(tmp_path):
+    """Of data, of files, of a part in memory, as they are and moved: once and again the same in every array and figure."""
+    (tmp_path / "ball.toml").write_text(DESIGN)
+    ball = lt.TetMesh.of(BALL)
+    ball.write(tmp_path / "ball.vtu")
+    made = [ball, lt.TetMesh.of(tmp_path / "ball.toml", "core"), lt.TetMesh.read(tmp_path / "ball.vtu", unit="cm")]
+    made += [lt.TetMesh.of(lt.Design(lt.region.mesh(ball.boundary()), BALL["lattice"])), ball.scaled([-1, 2, 3]).rotated("z", 30).moved([0.1, 0, 7])]
+    for mesh in made:
+        again = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(mesh))))
+        assert copy.deepcopy(mesh) is mesh is copy.copy(mesh) and repr(again) == repr(mesh)
+        assert again.report() == mesh.report() and again.zone_names == mesh.zone_names
+        for of in ("nodes", "tets", "zones", "sizes"):
+            np.testing.assert_array_equal(getattr(again, of), getattr(mesh, of))
 
 
 def test_the_command_tells_and_writes(tmp_path):

@@ -13,6 +13,7 @@ from .files import extension, read_text, whole_file
 from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
 from .given import fixed, positive, thread_count, whole
 from .machine import file_size, fits
+from .reproducible import Unchanging
 from .thickness import Thickness
 from .transforms import Transformed, determinant
 
@@ -47,7 +48,7 @@ MANY = 1_000_000
 TITLE = "Lattice part"
 
 
-class Mesh(Drawn, Transformed):
+class Mesh(Drawn, Transformed, Unchanging):
     """A triangle mesh. Made by ``Solid.mesh``, read from a file by ``Mesh.read``, or ``Mesh.of`` arrays.
 
     It never changes, and its arrays are read-only: ``moved``, ``scaled`` and ``rotated`` give another. So a copy is the mesh
@@ -152,12 +153,6 @@ class Mesh(Drawn, Transformed):
 
         cells = [("triangle", self.triangles.astype(np.int64))]
         return package("meshio").Mesh(self.vertices.copy(), cells, cell_data={"cut": [self.cut.astype(np.uint8)]})
-
-    def __copy__(self) -> Mesh:
-        return self
-
-    def __deepcopy__(self, memo: dict) -> Mesh:
-        return self
 
     def __reduce__(self) -> tuple:
         state = (self._core.vertices, self._core.triangles, self._core.known_cut(), self._core.design)

@@ -1,4 +1,4 @@
-"""What solids make of themselves, and how that is copied and pickled."""
+"""What never changes, and what solids make of themselves: how that is copied and pickled."""
 
 from __future__ import annotations
 
@@ -9,13 +9,24 @@ if TYPE_CHECKING:
 
     from .resolution import Resolution
 
+    Own = TypeVar("Own", bound="Unchanging")
     Self = TypeVar("Self", bound="Reproducible")
 
-__all__ = ["Reproducible"]
+__all__ = ["Reproducible", "Unchanging"]
 
 
-class Reproducible:
-    """What a solid, or its beams, make by a plan. It never changes, so a copy is itself. Pickled it is the solid's design and
+class Unchanging:
+    """What never changes: a copy is itself."""
+
+    def __copy__(self: Own) -> Own:
+        return self
+
+    def __deepcopy__(self: Own, memo: dict) -> Own:
+        return self
+
+
+class Reproducible(Unchanging):
+    """What a solid, or its beams, make by a plan. Pickled it is the solid's design and
     the plan, and is made again where that is read: the same in every bit.
     """
 
@@ -32,12 +43,6 @@ class Reproducible:
         made = object.__new__(type(self))
         made._solid, made._plan, made._core = self._solid, self._plan | more, core
         return made
-
-    def __copy__(self: Self) -> Self:
-        return self
-
-    def __deepcopy__(self: Self, memo: dict) -> Self:
-        return self
 
     def __reduce__(self) -> tuple:
         return type(self), (self._solid, self._plan)

@@ -21,6 +21,7 @@ from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
+from .reproducible import Unchanging
 from .seen import Seen
 from .simulated import Simulated
 from .thickness import Thickness
@@ -69,7 +70,7 @@ SPOOLED = 24
 SMOOTHED = 200
 
 
-class Solid(Seen, Simulated):
+class Solid(Seen, Simulated, Unchanging):
     """A region and the lattice in it. Made by ``Design.build``.
 
     It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
@@ -80,12 +81,6 @@ class Solid(Seen, Simulated):
         self._folder = folder
         #: Data in memory that its design names, which are there as long as this.
         self._memory = memory
-
-    def __copy__(self) -> Solid:
-        return self
-
-    def __deepcopy__(self, memo: dict) -> Solid:
-        return self
 
     def __reduce__(self) -> tuple:
         return _rebuilt, (self._core.design, self._folder, self._memory)
@@ -413,9 +408,8 @@ class Solid(Seen, Simulated):
         need, held = self._core.expected_beams(chord)
         fits(2 * TRIANGLE * held, f"{held:.3g} triangles of hubs that differ", edge=chord, power=1, word="chord")
         fits(file_size("stl", need), f"{need:.3g} triangles", path, chord, 1, "chord")
-        name = os.fsdecode(path)
-        if special(name):
-            return self._core.stream_beams(name, chord, thread_count(threads))
+        if special(os.fsdecode(path)):
+            return self._core.stream_beams(path, chord, thread_count(threads))
         with whole_file(path) as temporary:
             return self._core.stream_beams(temporary, chord, thread_count(threads))
 

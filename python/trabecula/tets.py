@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,26 +16,38 @@ from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
 from .given import fixed, thread_count
 from .mesh import Mesh
+from .reproducible import Unchanging
 from .transforms import Transformed
 
 if TYPE_CHECKING:
+    from typing import Any
+
     import numpy as np
     from numpy.typing import NDArray
 
     from .reports import TetMeshReport
 
+    #: The rows of M, c and s of x ↦ c + M (x − c) + s.
+    Affine = tuple[list[list[float]], list[float], list[float]]
+
 __all__ = ["TetMesh"]
 
 
-class TetMesh(Picture, Transformed, ElementMesh):
+class TetMesh(Picture, Transformed, Unchanging, ElementMesh):
     """A tetrahedral mesh, checked: conforming, every tetrahedron of positive volume.
 
     Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``. It never changes, and its arrays are read-only:
-    ``moved``, ``scaled`` and ``rotated`` give another.
+    ``moved``, ``scaled`` and ``rotated`` give another. So a copy is the mesh itself. Pickled it is the design or the file's
+    name, and is made again where that is read: the same in every bit.
     """
 
-    def __init__(self, core: _core.TetMesh):
+    def __init__(self, core: _core.TetMesh, maker: str, given: tuple, moves: tuple[Affine, ...] = ()):
         self._core = core
+        #: What of the core made it and of what; the affine maps since then.
+        self._plan = maker, given, moves
+
+    def __reduce__(self) -> tuple:
+        return _again, self._plan
 
     @staticmethod
     def of(design: Design | dict | str | os.PathLike[str], lattice: str | None = None, threads: int | None = None) -> TetMesh:
@@ -47,14 +60,13 @@ class TetMesh(Picture, Transformed, ElementMesh):
         """
         threads = thread_count(threads)
         if isinstance(design, Design):
-            data, folder = design.to_dict(), design.folder or os.getcwd()
-            return made_of(_core.TetMesh.from_data(data, folder, lattice, threads))
+            return made_by("from_data", design.to_dict(), design.folder or os.getcwd(), lattice, threads=threads)
         if isinstance(design, dict):
-            return made_of(_core.TetMesh.from_data(design, os.getcwd(), lattice, threads))
+            return made_by("from_data", copy.deepcopy(design), os.getcwd(), lattice, threads=threads)
         name = os.fsdecode(design)
         kind = extension(name, ("toml", "json"))
         folder = os.path.dirname(os.path.abspath(name))
-        return made_of(_core.TetMesh.from_text(read_text(name), kind == "json", name, folder, lattice, threads))
+        return made_by("from_text", read_text(name), kind == "json", name, folder, lattice, threads=threads)
 
     @staticmethod
     def read(path: str | os.PathLike[str], unit: str | None = None, split: bool = False) -> TetMesh:
@@ -68,7 +80,7 @@ class TetMesh(Picture, Transformed, ElementMesh):
         name = os.path.abspath(os.fsdecode(path))
         extension(name, TET_READS)
         try:
-            return made_of(_core.TetMesh.read(name, os.getcwd(), unit, split))
+            return made_by("read", name, os.getcwd(), unit, split)
         except DesignError as error:
             raise ValueError(str(error)) from None
 
@@ -131,7 +143,8 @@ class TetMesh(Picture, Transformed, ElementMesh):
         return self.report().quality.volume
 
     def _transformed(self, matrix: list[list[float]], center: list[float], shift: list[float]) -> TetMesh:
-        return TetMesh(self._core.transformed(matrix, center, shift))
+        maker, given, moves = self._plan
+        return TetMesh(self._core.transformed(matrix, center, shift), maker, given, (*moves, (matrix, center, shift)))
 
     def boundary(self) -> Mesh:
         """The boundary as a triangle mesh."""
@@ -174,9 +187,17 @@ class TetMesh(Picture, Transformed, ElementMesh):
         return self.boundary()
 
 
-def made_of(core: _core.TetMesh) -> TetMesh:
-    """The mesh; its warnings are raised."""
-    made = TetMesh(core)
-    for path, message in core.warnings:
+def made_by(maker: str, *given: Any, **how: Any) -> TetMesh:
+    """The mesh that the core makes so; its warnings are raised."""
+    made = TetMesh(getattr(_core.TetMesh, maker)(*given, **how), maker, given)
+    for path, message in made._core.warnings:
         warn_caller(message, path)
     return made
+
+
+def _again(maker: str, given: tuple, moves: tuple[Affine, ...]) -> TetMesh:
+    """A mesh that was pickled."""
+    core = getattr(_core.TetMesh, maker)(*given)
+    for move in moves:
+        core = core.transformed(*move)
+    return TetMesh(core, maker, given, moves)
