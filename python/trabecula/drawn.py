@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from . import _core
     from ._core import Cut, Eye, Inside, Lines, Shares, Tint
     from .mesh import Mesh
-    from .seen import Seen
+    from .solid import Solid
     from .viewer import View
 
     #: Numbers, or shares by name, at points (n, 3) in mm.
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         projection: str
         scale_bar: bool
         axes: bool
-        solid: Seen | None
+        solid: Solid | None
         inside: At | None
         up: Sequence[float]
 
@@ -120,7 +120,7 @@ class Drawn(Picture, ABC):
         projection: str = "perspective",
         scale_bar: bool = False,
         axes: bool = False,
-        solid: Seen | None = None,
+        solid: Solid | None = None,
         inside: At | None = None,
         up: Sequence[float] = (0, 0, 1),
     ) -> bytes:
@@ -163,7 +163,7 @@ class Drawn(Picture, ABC):
         projection: str = "perspective",
         scale_bar: bool = False,
         axes: bool = False,
-        solid: Seen | None = None,
+        solid: Solid | None = None,
         color: ArrayLike | At | str | None = None,
         label: str = "",
         span: tuple[float, float] | None = None,

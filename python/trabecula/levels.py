@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, overload
 
 from . import _core
 from .given import number
 
 if TYPE_CHECKING:
-    from typing import Any
-
     import numpy as np
     from numpy.typing import NDArray
 
+    from .given import Vector
     from .names import PartName
 
 __all__ = ["fraction", "iso"]
@@ -22,8 +20,8 @@ __all__ = ["fraction", "iso"]
 @overload
 def iso(cell: str | dict, fraction: float, part: PartName = "sheet") -> float: ...
 @overload
-def iso(cell: str | dict, fraction: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
-def iso(cell: str | dict, fraction: Any, part: PartName = "sheet") -> Any:
+def iso(cell: str | dict, fraction: Vector, part: PartName = "sheet") -> NDArray[np.float64]: ...
+def iso(cell: str | dict, fraction: float | Vector, part: PartName = "sheet") -> float | NDArray[np.float64]:
     """The level t at which this part of the cell has this solid fraction; numbers or arrays."""
     return _levels(cell, fraction, part, True)
 
@@ -31,13 +29,13 @@ def iso(cell: str | dict, fraction: Any, part: PartName = "sheet") -> Any:
 @overload
 def fraction(cell: str | dict, iso: float, part: PartName = "sheet") -> float: ...
 @overload
-def fraction(cell: str | dict, iso: Sequence[float] | NDArray, part: PartName = "sheet") -> NDArray[np.float64]: ...
-def fraction(cell: str | dict, iso: Any, part: PartName = "sheet") -> Any:
+def fraction(cell: str | dict, iso: Vector, part: PartName = "sheet") -> NDArray[np.float64]: ...
+def fraction(cell: str | dict, iso: float | Vector, part: PartName = "sheet") -> float | NDArray[np.float64]:
     """The solid fraction of this part of the cell at level t; numbers or arrays."""
     return _levels(cell, iso, part, False)
 
 
-def _levels(cell: str | dict, values: Any, part: PartName, to_iso: bool) -> float | NDArray[np.float64]:
+def _levels(cell: str | dict, values: float | Vector, part: PartName, to_iso: bool) -> float | NDArray[np.float64]:
     if isinstance(values, str) or not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
         return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
     import numpy as np

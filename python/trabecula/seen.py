@@ -13,7 +13,6 @@ from .shown import look
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
     from .drawn import Look
     from .mesh import Mesh
-    from .viewer import View
 
 __all__ = ["Seen"]
 
@@ -112,21 +110,6 @@ class Seen(Picture, Resolution):
         made = self.mesh(edge=edge, per_cell=per_cell, threads=threads)
         shown = dict(seen(made, towards(azimuth, elevation))) if seen else {}
         made.render(path, size, azimuth, elevation, **{**shown, "solid": self, **style})
-
-    def view(
-        self,
-        values: ArrayLike | Callable[[NDArray], ArrayLike] | str | None = None,
-        label: str = "",
-        edge: float | None = None,
-        per_cell: float | None = None,
-        **look: Any,
-    ) -> View:
-        """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``. ``values`` may also be what ``render``
-        shows as a number: ``"fraction"``, ``"stiffness"``, ``"angle"``, ``"spacing"`` or ``"density"``.
-        """
-        from .viewer import view
-
-        return view(self, values, label, edge, per_cell, **look)
 
     def _solved(self, lattice: str | None) -> str:
         """The lattice of that name, or else the first whose map was solved for."""

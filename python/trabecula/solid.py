@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         StepReport,
         SurfaceReport,
     )
+    from .viewer import View
 
     Progress = Callable[[int, int], Any]
 
@@ -740,6 +741,21 @@ class Solid(Seen, Simulated, Unchanging):
         """
         wanted = None if step is None else positive("step", step)
         return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
+
+    def view(
+        self,
+        values: ArrayLike | Callable[[NDArray], ArrayLike] | str | None = None,
+        label: str = "",
+        edge: float | None = None,
+        per_cell: float | None = None,
+        **look: Any,
+    ) -> View:
+        """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``. ``values`` may also be what ``render``
+        shows as a number: ``"fraction"``, ``"stiffness"``, ``"angle"``, ``"spacing"`` or ``"density"``.
+        """
+        from .viewer import view
+
+        return view(self, values, label, edge, per_cell, **look)
 
     def _picture(self) -> Mesh:
         low, high = self.bounds

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from .mesh import Mesh
     from .seen import Seen
+    from .solid import Solid
     from .widget import Widget
 
     Progress = Callable[[int, int], Any]
@@ -59,7 +60,7 @@ THICKNESS = "thickness"
 
 
 def view(
-    shape: Mesh | Seen,
+    shape: Mesh | Solid,
     values: ArrayLike | At | str | None = None,
     label: str = "",
     edge: float | None = None,
@@ -166,7 +167,7 @@ class View:
         if not (values is None or isinstance(values, str) or callable(values)):
             self._values = numbers("values", values, (mesh.counts[0], "vertex"))
             scale_of("values", self._values)
-        self._solid: Seen | None = None
+        self._solid: Solid | None = None
         self._progress = progress
         self._widget: Widget | None = None
         self.look: dict[str, Any] = {
