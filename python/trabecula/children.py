@@ -57,8 +57,8 @@ def run(command: list[str], folder: str, limit: float) -> str | None:
 
 def arrays(module: str, given: Sequence[str], name: str, reader: str, memory: float, limit: float) -> list[NDArray]:
     """The arrays that a module of this package makes of what is ``given``, as a child of at most ``limit`` seconds and
-    ``memory`` bytes: it is run with these texts, the file that it writes them to, and the bytes. Raises ValueError with one
-    sentence on ``name``, the file that the package ``reader`` reads.
+    ``memory`` bytes, in its order: it is run with these texts, the file that it writes them to, and the bytes. Raises
+    ValueError with one sentence on ``name``, the file that the package ``reader`` reads.
     """
     import numpy as np
 

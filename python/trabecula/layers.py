@@ -194,7 +194,8 @@ class Layers(Reproducible, Sequence["Layer"]):
         needed = [max(1, math.ceil(e / edge - 1e-9)) for e in extents]
         if size is not None and len(size) != 2:
             raise ValueError(f"size is the width and height of a picture in pixels, found {len(size)} numbers")
-        pixels = [whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in size or needed]
+        asked = needed if size is None else size
+        pixels = [whole("size", n, 1, MOST_PIXELS) if n <= MOST_PIXELS else _too_many(n, edge) for n in asked]
         if any(n < m for n, m in zip(pixels, needed, strict=True)):
             raise ValueError(
                 f"pictures of {pixels[0]} x {pixels[1]} pixels of {edge:g} mm are smaller than the part: it needs "

@@ -26,8 +26,8 @@ class Unchanging:
 
 
 class Reproducible(Unchanging):
-    """What a solid, or its beams, make by a plan. Pickled it is the solid's design and
-    the plan, and is made again where that is read: the same in every bit.
+    """What a solid, or its beams, make by a plan. Pickled it is the solid's design and the plan, and is made again where that
+    is read: the same in every bit.
     """
 
     #: What makes it, of the core's part of the solid and the plan.

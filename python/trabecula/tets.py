@@ -62,7 +62,7 @@ class TetMesh(Picture, Transformed, Unchanging, ElementMesh):
         if isinstance(design, Design):
             return made_by("from_data", design.to_dict(), design.folder or os.getcwd(), lattice, threads=threads)
         if isinstance(design, dict):
-            return made_by("from_data", copy.deepcopy(design), os.getcwd(), lattice, threads=threads)
+            return made_by("from_data", design, os.getcwd(), lattice, threads=threads)
         name = os.fsdecode(design)
         kind = extension(name, ("toml", "json"))
         folder = os.path.dirname(os.path.abspath(name))
@@ -189,7 +189,7 @@ class TetMesh(Picture, Transformed, Unchanging, ElementMesh):
 
 def made_by(maker: str, *given: Any, **how: Any) -> TetMesh:
     """The mesh that the core makes so; its warnings are raised."""
-    made = TetMesh(getattr(_core.TetMesh, maker)(*given, **how), maker, given)
+    made = TetMesh(getattr(_core.TetMesh, maker)(*given, **how), maker, copy.deepcopy(given))
     for path, message in made._core.warnings:
         warn_caller(message, path)
     return made
