@@ -7,8 +7,8 @@ from argparse import Namespace
 from .camera import NO_SCALE, VIEWS, section_plane, towards
 from .drawn import WALL, pixels_of
 from .errors import Refused, WrongUsage
-from .files import check_place, kind_of, write_bytes
-from .formats import is_design
+from .files import check_place, write_bytes
+from .formats import is_design, kind_of
 from .inputs import build, meshed, surface
 from .mesh import Mesh
 from .shown import OF_MESH, look
