@@ -369,8 +369,9 @@ class Solid(Seen, Simulated, Unchanging):
         says which are wanted, in which order; ``edge``, ``per_cell``, ``threads`` and ``progress`` are those of ``mesh``.
 
         All come from one grid: the triangles between two of them are the same in both, turned round, with the same
-        coordinates to the last bit, and the three volumes (mm³) add up to the region's. No piece is dropped, since that would
-        leave a gap: several pieces of one part are warned of, or refused by ``islands = "error"``.
+        coordinates to the last bit, and the three volumes (mm³) add up to the region's: to rounding where the region is flat,
+        with an error of the order of ``edge``² where it is curved. No piece is dropped, since that would leave a gap: several
+        pieces of one part are warned of, or refused by ``islands = "error"``.
 
         A ValueError if the design is not a sheet (a network, beams, tetrahedra, a blend with any of these), or where its wall
         has no thickness, so that nothing is between lower and upper.
