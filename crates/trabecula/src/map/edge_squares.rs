@@ -76,9 +76,8 @@ impl EdgeSquares {
 
     /// The solution of the normal equations, from `start` on.
     fn solve(&self, right: Vec<f64>, start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
-        let none = vec![0.0; start.len()];
         let operator = |x: &[f64], out: &mut [f64]| {
-            self.multigrid.finest().apply(x, out, |_, _, product| product, &none);
+            self.multigrid.apply(x, out);
             if let Some(tilt) = tilt {
                 out.par_iter_mut().zip(tilt.apply(x)).for_each(|(o, more)| *o += more);
             }

@@ -3,9 +3,15 @@
 //! A V-cycle: Chebyshev polynomials of Jacobi's iteration as smoothers, trilinear interpolation, and on each coarser grid the seven
 //! points of the same form whose edges count what the edges about them count together, Galerkin's operator with its mass lumped. The
 //! cycle is symmetric, so it can precondition conjugate gradients, and neither its order nor its sums depend on the number of threads.
+//!
+//! Three values at a node may turn along edges, as phases with branches do across cuts: on each grid, and on the way from one to the next,
+//! they turn as they would straight from the one node to the other. Coarse grids that do not know what lies across a cut leave waves
+//! along it to conjugate gradients, in steps that grow with the grid.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
+
+use geometry::math::{Mat3, Vec3, apply, scale, sub, transpose};
 
 /// Degree of the smoothers, and the least eigenvalue of D⁻¹A that they are for; no eigenvalue exceeds 2, by Gershgorin's circles.
 const SMOOTHER: (usize, f64) = (3, 0.3);
@@ -22,6 +28,16 @@ const SHARED: usize = 16_384;
 /// A grid and the grids coarser than it.
 pub(super) struct Multigrid {
     levels: Vec<Level>,
+    /// Values at each node.
+    parts: usize,
+}
+
+/// Two nodes, the second of another level where values are interpolated; what that counts; and what values of the first are turned by on
+/// the way to the second.
+struct Link {
+    ends: [usize; 2],
+    counts: f64,
+    turn: Mat3,
 }
 
 /// Σ w (Φⱼ − Φᵢ)² over the edges of a grid, x running fastest, and Σ m Φᵢ² over its nodes.
@@ -35,6 +51,10 @@ pub(super) struct Level {
     inverse: Vec<f64>,
     /// The axes along which the next level has half as many nodes.
     halved: [bool; 3],
+    /// Edges along which values turn, which `edges` lacks.
+    turned: Vec<Link>,
+    /// Nodes of the next level whose values turn on the way to nodes of this one.
+    shared: Vec<Link>,
 }
 
 /// Vectors of one level: the right-hand side, the solution, its last change, and what is left.
@@ -53,20 +73,39 @@ impl Multigrid {
         while let Some(coarser) = levels.last_mut().and_then(|l| l.coarsened(&mut step)) {
             levels.push(coarser);
         }
-        Multigrid { levels }
+        Multigrid { levels, parts: 1 }
+    }
+
+    /// The same for three values at each node, one after the other for all nodes, which on the way between two near nodes are `turned`.
+    pub fn turned(mut self, turn: impl Fn([usize; 2]) -> Option<Mat3> + Sync) -> Multigrid {
+        self.parts = 3;
+        let mut nodes: Vec<usize> = (0..self.finest().inverse.len()).collect();
+        for l in 0..self.levels.len() {
+            let (above, below) = self.levels.split_at_mut(l + 1);
+            let level = &mut above[l];
+            level.cut(|ends| turn(ends.map(|n| nodes[n])));
+            let Some(next) = below.first() else { break };
+            let here: Vec<usize> = (0..next.inverse.len()).map(|n| nodes[level.under(next, n)]).collect();
+            level.shared = level.interpolated(next, |[n, m]| turn([nodes[n], here[m]]));
+            nodes = here;
+        }
+        self
     }
 
     pub fn finest(&self) -> &Level {
         &self.levels[0]
     }
 
+    /// A x on the finest level.
+    pub fn apply(&self, x: &[f64], out: &mut [f64]) {
+        self.finest().apply(x, out, None);
+    }
+
     /// A cycle: what takes residuals of the finest level to corrections.
     pub fn cycle(&self) -> impl FnMut(&[f64], &mut [f64]) + '_ {
-        let zeros = |l: &Level| Work {
-            right: vec![0.0; l.inverse.len()],
-            x: vec![0.0; l.inverse.len()],
-            change: vec![0.0; l.inverse.len()],
-            left: vec![0.0; l.inverse.len()],
+        let zeros = |l: &Level| {
+            let zeros = || vec![0.0; self.parts * l.inverse.len()];
+            Work { right: zeros(), x: zeros(), change: zeros(), left: zeros() }
         };
         let mut work: Vec<Work> = self.levels.iter().map(zeros).collect();
         move |r, z| {
@@ -82,7 +121,7 @@ fn descend(levels: &[Level], work: &mut [Work]) {
     let ([_, ..], [next, ..]) = (coarser, &mut *below) else { return level.smooth(own, COARSEST, true) };
     level.smooth(own, SMOOTHER, true);
     let Work { right, x, left, .. } = own;
-    level.apply(x, left, |_, right, product| right - product, right);
+    level.apply(x, left, Some(right));
     level.restrict(&coarser[0], left, &mut next.right);
     descend(coarser, below);
     level.prolong(&coarser[0], &below[0].x, &mut own.x);
@@ -99,7 +138,7 @@ impl Level {
         };
         let all = shape.iter().product();
         let inverse = (0..all).into_par_iter().map(sum).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
-        Level { shape, edges, mass, inverse, halved: [false; 3] }
+        Level { shape, edges, mass, inverse, halved: [false; 3], turned: Vec::new(), shared: Vec::new() }
     }
 
     /// The next level; `None` where no axis can be halved.
@@ -162,18 +201,68 @@ impl Level {
         }
     }
 
-    /// Gives each entry of `out` what `of` makes of it, of the entry of `given` and of that of A x.
-    pub fn apply(&self, x: &[f64], out: &mut [f64], of: impl Fn(f64, f64, f64) -> f64 + Sync, given: &[f64]) {
+    /// Takes edges along which values turn out of the others.
+    fn cut(&mut self, turn: impl Fn([usize; 2]) -> Option<Mat3> + Sync) {
+        let strides = [1, self.shape[0], self.shape[0] * self.shape[1]];
+        for (edges, stride) in self.edges.iter_mut().zip(strides) {
+            let link = |(n, counts): (usize, &f64)| link([n, n + stride], *counts, &turn);
+            let found: Vec<Link> = edges.par_iter().enumerate().filter_map(link).collect();
+            found.iter().for_each(|l| edges[l.ends[0]] = 0.0);
+            self.turned.extend(found);
+        }
+    }
+
+    /// The nodes of this level and those of the next that have a share in them, where values turn on the way.
+    fn interpolated(&self, next: &Level, turn: impl Fn([usize; 2]) -> Option<Mat3> + Sync) -> Vec<Link> {
+        let ([nx, ny, _], [cx, cy, _]) = (self.shape, next.shape);
+        let of = |n: usize| {
+            let [x, y, z] = [n % nx, n / nx % ny, n / nx / ny];
+            let mut all = Vec::new();
+            for (k, wz) in self.sources(2, z) {
+                for (j, wy) in self.sources(1, y) {
+                    let along = self.sources(0, x).into_iter();
+                    all.extend(along.filter_map(|(i, wx)| link([n, (k * cy + j) * cx + i], wx * wy * wz, &turn)));
+                }
+            }
+            all
+        };
+        (0..self.inverse.len()).into_par_iter().flat_map_iter(of).collect()
+    }
+
+    /// The node at which node `n` of the next level is, or the nearest to it.
+    fn under(&self, next: &Level, n: usize) -> usize {
+        let at = [n % next.shape[0], n / next.shape[0] % next.shape[1], n / next.shape[0] / next.shape[1]];
+        let [i, j, k]: [usize; 3] =
+            core::array::from_fn(|a| if self.halved[a] { (2 * at[a]).min(self.shape[a] - 1) } else { at[a] });
+        (k * self.shape[1] + j) * self.shape[0] + i
+    }
+
+    /// A x, or what it leaves of a right-hand side.
+    fn apply(&self, x: &[f64], out: &mut [f64], right: Option<&[f64]>) {
+        let len = self.inverse.len();
+        for (i, (x, out)) in x.chunks(len).zip(out.chunks_mut(len)).enumerate() {
+            self.apply_untwisted(x, out, right.map(|r| &r[i * len..]));
+        }
+        let sign = if right.is_some() { -1.0 } else { 1.0 };
+        for Link { ends: [n, m], counts, turn } in &self.turned {
+            let off = scale(sub(values(x, len, *n), apply(&transpose(turn), values(x, len, *m))), sign * counts);
+            add_to(out, len, *n, off);
+            add_to(out, len, *m, scale(apply(turn, off), -1.0));
+        }
+    }
+
+    /// The same for one value at each node, without the edges along which values turn.
+    fn apply_untwisted(&self, x: &[f64], out: &mut [f64], right: Option<&[f64]>) {
         let nx = self.shape[0];
-        let rows = |(at, (out, given)): (usize, (&mut [f64], &[f64]))| {
-            let mut product = vec![0.0; nx];
-            for (i, (out, given)) in out.chunks_mut(nx).zip(given.chunks(nx)).enumerate() {
-                self.row(x, at * ROWS + i, &mut product);
-                out.iter_mut().zip(given).zip(&product).for_each(|((o, b), p)| *o = of(*o, *b, *p));
+        let rows = |(at, out): (usize, &mut [f64])| {
+            for (row, out) in (at * ROWS..).zip(out.chunks_mut(nx)) {
+                self.row(x, row, out);
+                if let Some(right) = right {
+                    out.iter_mut().zip(&right[row * nx..]).for_each(|(o, b)| *o = b - *o);
+                }
             }
         };
-        let chunks = out.par_chunks_mut(nx * ROWS).zip(given.par_chunks(nx * ROWS));
-        chunks.enumerate().with_min_len(SHARED.div_ceil(nx * ROWS)).for_each(rows);
+        out.par_chunks_mut(nx * ROWS).enumerate().with_min_len(SHARED.div_ceil(nx * ROWS)).for_each(rows);
     }
 
     /// Row number `row` of A x.
@@ -214,25 +303,38 @@ impl Level {
             let first = anew && i == 0;
             match first {
                 true => left.copy_from_slice(right),
-                false => self.apply(x, left, |_, right, product| right - product, right),
+                false => self.apply(x, left, Some(right)),
             }
-            let parts = (
-                x.par_chunks_mut(SHARED),
-                change.par_chunks_mut(SHARED),
-                left.par_chunks(SHARED),
-                self.inverse.par_chunks(SHARED),
-            );
-            parts.into_par_iter().for_each(|(x, change, left, inverse)| {
-                for (((x, c), l), d) in x.iter_mut().zip(change).zip(left).zip(inverse) {
-                    *c = if i == 0 { more * d * l } else { keep * *c + more * d * l };
-                    *x = if first { *c } else { *x + *c };
-                }
-            });
+            let len = self.inverse.len();
+            let all = x.chunks_mut(len).zip(change.chunks_mut(len)).zip(left.chunks(len));
+            for ((x, change), left) in all {
+                let parts = (
+                    x.par_chunks_mut(SHARED),
+                    change.par_chunks_mut(SHARED),
+                    left.par_chunks(SHARED),
+                    self.inverse.par_chunks(SHARED),
+                );
+                parts.into_par_iter().for_each(|(x, change, left, inverse)| {
+                    for (((x, c), l), d) in x.iter_mut().zip(change).zip(left).zip(inverse) {
+                        *c = if i == 0 { more * d * l } else { keep * *c + more * d * l };
+                        *x = if first { *c } else { *x + *c };
+                    }
+                });
+            }
         }
     }
 
     /// What a vector of this level is on the next: the transpose of `prolong`.
     fn restrict(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+        let [own, next] = [self, coarser].map(|l| l.inverse.len());
+        to.chunks_mut(next).zip(from.chunks(own)).for_each(|(to, from)| self.restrict_untwisted(coarser, from, to));
+        for Link { ends: [n, m], counts, turn } in &self.shared {
+            let r = values(from, own, *n);
+            add_to(to, next, *m, scale(sub(apply(turn, r), r), *counts));
+        }
+    }
+
+    fn restrict_untwisted(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
         to.par_chunks_mut(cx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
@@ -251,6 +353,15 @@ impl Level {
 
     /// Adds the trilinear interpolation of a vector of the next level.
     fn prolong(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+        let [own, next] = [self, coarser].map(|l| l.inverse.len());
+        to.chunks_mut(own).zip(from.chunks(next)).for_each(|(to, from)| self.prolong_untwisted(coarser, from, to));
+        for Link { ends: [n, m], counts, turn } in &self.shared {
+            let z = values(from, next, *m);
+            add_to(to, own, *n, scale(sub(apply(&transpose(turn), z), z), *counts));
+        }
+    }
+
+    fn prolong_untwisted(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
         to.par_chunks_mut(nx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
@@ -268,6 +379,22 @@ impl Level {
             }
         });
     }
+}
+
+/// The link between two nodes if it counts anything and values turn along it.
+fn link(ends: [usize; 2], counts: f64, turn: impl Fn([usize; 2]) -> Option<Mat3>) -> Option<Link> {
+    let turn = if counts > 0.0 { turn(ends)? } else { return None };
+    Some(Link { ends, counts, turn })
+}
+
+/// The three values at a node.
+fn values(x: &[f64], len: usize, node: usize) -> Vec3 {
+    [0, 1, 2].map(|i| x[i * len + node])
+}
+
+/// Adds to the three values at a node.
+fn add_to(x: &mut [f64], len: usize, node: usize, by: Vec3) {
+    by.iter().enumerate().for_each(|(i, by)| x[i * len + node] += by);
 }
 
 /// What the edges along a row give of A x.
