@@ -13,6 +13,8 @@ use geometry::math::{
     IDENTITY, Mat3, Vec3, add, apply, cross, dot, norm, product, scale, sin_cos_turns, sub, transpose, unit,
 };
 
+/// Half a turn of the angle about a line over six edges of a grid is more than this along one of them.
+const STEEP: f64 = 0.08;
 /// Directions of the cuts that are tried.
 const DIRECTIONS: usize = 48;
 
@@ -105,7 +107,32 @@ impl BranchCuts {
     /// The sense in which the cut of a line lies between two near nodes; zero where it does not.
     pub fn crossed(&self, line: usize, [a, b]: [usize; 2]) -> i32 {
         let angle = &self.cuts[line].angle;
-        (self.sense * (angle[a] - angle[b])).round() as i32
+        let fall = self.sense * (angle[a] - angle[b]);
+        // So mostly, and sooner known than rounded.
+        if fall.abs() < 0.5 { 0 } else { fall.round() as i32 }
+    }
+
+    /// Whether a cut may lie between each node and another that is up to one step below it and up to two above it along each axis.
+    pub fn near(&self, grid: &Grid) -> Vec<bool> {
+        let strides = grid.strides();
+        let steep = |n: &usize| {
+            let at = grid.index(*n);
+            let rise = |c: &Cut, m: usize| (c.angle[m] - c.angle[*n]).abs();
+            let above = (0..3).filter(|a| at[*a] + 1 < grid.shape[*a]).map(|a| n + strides[a]);
+            above.into_iter().any(|m| self.cuts.iter().any(|c| rise(c, m) > STEEP))
+        };
+        let mut near = vec![false; grid.len()];
+        for n in (0..grid.len()).into_par_iter().filter(steep).collect::<Vec<usize>>() {
+            let at = grid.index(n);
+            let [x, y, z] = [0, 1, 2].map(|a| at[a].saturating_sub(2)..=(at[a] + 1).min(grid.shape[a] - 1));
+            for k in z {
+                for j in y.clone() {
+                    let row = j * strides[1] + k * strides[2];
+                    near[row + x.start()..=row + x.end()].fill(true);
+                }
+            }
+        }
+        near
     }
 
     /// Whether any cut lies between two near nodes.

@@ -1,6 +1,7 @@
 //! Branches of frames at covered lines: labels of axes that agree all over the part outside the cores but across cuts, and the rotation
 //! at each cut.
 
+use core::f64::consts::SQRT_2;
 use std::collections::VecDeque;
 
 use rayon::prelude::*;
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 use super::branch_cuts::{BranchCuts, Move};
 use super::phase::Wanted;
 use super::phase_target::{Laid, Target};
-use super::singular_lines::Alike;
+use super::singular_lines::{Alike, agreement};
 use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};
 
@@ -29,7 +30,7 @@ pub(super) fn labels(laid: &Laid, target: &Target, count: &[bool], cuts: &Branch
                 let own = product(&frames[n], &labels[n].unwrap_or(IDENTITY));
                 for m in grid.neighbours(n) {
                     if labels[m].is_none() && (count[m] || !inner) && !cuts.any([n, m]) {
-                        labels[m] = Some(nearest(&own, &frames[m], &turns).1);
+                        labels[m] = Some(nearest(&own, &frames[m], &turns));
                         queue.push_back(m);
                     }
                 }
@@ -61,7 +62,7 @@ pub(super) fn rotations(
     let edges = (0..grid.len()).into_par_iter().filter(|n| count[*n]).flat_map_iter(|n| {
         let above = grid.neighbours(n).filter(move |m| *m > n && count[*m]);
         let turns = &turns;
-        above.map(move |m| (n, m, nearest(&frames[n], &frames[m], turns).1))
+        above.map(move |m| (n, m, nearest(&frames[n], &frames[m], turns)))
     });
     let crossed = |n: usize, m: usize| -> Vec<(usize, i32)> {
         (0..cuts.len()).map(|line| (line, cuts.crossed(line, [n, m]))).filter(|(_, sense)| *sense != 0).collect()
@@ -127,14 +128,14 @@ fn unlike(at: Vec3, wanted: &Wanted) -> Fault {
     Fault::new("core", message)
 }
 
-/// The rotation after which a frame is nearest to another, and how near: one and twice the cosine of the angle.
-fn nearest(to: &Mat3, frame: &Mat3, turns: &[Mat3]) -> (f64, Mat3) {
+/// The rotation after which a frame is nearest to another: the two agree by one and twice the cosine of the angle.
+fn nearest(to: &Mat3, frame: &Mat3, turns: &[Mat3]) -> Mat3 {
+    // Mostly they agree as they are: within an eighth of a turn no other rotation is nearer.
+    if agreement(to, frame) > 1.0 + SQRT_2 {
+        return IDENTITY;
+    }
     let all = turns.iter().map(|t| (agreement(to, &product(frame, t)), *t));
-    all.fold((f64::NEG_INFINITY, IDENTITY), |best, t| if t.0 > best.0 { t } else { best })
-}
-
-fn agreement(a: &Mat3, b: &Mat3) -> f64 {
-    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+    all.fold((f64::NEG_INFINITY, IDENTITY), |best, t| if t.0 > best.0 { t } else { best }).1
 }
 
 impl Target {

@@ -48,20 +48,27 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
         });
         all.filter_map(move |by| offset(n, by).map(|m| (by, m)))
     };
+    let (strides, close) = (grid.strides(), cuts.near(&grid));
+    let stencil: [(usize, f64); 27] = core::array::from_fn(|c| {
+        let by = [c % 3, c / 3 % 3, c / 9];
+        let weight = by.iter().map(|b| if *b == 1 { 4.0 / 3.0 } else { -1.0 / 6.0 }).product();
+        ((0..3).map(|a| by[a] * strides[a]).sum(), weight)
+    });
+    let first: usize = strides.iter().sum();
     let coefficient = |n: usize| {
-        if near(n, -1..=1).count() < 27 {
+        if (0..3).any(|a| at(n)[a] == 0 || at(n)[a] + 1 == grid.shape[a]) {
             return values[n];
         }
-        near(n, -1..=1).fold([0.0; 3], |sum, (by, m)| {
-            let weight: f64 = by.iter().map(|b| if *b == 0 { 4.0 / 3.0 } else { -1.0 / 6.0 }).product();
-            let v = if cuts.any([n, m]) { cuts.between([m, n]).of(values[m]) } else { values[m] };
-            add(sum, scale(v, weight))
+        stencil.iter().fold([0.0; 3], |sum, (by, weight)| {
+            let m = n - first + by;
+            let v = if close[n] && cuts.any([n, m]) { cuts.between([m, n]).of(values[m]) } else { values[m] };
+            add(sum, scale(v, *weight))
         })
     };
     let coefficients: Vec<Vec3> = (0..grid.len()).into_par_iter().map(coefficient).collect();
     let inner = |n: &usize| (0..3).all(|a| at(*n)[a] > 0 && at(*n)[a] + 2 < grid.shape[a]);
     let local = |n: usize| {
-        if !near(n, -1..=2).any(|(_, m)| cuts.any([n, m])) {
+        if !close[n] || !near(n, -1..=2).any(|(_, m)| cuts.any([n, m])) {
             return None;
         }
         let mut own = Box::new([[0.0; 3]; 64]);
@@ -72,7 +79,6 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
     let mut rows = vec![false; grid.shape[1] * grid.shape[2]];
     cells.keys().for_each(|n| rows[n / grid.shape[0]] = true);
     let mut torn = vec![false; grid.len()];
-    let strides = grid.strides();
     for n in cells.keys() {
         for (a, stride) in strides.into_iter().enumerate() {
             for (one, other) in [(*n, n + stride), (n - stride, *n)] {

@@ -185,7 +185,7 @@ fn third(m: &Mat3) -> Vec3 {
 }
 
 /// One and twice the cosine of the angle between two frames.
-fn agreement(a: &Mat3, b: &Mat3) -> f64 {
+pub(super) fn agreement(a: &Mat3, b: &Mat3) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
 }
 
