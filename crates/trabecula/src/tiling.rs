@@ -26,7 +26,7 @@ use crate::cell::{Cut, Part};
 use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
 use crate::map::Tets;
-use crate::map::curved_tets::within;
+use crate::map::bent_tets::within;
 use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;

@@ -10,7 +10,7 @@ use sources::{files, is_test, root, shipped};
 mod sources;
 
 /// The doors are left out: the Python classes of a mesh and a solid make each other.
-const CRATES: [&str; 3] = ["geometry", "beams", "homogenise"];
+const CRATES: [&str; 4] = ["geometry", "beams", "homogenise", "trabecula"];
 
 /// The path of a module from its crate; empty for the crate itself.
 type Module = Vec<String>;

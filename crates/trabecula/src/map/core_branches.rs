@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
-use super::phase::Wanted;
 use super::phase_target::{Laid, Target};
+use super::phase_wanted::Wanted;
 use super::singular_lines::{Alike, agreement};
 use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};

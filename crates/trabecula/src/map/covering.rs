@@ -3,18 +3,19 @@
 use super::branch_cuts::BranchCuts;
 use super::branched_solve::{Branched, Numbers};
 use super::core_branches::{labels, rotations};
+use super::core_cover::{CoreFill, Covering};
 use super::cut_cells::{self, CutCells};
 use super::edge_squares::weights;
 use super::judged::{Judged, fold_at_node, fold_between};
 use super::pace;
 use super::periods::{least, nearest};
-use super::phase::{Found, Settings, Wanted};
+use super::phase_found::Found;
 use super::phase_target::{LEAST_ROOT, Laid, Target, wavelengths};
+use super::phase_wanted::{Settings, Wanted};
 use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::winding::Winding;
 use crate::field::Field;
-use crate::kind::Kind;
 use crate::region::{OutsideTube, Tube, smoothed};
 use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub, unit};
@@ -31,25 +32,6 @@ const END: f64 = 3.0;
 
 /// Least cosine of the angle between the ends of lines that face each other and the way from one to the other.
 const FACING: f64 = 0.7;
-
-/// What the core of a singular line is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
-#[kind(noun = "core")]
-pub enum CoreFill {
-    /// Solid.
-    Solid,
-    /// Void.
-    Void,
-}
-
-/// How singular lines are covered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Covering {
-    /// What their cores are.
-    pub fill: CoreFill,
-    /// The radius of the cores, mm; half the wavelength at the lines if none.
-    pub radius: Option<f64>,
-}
 
 /// The cores of a map.
 #[derive(Clone, Debug)]

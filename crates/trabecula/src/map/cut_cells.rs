@@ -13,7 +13,7 @@ use super::branch_cuts::{BranchCuts, Move};
 use super::phase_grid::Grid;
 use super::spline::Spline;
 use geometry::cubic_spline::{slopes, weights};
-use geometry::math::{Aabb, Mat3, Vec3, add, norm, product, scale, spectral_norm, sub};
+use geometry::math::{Aabb, Mat3, Vec3, add, norm, product, scale, sub};
 
 /// By how much phases on a face may differ from cell to cell, turns: rounding.
 const APART: f64 = 1e-6;
@@ -187,18 +187,4 @@ fn sum(c: &Local, [x, y, z]: [[f64; 4]; 3]) -> Vec3 {
         }
     }
     sum
-}
-
-/// A bound of |J| (spectral norm) in a cell with these coefficients: a derivative is a mean of differences along its axis.
-pub(super) fn steepest(c: &Local, step: Vec3) -> f64 {
-    let (mut middle, mut half) = ([[0.0; 3]; 3], 0.0);
-    for (a, stride) in [1usize, 4, 16].into_iter().enumerate() {
-        for i in 0..3 {
-            let differences = (0..64).filter(|n| n / stride % 4 < 3).map(|n| c[n + stride][i] - c[n][i]);
-            let (lo, hi) = differences.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), d| (lo.min(d), hi.max(d)));
-            middle[i][a] = 0.5 * (lo + hi) / step[a];
-            half += (0.5 * (hi - lo) / step[a]).powi(2);
-        }
-    }
-    spectral_norm(&middle) + half.sqrt()
 }

@@ -1,24 +1,22 @@
 //! Orientation of cells: orthonormal frames from angles, vectors or a stress tensor.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use rayon::prelude::*;
 
+use super::axis::{Axis, constant, toward};
+use super::columns::columns;
+use super::comb::{comb, first_in};
+use super::cube_turns::{cube, nearest};
 use super::cut_cells::CutCells;
 use super::load_cases::Stress;
 use super::phase_grid::Grid;
 use super::principal::{Principal, range};
 use super::singular_lines::Alike;
-use super::smooth_frames::{LEAST_AVERAGE, Octahedral, Smoothing};
+use super::smooth_frames::{Octahedral, Smoothing};
 use super::surface_frames::Surface;
 use super::two_axes::TwoAxes;
 use crate::grade::Grade;
-use geometry::fault::{Fault, number, position};
-use geometry::math::{
-    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
-};
-use geometry::progress::checkpoint;
+use geometry::fault::Fault;
+use geometry::math::{IDENTITY, Mat3, Vec3, cross, determinant, dot, product, rotation, scale, sub, transpose, unit};
 
 /// Orientation of the cell at each position. A frame's columns are the directions of the cell's axes in space.
 #[derive(Clone)]
@@ -31,84 +29,6 @@ pub enum Orientation {
     Frame(TwoAxes),
     /// The axes along the principal directions of a stress.
     Stress(Stress),
-}
-
-/// The direction of an axis.
-#[derive(Clone)]
-pub enum Axis {
-    /// Along a vector v.
-    Vector([Grade; 3]),
-    /// Along the principal direction of the greatest value of a tensor v vᵀ, given as 11, 22, 33, 23, 13, 12: for vectors whose signs
-    /// are arbitrary, which vanish between two opposite ones.
-    Line([Grade; 6]),
-}
-
-/// The least cosine of an axis that is given and one of a combed frame that it stands for.
-const MEANT: f64 = 0.9;
-
-impl Axis {
-    /// What axes without signs are made to agree with first.
-    const UP: Vec3 = [1e-6, 1e-3, 1.0];
-
-    /// Unit vectors at points; those of lines have arbitrary signs.
-    pub(super) fn vectors(&self, points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
-        match self {
-            Axis::Vector(of) => vectors(of, points, key),
-            Axis::Line(of) => along(&columns(of, points, key)?, points, key),
-        }
-    }
-
-    pub(super) fn is_constant(&self) -> bool {
-        match self {
-            Axis::Vector(of) => constant(of),
-            Axis::Line(of) => constant(of),
-        }
-    }
-
-    /// Whether a unit vector is what is given at one of the points.
-    pub(super) fn meaning(&self, points: &[Vec3], key: &str) -> Result<Box<dyn Fn(usize, Vec3) -> bool + Sync>, Fault> {
-        Ok(match self {
-            Axis::Vector(_) => {
-                let given = self.vectors(points, key)?;
-                Box::new(move |n, v| dot(given[n], v) > MEANT)
-            }
-            Axis::Line(of) => {
-                let given = columns(of, points, key)?;
-                Box::new(move |n, v| {
-                    let [xx, yy, zz, yz, xz, xy] = given[n];
-                    let [x, y, z] = square(v).as_chunks::<3>().0[0];
-                    let [p, q, r] = square(v).as_chunks::<3>().0[1];
-                    let along = xx * x + yy * y + zz * z + 2.0 * (yz * p + xz * q + xy * r);
-                    along > MEANT * MEANT * (xx + yy + zz)
-                })
-            }
-        })
-    }
-
-    /// Unit vectors at the nodes of a grid, smoothed, of arbitrary signs.
-    fn smoothed(&self, grid: &Grid, nodes: &[Vec3], key: &str, smoothing: &Smoothing) -> Result<Vec<Vec3>, Fault> {
-        let tensors: Vec<[f64; 6]> = self.vectors(nodes, key)?.iter().map(|v| square(*v)).collect();
-        let averages = smoothing.axes(grid, &tensors);
-        let size = |t: &[f64; 6]| t[0] + t[1] + t[2];
-        let least = LEAST_AVERAGE * averages.iter().map(size).fold(0.0, f64::max);
-        // Far from the region nothing is left of the averages: a node there keeps its own direction.
-        let kept = averages.into_iter().zip(tensors).map(|(mean, own)| if size(&mean) > least { mean } else { own });
-        along(&kept.collect::<Vec<_>>(), nodes, key)
-    }
-}
-
-/// v vᵀ as 11, 22, 33, 23, 13, 12.
-fn square([x, y, z]: Vec3) -> [f64; 6] {
-    [x * x, y * y, z * z, y * z, x * z, x * y]
-}
-
-/// The one of v and −v that is nearer to another vector.
-fn toward(v: Vec3, to: Vec3) -> Vec3 {
-    if dot(v, to) < 0.0 { scale(v, -1.0) } else { v }
-}
-
-fn constant(of: &[Grade]) -> bool {
-    of.iter().all(|g| g.constant().is_some())
 }
 
 impl Orientation {
@@ -296,23 +216,6 @@ fn no_principal() -> Fault {
     Fault::new("stress", message)
 }
 
-/// The principal directions of the greatest values of tensors v vᵀ or sums of such.
-fn along(tensors: &[[f64; 6]], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
-    let one = |(t, p): (&[f64; 6], &Vec3)| {
-        let Principal { frame, values, .. } = Principal::of(t);
-        let i = (0..3).fold(0, |m, i| if values[i] > values[m] { i } else { m });
-        if values[i] < 1e-12 * (t[0] + t[1] + t[2]).max(f64::MIN_POSITIVE) {
-            return Err(no_direction(key, *p));
-        }
-        Ok([frame[0][i], frame[1][i], frame[2][i]])
-    };
-    tensors.par_iter().zip(points).map(one).collect()
-}
-
-fn no_direction(key: &str, p: Vec3) -> Fault {
-    Fault::new(key, format!("the vector is zero at {}; it needs a direction all over the region's bounds", position(p)))
-}
-
 /// The frame between those at the nodes about a point, in the branch of the first of them: their mean, made orthonormal; of the nearest
 /// node where they are too far apart for a mean.
 pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], cuts: Option<&CutCells>, p: Vec3) -> Mat3 {
@@ -335,57 +238,6 @@ pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], cuts: Option<&CutCells>
     transpose(&[x, cross(z, x), z])
 }
 
-/// The frames of first and third axes: the third exactly, the first as nearly as it can.
-pub(super) fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
-    let both = x.into_iter().zip(z).enumerate();
-    both.map(|(n, (x, z))| {
-        let x = sub(x, scale(z, dot(x, z)));
-        if norm(x) < 1e-6 {
-            let message =
-                format!("the first and the third axis are parallel at {}; give two that differ", position(points[n]));
-            return Err(Fault::new("frame.x", message));
-        }
-        let x = unit(x);
-        Ok(transpose(&[x, cross(z, x), z]))
-    })
-    .collect()
-}
-
-/// Values of several grades at points: one tuple for each point.
-pub(super) fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
-    let mut out = vec![[0.0; N]; points.len()];
-    let mut values = vec![0.0; points.len()];
-    for (c, grade) in of.iter().enumerate() {
-        grade.values(points, &mut values);
-        for (n, (o, v)) in out.iter_mut().zip(&values).enumerate() {
-            if !v.is_finite() {
-                return Err(Fault::new(
-                    key,
-                    format!(
-                        "found {} at {}; it must be a finite number all over the region's bounds",
-                        number(*v),
-                        position(points[n])
-                    ),
-                ));
-            }
-            o[c] = *v;
-        }
-    }
-    Ok(out)
-}
-
-/// Unit vectors.
-fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
-    let mut found = columns(of, points, key)?;
-    for (v, p) in found.iter_mut().zip(points) {
-        if norm(*v) < 1e-12 {
-            return Err(no_direction(key, *p));
-        }
-        *v = unit(*v);
-    }
-    Ok(found)
-}
-
 /// The frame of the least turn that takes z to `d`.
 fn turned_from_z(d: Vec3) -> Mat3 {
     let [x, y, z] = d;
@@ -394,34 +246,6 @@ fn turned_from_z(d: Vec3) -> Mat3 {
     }
     let s = 1.0 / (1.0 + z);
     transpose(&[[1.0 - x * x * s, -x * y * s, -x], [-x * y * s, 1.0 - y * y * s, -y], [x, y, z]])
-}
-
-/// The 24 rotations of a cube.
-pub(super) fn cube() -> Vec<Mat3> {
-    let mut all = Vec::new();
-    for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-        for signs in 0..8 {
-            let mut m = [[0.0; 3]; 3];
-            for a in 0..3 {
-                m[p[a]][a] = if signs >> a & 1 == 0 { 1.0 } else { -1.0 };
-            }
-            if determinant(&m) > 0.0 {
-                all.push(m);
-            }
-        }
-    }
-    all
-}
-
-/// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
-pub(super) fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
-    let agree = |m: &Mat3| -> f64 { m.as_flattened().iter().zip(to.as_flattened()).map(|(a, b)| a * b).sum() };
-    // Turns of the cube are a quarter or more: within an eighth, whose cosine this is, there is no nearer one.
-    if agree(f) > 1.0 + core::f64::consts::SQRT_2 {
-        return *f;
-    }
-    let all = turns.iter().map(|t| product(f, t));
-    all.max_by(|a, b| agree(a).total_cmp(&agree(b))).unwrap_or(*f)
 }
 
 /// The frame at a node whose neighbour has the frame `to`: the principal one nearest to it, where there is one. Where
@@ -450,58 +274,6 @@ fn least_turn(from: Vec3, to: Vec3) -> Mat3 {
     let kk = product(&k, &k);
     let s = 1.0 / (1.0 + dot(from, to));
     core::array::from_fn(|i| core::array::from_fn(|j| IDENTITY[i][j] + k[i][j] + s * kk[i][j]))
-}
-
-/// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
-/// nodes come last, so that none depends on them. Returns the first, which has the value that `first` gives it.
-pub(super) fn comb<T: Copy>(
-    grid: &Grid,
-    values: &mut [T],
-    sure: impl Fn(usize) -> f64,
-    first: impl Fn(usize, &T) -> T,
-    agree: impl Fn(usize, &T, &T) -> T,
-) -> usize {
-    let strides = grid.strides();
-    let sure: Vec<f64> = (0..values.len()).map(sure).collect();
-    // The surest first, of equals the first node: the number of a node in this order says when it is its turn, and of the nodes that
-    // it may be reached from the least is the one.
-    let mut order: Vec<u32> = (0..values.len() as u32).collect();
-    order.par_sort_unstable_by(|&a, &b| sure[b as usize].total_cmp(&sure[a as usize]).then(a.cmp(&b)));
-    let mut rank = vec![0u32; order.len()];
-    order.iter().zip(0..).for_each(|(n, r)| rank[*n as usize] = r);
-    let mut reached = vec![false; values.len()];
-    let mut from_rank = vec![u32::MAX; values.len()];
-    let mut heap = BinaryHeap::from([Reverse(0u64)]);
-    let start = order.first().map_or(0, |n| *n as usize);
-    values[start] = first(start, &values[start]);
-    while let Some(Reverse(step)) = heap.pop() {
-        checkpoint();
-        let [node, from] = [step >> 32, step & 0xffff_ffff].map(|r| order[r as usize] as usize);
-        if core::mem::replace(&mut reached[node], true) {
-            continue;
-        }
-        values[node] = agree(node, &values[node], &values[from]);
-        let at = grid.index(node);
-        for a in 0..3 {
-            let below = (at[a] > 0).then(|| node - strides[a]);
-            let above = (at[a] + 1 < grid.shape[a]).then(|| node + strides[a]);
-            for next in below.into_iter().chain(above).filter(|&n| !reached[n]) {
-                if rank[node] < from_rank[next] {
-                    from_rank[next] = rank[node];
-                    heap.push(Reverse(u64::from(rank[next]) << 32 | u64::from(rank[node])));
-                }
-            }
-        }
-    }
-    start
-}
-
-/// How sure nodes are, those in the part before all others, and of these the nearest to it first.
-pub(super) fn first_in<'a>(outside: Option<&'a [f64]>, sure: impl Fn(usize) -> f64 + 'a) -> impl Fn(usize) -> f64 + 'a {
-    move |n| match outside.map(|d| d[n]) {
-        Some(distance) if distance > 0.0 => -distance,
-        _ => sure(n),
-    }
 }
 
 #[cfg(test)]

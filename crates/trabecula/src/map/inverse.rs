@@ -40,62 +40,64 @@ pub(super) fn corners(b: &Aabb) -> [Vec3; 8] {
     core::array::from_fn(|i| core::array::from_fn(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] }))
 }
 
-/// The position (mm) of the phase u by Newton's method from `near`, no step longer than a wavelength.
-pub(super) fn search(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
-    let longest = map.longest();
-    let mut x = near;
-    let mut at = [[0.0; 3]];
-    // Phases jump by whole numbers where they grow round holes; the search follows them without jumps.
-    let mut ahead = [0.0; 3];
-    for _ in 0..STEPS {
-        map.phases(&[x], &mut at);
-        at[0] = add(at[0], ahead);
-        let miss = sub(u, at[0]);
-        if norm(miss) < NEAR {
-            return Some(x);
+impl Phase {
+    /// The position (mm) of the phase u by Newton's method from `near`, no step longer than a wavelength.
+    pub(super) fn search(&self, u: Vec3, near: Vec3) -> Option<Vec3> {
+        let longest = self.longest();
+        let mut x = near;
+        let mut at = [[0.0; 3]];
+        // Phases jump by whole numbers where they grow round holes; the search follows them without jumps.
+        let mut ahead = [0.0; 3];
+        for _ in 0..STEPS {
+            self.phases(&[x], &mut at);
+            at[0] = add(at[0], ahead);
+            let miss = sub(u, at[0]);
+            if norm(miss) < NEAR {
+                return Some(x);
+            }
+            let j = self.jacobian(x);
+            if determinant(&j) <= 0.0 {
+                return None;
+            }
+            let step = apply(&inverse(&j), miss);
+            let long = norm(step);
+            let next = add(x, scale(step, (longest / long).min(1.0)));
+            ahead = self.continued(ahead, x, next);
+            x = next;
         }
-        let j = map.jacobian(x);
-        if determinant(&j) <= 0.0 {
-            return None;
-        }
-        let step = apply(&inverse(&j), miss);
-        let long = norm(step);
-        let next = add(x, scale(step, (longest / long).min(1.0)));
-        ahead = map.continued(ahead, x, next);
-        x = next;
+        None
     }
-    None
-}
 
-/// The cells of a solved map that contain a sample of the box, and their neighbours.
-pub(super) fn searched(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
-    let step = map.wavelength() / FINE;
-    let count = b.size().map(|s| (s / step).ceil().max(1.0) as usize);
-    let at = |i: usize, a: usize| b.min[a] + b.size()[a] * i as f64 / count[a] as f64;
-    let mut nearest: BTreeMap<[i32; 3], (f64, Vec3)> = BTreeMap::new();
-    let mut u = vec![[0.0; 3]; count[0] + 1];
-    for k in 0..=count[2] {
-        for j in 0..=count[1] {
-            let row: Vec<Vec3> = (0..=count[0]).map(|i| [at(i, 0), at(j, 1), at(k, 2)]).collect();
-            map.phases(&row, &mut u);
-            for (p, u) in row.iter().zip(&u) {
-                let off = norm(u.map(|v| v - v.floor() - 0.5));
-                let best = nearest.entry(u.map(whole)).or_insert((off, *p));
-                if off < best.0 {
-                    *best = (off, *p);
+    /// The cells of a solved map that contain a sample of the box, and their neighbours.
+    pub(super) fn searched(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
+        let step = self.wavelength() / FINE;
+        let count = b.size().map(|s| (s / step).ceil().max(1.0) as usize);
+        let at = |i: usize, a: usize| b.min[a] + b.size()[a] * i as f64 / count[a] as f64;
+        let mut nearest: BTreeMap<[i32; 3], (f64, Vec3)> = BTreeMap::new();
+        let mut u = vec![[0.0; 3]; count[0] + 1];
+        for k in 0..=count[2] {
+            for j in 0..=count[1] {
+                let row: Vec<Vec3> = (0..=count[0]).map(|i| [at(i, 0), at(j, 1), at(k, 2)]).collect();
+                self.phases(&row, &mut u);
+                for (p, u) in row.iter().zip(&u) {
+                    let off = norm(u.map(|v| v - v.floor() - 0.5));
+                    let best = nearest.entry(u.map(whole)).or_insert((off, *p));
+                    if off < best.0 {
+                        *best = (off, *p);
+                    }
                 }
             }
         }
-    }
-    let own: Vec<([i32; 3], Vec3)> = nearest.iter().map(|(c, s)| (*c, s.1)).collect();
-    for (cell, near) in own {
-        for n in 0..27 {
-            let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
-            let adjacent = core::array::from_fn(|a| cell[a] + by[a]);
-            nearest.entry(adjacent).or_insert((f64::INFINITY, near));
+        let own: Vec<([i32; 3], Vec3)> = nearest.iter().map(|(c, s)| (*c, s.1)).collect();
+        for (cell, near) in own {
+            for n in 0..27 {
+                let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+                let adjacent = core::array::from_fn(|a| cell[a] + by[a]);
+                nearest.entry(adjacent).or_insert((f64::INFINITY, near));
+            }
         }
+        nearest.into_iter().map(|(c, s)| (c, s.1)).collect()
     }
-    nearest.into_iter().map(|(c, s)| (c, s.1)).collect()
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-use super::frame::columns;
+use super::columns::columns;
 use super::principal::{Principal, matrix};
 use crate::grade::Grade;
 use crate::kind::Kind;
@@ -181,7 +181,7 @@ impl Turned {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::cube;
+    use super::super::cube_turns::cube;
     use super::*;
     use geometry::math::{IDENTITY, rotation};
     use geometry::random::random;

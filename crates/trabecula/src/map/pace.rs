@@ -6,9 +6,9 @@
 //! K can hide from it: the nodes' own shows at the second.
 
 use super::frame::Orientation;
-use super::phase::Wanted;
 use super::phase_grid::Grid;
 use super::phase_target::wavelengths;
+use super::phase_wanted::Wanted;
 use super::spline;
 use crate::field::Field;
 use crate::grade::Grade;

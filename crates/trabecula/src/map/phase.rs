@@ -7,34 +7,30 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::covering::{Cores, Covered, Covering};
+use super::covering::{Cores, Covered};
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
-use super::frame::{Orientation, cube};
-use super::integral::{Integral, Problem, Weights};
+use super::integral::{Integral, Problem};
 use super::judged::{Judged, fold_at_node, fold_between, targets};
 use super::pace;
 use super::periods::{Angles, Period, tried};
+use super::phase_found::Found;
 use super::phase_target::{Laid, Target};
+use super::phase_wanted::{Settings, Wanted};
 use super::region_holes::{MOST, Sought};
 use super::remedy::{folded, remedy};
-use super::singular_lines::{Alike, SingularLine, singular_lines};
+use super::singular_lines::{SingularLine, singular_lines};
 use super::solution::Solution;
 use super::spline::Spline;
 use super::stretch::{MARGINS, Stretch, bounded};
-use super::surface_frames::Aligned;
 use super::winding::Winding;
-use super::{Mapping, Rows, inverse};
+use super::{Mapping, Rows};
 use crate::field::{Block, Field};
-use crate::grade::Grade;
-use crate::region::Region;
-use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, spectral_norm};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, norm, scale, spectral_norm};
 use geometry::progress::checkpoint;
 
-/// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
-const LEAST_RATIO: f64 = 0.001;
 /// The error |∇Φ − K|² of phases of one value, relative to |K|², above which cells round holes are considered though none fold, and the
 /// share of it that is left where they are taken. A grating of three that cannot close misses less than a third: it may follow its target
 /// nearly all the way round, and be torn in one place.
@@ -45,93 +41,6 @@ const SHARP: f64 = 0.5;
 
 /// Nodes beyond the bounds of a part whose cells are held within a range of stretches.
 const PADDING: usize = 2;
-
-/// The target of a map.
-#[derive(Clone)]
-pub struct Wanted {
-    /// Cell edges (mm) along the cell's axes, or the principal directions of a stress.
-    pub wavelength: [Grade; 3],
-    /// Whether they are those along the principal directions of a stress, the greatest value's first.
-    pub by_principal: bool,
-    /// Orientation of the cells.
-    pub orientation: Orientation,
-    /// Relative weight of the map's error; the same everywhere if none.
-    pub weight: Option<Grade>,
-    /// What an error of angle counts, for the same error of spacing (squares of the parts of ∇Φ − K across and along K); 1 if
-    /// both count alike.
-    pub angle_weight: f64,
-    /// The length over which directions, frames and stresses are smoothed, mm.
-    pub smooth: Option<f64>,
-    /// Alignment of an axis of the cells with the region's surface, within a depth.
-    pub align: Option<Aligned>,
-    /// The range in which cells may be stretched; any if none.
-    pub stretch: Option<Stretch>,
-    /// Regions on whose parts of the surface the phase along the normal is a whole number.
-    pub fix: Vec<Region>,
-    /// Moves the lattice (mm).
-    pub offset: Vec3,
-    /// How singular lines are covered, if they are.
-    pub core: Option<Covering>,
-}
-
-impl Wanted {
-    /// Cells of these edges (mm) along their axes, turned so, and nothing else.
-    pub fn new(wavelength: [Grade; 3], orientation: Orientation) -> Wanted {
-        Wanted {
-            wavelength,
-            by_principal: false,
-            orientation,
-            weight: None,
-            angle_weight: 1.0,
-            smooth: None,
-            align: None,
-            stretch: None,
-            fix: Vec::new(),
-            offset: [0.0; 3],
-            core: None,
-        }
-    }
-
-    /// The length over which frames are averaged, mm, if they are.
-    pub(super) fn averaged(&self) -> Option<f64> {
-        self.align.map(|a| a.length(self.smooth)).or(self.smooth)
-    }
-
-    /// What moves phases whose target has a mean.
-    fn shift(&self, mean: &Mat3) -> Vec3 {
-        mean.map(|m| -dot(m, self.offset))
-    }
-
-    /// What counts as the same axes.
-    pub(super) fn alike(&self) -> Alike {
-        if self.align.is_some() { Alike::Turned(cube()) } else { self.orientation.alike() }
-    }
-
-    /// What an error of angle counts, if it is in its range.
-    fn ratio(&self) -> Result<f64, Fault> {
-        let ratio = self.angle_weight;
-        if !(LEAST_RATIO..=1.0 / LEAST_RATIO).contains(&ratio) {
-            let message = format!(
-                "{}; an angle counts from {LEAST_RATIO} to {} times as much as a spacing",
-                number(ratio),
-                number(1.0 / LEAST_RATIO)
-            );
-            return Err(Fault::new("angle_weight", message));
-        }
-        Ok(ratio)
-    }
-}
-
-/// How a map is solved for.
-#[derive(Clone, Copy, Default)]
-pub struct Settings<'a> {
-    /// Spacing of the grid (mm); chosen if not given.
-    pub step: Option<f64>,
-    /// Signed distance of the region that counts; all of the box if none.
-    pub region: Option<&'a dyn Field>,
-    /// Whether the map may fold (det J ≤ 0).
-    pub folds: bool,
-}
 
 /// A solved map.
 pub struct Phase {
@@ -429,11 +338,11 @@ impl Mapping for Phase {
     }
 
     fn position(&self, u: Vec3, near: Vec3) -> Option<Vec3> {
-        inverse::search(self, u, near)
+        self.search(u, near)
     }
 
     fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
-        inverse::searched(self, b)
+        self.searched(b)
     }
 
     fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
@@ -460,19 +369,6 @@ fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
     let within = inside.iter().zip(of).filter(|(inside, _)| **inside || none);
     let smallest = within.map(|(_, w)| w.iter().copied().fold(f64::INFINITY, f64::min));
     smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
-}
-
-/// A solution, and what it was found for.
-pub(super) struct Found {
-    pub target: Target,
-    /// What errors count.
-    pub weights: Weights,
-    pub solution: Solution,
-    pub periods: Vec<Period>,
-    /// The mean of the rows of K.
-    pub mean: Mat3,
-    pub steps: usize,
-    pub judged: Judged,
 }
 
 impl Found {

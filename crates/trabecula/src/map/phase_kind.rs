@@ -1,6 +1,6 @@
 //! The solved map, as it is declared.
 
-use super::stress_kind::StressKind;
+use super::stress_kind::{StressKind, each};
 use super::{
     Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, TwoAxes,
     Wanted, given_twice, shared,
@@ -410,15 +410,4 @@ impl OrientationKind {
             OrientationKind::Stress(of) => Orientation::Stress(of.stress.build(&below("stress"), environment)?),
         })
     }
-}
-
-/// The same for each, with its index in the path.
-pub(super) fn each<const N: usize>(
-    of: &[GradeSpec; N],
-    path: &str,
-    one: &impl Fn(&GradeSpec, String) -> Result<Grade, DesignError>,
-) -> Result<[Grade; N], DesignError> {
-    let made = of.iter().enumerate().map(|(i, g)| one(g, format!("{path}[{i}]")));
-    let mut made = made.collect::<Result<Vec<Grade>, DesignError>>()?.into_iter();
-    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
 }

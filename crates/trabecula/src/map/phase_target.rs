@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::frame::Frames;
-use super::phase::Wanted;
 use super::phase_grid::Grid;
+use super::phase_wanted::Wanted;
 use super::principal_lengths::along_axes;
 use super::smooth_frames::Smoothing;
 use super::surface_frames::Surface;

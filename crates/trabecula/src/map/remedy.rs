@@ -2,7 +2,7 @@
 
 use super::covering;
 use super::frame::Orientation;
-use super::phase::Wanted;
+use super::phase_wanted::Wanted;
 use super::singular_lines::{Alike, SingularLine};
 use geometry::fault::{Fault, number, position};
 use geometry::math::Vec3;

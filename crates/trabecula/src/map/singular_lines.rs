@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn disclinations_are_at_their_place() {
-        let quarter = Alike::Turned(crate::map::frame::cube());
+        let quarter = Alike::Turned(crate::map::cube_turns::cube());
         for (alike, index, turn) in
             [(&Alike::Line, 0.5, 180.0), (&quarter, 0.5, 180.0), (&quarter, -0.25, 90.0), (&equal(), 1.0, 360.0)]
         {
@@ -275,7 +275,7 @@ mod tests {
     /// Where the line lies in a hole of the part there is none, nor in a field that turns by less.
     #[test]
     fn there_is_none_in_a_hole() {
-        let quarter = Alike::Turned(crate::map::frame::cube());
+        let quarter = Alike::Turned(crate::map::cube_turns::cube());
         let hole = |[x, _, z]: Vec3| (x - 0.7).hypot(z - 3.3) > 1.0;
         assert_eq!(found(&quarter, about(0.25), hole), []);
         let slow = |p: Vec3| rotation([20.0 * p[0], 5.0 * p[1] * p[2], -8.0 * p[0]]);
@@ -287,7 +287,7 @@ mod tests {
     /// Signs and axes of the frames do not count, whatever each node has.
     #[test]
     fn arbitrary_axes_change_nothing() {
-        let turns = crate::map::frame::cube();
+        let turns = crate::map::cube_turns::cube();
         let quarter = Alike::Turned(turns.clone());
         let mut s = 3u64;
         let mut any: Vec<usize> =

@@ -9,7 +9,7 @@
 //! The average at a node is φ = (1 − ℓ²Δ)⁻¹ (c q), with the confidence c of each node: it falls off as e^{−d/ℓ}, and only its direction
 //! counts. With mirrored faces the cosines of the DCT-I are the eigenvectors, so a component is one transform forth and back.
 
-use super::frame::{cube, nearest};
+use super::cube_turns::{cube, nearest};
 use super::phase_grid::Grid;
 use super::poisson::Poisson;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, cross, determinant, dot, norm, rotation, scale, sub, transpose};

@@ -6,11 +6,10 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::cut_cells::steepest;
 use super::phase_grid::Grid;
 use crate::field::Block;
 use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
-use geometry::math::{Aabb, Mat3, Vec3};
+use geometry::math::{Aabb, Mat3, Vec3, spectral_norm};
 
 /// Fewest nodes along an axis.
 pub(super) const LEAST: usize = 6;
@@ -450,6 +449,20 @@ fn longest(m: &Mat3) -> f64 {
     // tr (A⁴)² = Σ aᵢⱼ², A = M Mᵀ; the eighth root for A, half of it for M.
     let trace: f64 = a.as_flattened().iter().map(|v| v * v).sum();
     trace.powf(1.0 / 16.0)
+}
+
+/// A bound of |J| (spectral norm) in a cell with these coefficients: a derivative is a mean of differences along its axis.
+fn steepest(c: &[Vec3; 64], step: Vec3) -> f64 {
+    let (mut middle, mut half) = ([[0.0; 3]; 3], 0.0);
+    for (a, stride) in [1usize, 4, 16].into_iter().enumerate() {
+        for i in 0..3 {
+            let differences = (0..64).filter(|n| n / stride % 4 < 3).map(|n| c[n + stride][i] - c[n][i]);
+            let (lo, hi) = differences.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), d| (lo.min(d), hi.max(d)));
+            middle[i][a] = 0.5 * (lo + hi) / step[a];
+            half += (0.5 * (hi - lo) / step[a]).powi(2);
+        }
+    }
+    spectral_norm(&middle) + half.sqrt()
 }
 
 #[cfg(test)]

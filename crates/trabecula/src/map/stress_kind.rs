@@ -1,7 +1,6 @@
 //! Stresses, as they are declared.
 
 use super::load_cases::{CasesBy, Stress};
-use super::phase_kind::each;
 use crate::environment::Environment;
 use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, TableKind, TensorOrder, several};
 use crate::kind::{DesignError, Fault, Key, Kind};
@@ -145,4 +144,15 @@ impl TensorPoints {
 
 fn components(of: &[GradeSpec; 6], path: &str, environment: &Environment) -> Result<[Grade; 6], DesignError> {
     each(of, path, &|of, path| of.build(&Quantity::new(path, environment, Key::NONE)))
+}
+
+/// The same for each, with its index in the path.
+pub(super) fn each<const N: usize>(
+    of: &[GradeSpec; N],
+    path: &str,
+    one: &impl Fn(&GradeSpec, String) -> Result<Grade, DesignError>,
+) -> Result<[Grade; N], DesignError> {
+    let made = of.iter().enumerate().map(|(i, g)| one(g, format!("{path}[{i}]")));
+    let mut made = made.collect::<Result<Vec<Grade>, DesignError>>()?.into_iter();
+    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
 }

@@ -4,8 +4,7 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use super::curved_tets::{Curves, settled};
-use crate::region::Region;
+use super::bent_tets::Curves;
 use geometry::fault::{Fault, position};
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
 use geometry::tetmesh::{FACES, TetMesh};
@@ -129,18 +128,11 @@ impl Tets {
         Ok(out)
     }
 
-    /// As `new`, the tetrahedra at the boundary bent onto the surface of a region of which it is a mesh.
-    ///
-    /// # Errors
-    /// As `new`.
-    pub fn of_region(mesh: &TetMesh, overlap: f64, region: &Region) -> Result<Tets, Fault> {
-        let flat = Tets::new(mesh, overlap)?;
-        let nodes = settled(&flat, &**region);
-        let mut out = if nodes == flat.nodes { flat } else { Tets::new(&TetMesh { nodes, ..mesh.clone() }, overlap)? };
-        let curves = Curves::new(&out, region);
-        out.curves = Some(curves);
-        out.index();
-        Ok(out)
+    /// Its boundary bent.
+    pub(super) fn with(mut self, curves: Curves) -> Tets {
+        self.curves = Some(curves);
+        self.index();
+        self
     }
 
     /// How tetrahedra at the boundary are bent onto a region, if they are.

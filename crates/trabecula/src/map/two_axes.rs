@@ -7,12 +7,15 @@
 
 use rayon::prelude::*;
 
-use super::frame::{Axis, columns, comb, cube, first_in, nearest, squared};
+use super::axis::Axis;
+use super::columns::columns;
+use super::comb::{comb, first_in};
+use super::cube_turns::{cube, nearest};
 use super::phase_grid::Grid;
 use super::smooth_frames::Octahedral;
 use crate::grade::Grade;
-use geometry::fault::Fault;
-use geometry::math::{IDENTITY, Mat3, Vec3, product, transpose, unit};
+use geometry::fault::{Fault, position};
+use geometry::math::{IDENTITY, Mat3, Vec3, cross, dot, norm, product, scale, sub, transpose, unit};
 
 /// The first and the third axis of frames: the third exactly, the first as nearly as it can.
 #[derive(Clone)]
@@ -120,6 +123,22 @@ impl TwoAxes {
         let turns = cube();
         Ok(self.given(points)?.par_iter().zip(like).map(|(f, like)| nearest(f, like, &turns)).collect())
     }
+}
+
+/// The frames of first and third axes: the third exactly, the first as nearly as it can.
+fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+    let both = x.into_iter().zip(z).enumerate();
+    both.map(|(n, (x, z))| {
+        let x = sub(x, scale(z, dot(x, z)));
+        if norm(x) < 1e-6 {
+            let message =
+                format!("the first and the third axis are parallel at {}; give two that differ", position(points[n]));
+            return Err(Fault::new("frame.x", message));
+        }
+        let x = unit(x);
+        Ok(transpose(&[x, cross(z, x), z]))
+    })
+    .collect()
 }
 
 /// The number of pairs of neighbouring nodes of which one has another frame, of those that are alike, nearer to the other's.

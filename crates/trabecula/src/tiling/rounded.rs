@@ -18,7 +18,7 @@ use crate::cell::Part;
 use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
 use crate::map::Tets;
-use crate::map::curved_tets::within;
+use crate::map::bent_tets::within;
 use crate::region::Region;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
 use geometry::tetmesh::TetMesh;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::small_simplices::{Small, Template};
 use crate::cell::tet::{Nodes, Subdivision};
 use crate::map::Tets;
-use crate::map::curved_tets::{BoundaryEdge, Curves};
+use crate::map::bent_tets::{BoundaryEdge, Curves};
 use crate::map::surface_feet::{edge_feet, feet_facing};
 use crate::map::tet_map::NONE;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};

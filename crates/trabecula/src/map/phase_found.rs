@@ -1,0 +1,21 @@
+//! A solution of phases, and what it was found for.
+
+use super::integral::Weights;
+use super::judged::Judged;
+use super::periods::Period;
+use super::phase_target::Target;
+use super::solution::Solution;
+use geometry::math::Mat3;
+
+/// A solution, and what it was found for.
+pub(super) struct Found {
+    pub target: Target,
+    /// What errors count.
+    pub weights: Weights,
+    pub solution: Solution,
+    pub periods: Vec<Period>,
+    /// The mean of the rows of K.
+    pub mean: Mat3,
+    pub steps: usize,
+    pub judged: Judged,
+}
