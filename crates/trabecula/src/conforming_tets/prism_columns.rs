@@ -87,7 +87,7 @@ pub(super) struct Columns {
     /// The faces at each column.
     around: Vec<Vec<u32>>,
     /// The shape that the tetrahedra over each face shall have.
-    wanted: Vec<f64>,
+    pub wanted: Vec<f64>,
     /// The normal of each face at each column over the part of the way asked for that is along it.
     across: Vec<Vec<Vec3>>,
 }

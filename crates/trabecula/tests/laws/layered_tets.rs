@@ -197,3 +197,56 @@ fn layers_of_brackets_have_no_flat_tetrahedra() {
         fair_layers(&format!("{w} x {d} x {h}, {thick} and {other} thick"), &space, size, &mut some);
     }
 }
+
+/// A slanted rod, a tube or a plate with two holes, and its volume.
+fn round_part(kind: usize, some: &mut Random) -> (Region, f64) {
+    let rod = |base: Vec3, axis: Vec3, radius: f64, height: f64| -> Region {
+        Arc::new(Cylinder::new(base, axis, radius, height).expect("cylinder"))
+    };
+    let less = |parts: Vec<Region>| -> Region { Arc::new(Difference::new(parts).expect("difference")) };
+    let (z, pi) = ([0.0, 0.0, 1.0], std::f64::consts::PI);
+    match kind {
+        0 => {
+            let axis = [some.between(-1.0, 1.0), some.between(-1.0, 1.0), 1.0];
+            let (radius, height) = (some.between(5.0, 7.0), some.between(20.0, 30.0));
+            (rod([0.1, 0.2, 0.3], axis, radius, height), pi * radius * radius * height)
+        }
+        1 => {
+            let (hole, wall) = (some.between(5.0, 8.0), some.between(4.0, 6.0));
+            let around = rod([0.0; 3], z, hole + wall, 12.0);
+            let volume = 12.0 * pi * ((hole + wall).powi(2) - hole * hole);
+            (less(vec![around, rod([0.0, 0.0, -1.0], z, hole, 14.0)]), volume)
+        }
+        _ => {
+            let (thick, hole) = (some.between(5.0, 8.0), some.between(3.0, 4.0));
+            let holes = [[9.0, 8.0, -1.0], [30.0, 16.0, -1.0]].map(|at| rod(at, z, hole, thick + 2.0));
+            let volume = thick * (40.0 * 24.0 - 2.0 * pi * hole * hole);
+            (less([cuboid([0.0; 3], [40.0, 24.0, thick])].into_iter().chain(holes).collect()), volume)
+        }
+    }
+}
+
+/// Layers move with the nodes of the boundary that balance its flat faces: the part's volume to 0.3 % at a fifteenth of its longest side,
+/// and angles that are hardly worse.
+#[test]
+fn layers_of_curved_parts_have_their_volume() {
+    let mut some = Random(43);
+    for i in 0..cases(9) as usize {
+        let (space, volume) = round_part(i % 3, &mut some);
+        let size = space.bounds().size().into_iter().fold(0.0, f64::max) / 15.0;
+        let count = 1 + (some.share() * 2.0) as u32;
+        let height = size * some.between(0.2, 0.35) / f64::from(count);
+        let what = format!("kind {}, size {size}, {count} layers of {height}", i % 3);
+        let layered = made(&space, size, Some(layers(count, height, 1.0, None)));
+        let balanced = TetMesh { nodes: layered.balanced, ..layered.mesh.clone() };
+        sound(&what, &balanced);
+        let [by_chords, by_faces] = [&layered.mesh, &balanced].map(|m| (m.volume() / volume - 1.0).abs());
+        let [before, after] = [&layered.mesh, &balanced].map(|m| m.quality().expect("tetrahedra").dihedral);
+        println!(
+            "{what}: volume off {by_faces:.1e} of {by_chords:.1e}, least angle {:.1} of {:.1}",
+            after.min, before.min
+        );
+        assert!(by_faces < 3e-3 && by_faces < 0.5 * by_chords, "{what}: {by_faces} of {by_chords}");
+        assert!(after.min > 0.9 * before.min, "{what}: {} of {}", after.min, before.min);
+    }
+}
