@@ -152,7 +152,7 @@ impl Shaping<'_> {
             .collect();
         let distance = |s: usize, e: [u32; 2]| edges.binary_search(&(s, e)).map_or(0.0, |i| found[i]);
         let outward: Vec<Vec3> = faces.par_iter().map(|(f, s)| self.outward(*f, *s)).collect();
-        // (area, area times mean distance, outward area) at each node on each surface, added in the order of the faces.
+        // (area, area times mean distance, area along the normal) at each node on each surface, added in the order of the faces.
         let mut sums: FxHashMap<(u32, usize), ([f64; 2], Vec3)> = FxHashMap::default();
         for (([a, b, c], s), outward) in faces.iter().zip(outward) {
             let area = norm(outward);
@@ -188,12 +188,16 @@ impl Shaping<'_> {
             .collect()
     }
 
-    /// Twice the area of a face on a surface, along its normal outwards.
+    /// Twice the area of a face on a surface, along its normal: that outwards, where the surface has creases.
     fn outward(&self, face: [u32; 3], surface: usize) -> Vec3 {
         let [a, b, c] = face.map(|n| self.nodes[n as usize]);
         let area = cross(sub(b, a), sub(c, a));
+        let surface = &self.surfaces[surface];
+        if surface.creases.segments.is_empty() {
+            return area;
+        }
         let (mut v, mut g) = ([0.0], [[0.0; 3]]);
-        self.surfaces[surface].field.gradients(&[scale(add(add(a, b), c), 1.0 / 3.0)], &mut v, &mut g);
+        surface.field.gradients(&[scale(add(add(a, b), c), 1.0 / 3.0)], &mut v, &mut g);
         if dot(area, g[0]) < 0.0 { scale(area, -1.0) } else { area }
     }
 

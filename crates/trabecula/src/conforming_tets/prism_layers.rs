@@ -200,7 +200,7 @@ impl Shaping<'_> {
         }
         let (first, mut wanted) = (self.tets.len(), Vec::new());
         let mut prisms = 0;
-        for (face, shape) in columns.faces.iter().zip(&columns.wanted) {
+        for (face, [small, large]) in columns.faces.iter().zip(&columns.wanted) {
             let (sorted, outward) = ascending(*face);
             let [a, b, c] = sorted.map(|i| &nodes[i]);
             for level in 0..last {
@@ -208,7 +208,7 @@ impl Shaping<'_> {
                 let made = staircase([a, b, c].map(|column| [column[level], column[level + 1]]));
                 made.into_iter().for_each(|t| self.add_tet(t, outward));
                 prisms += usize::from(self.tets.len() > before);
-                wanted.resize(self.tets.len() - first, *shape);
+                wanted.resize(self.tets.len() - first, small.min(*large));
             }
         }
         nodes.iter_mut().for_each(Vec::dedup);

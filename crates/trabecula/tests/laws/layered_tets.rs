@@ -184,17 +184,37 @@ fn layers_of_parts_with_edges_have_no_flat_tetrahedra() {
     }
 }
 
-/// Brackets of two boxes that have planes in common, on which nodes move as on any other.
+/// A bracket of two boxes that have planes in common, on which nodes move as on any other, its dimensions, and a size for it.
+fn bracket(some: &mut Random) -> (String, Region, f64) {
+    let [thick, other] = [0; 2].map(|_| some.between(4.0, 8.0));
+    let [w, d, h] = [0; 3].map(|_| some.between(15.0, 40.0));
+    let legs = vec![cuboid([0.0; 3], [w, d, thick]), cuboid([0.0; 3], [other, d, h])];
+    let space = Arc::new(Union::new(legs).expect("union"));
+    (format!("{w} x {d} x {h}, {thick} and {other} thick"), space, thick * some.between(0.6, 1.2))
+}
+
 #[test]
 fn layers_of_brackets_have_no_flat_tetrahedra() {
     let mut some = Random(37);
     for _ in 0..cases(6) {
-        let [thick, other] = [0; 2].map(|_| some.between(4.0, 8.0));
-        let [w, d, h] = [0; 3].map(|_| some.between(15.0, 40.0));
-        let legs = vec![cuboid([0.0; 3], [w, d, thick]), cuboid([0.0; 3], [other, d, h])];
-        let space: Region = Arc::new(Union::new(legs).expect("union"));
-        let size = thick * some.between(0.6, 1.2);
-        fair_layers(&format!("{w} x {d} x {h}, {thick} and {other} thick"), &space, size, &mut some);
+        let (what, space, size) = bracket(&mut some);
+        fair_layers(&what, &space, size, &mut some);
+    }
+}
+
+/// Layers that are low against the size have angles as small as right prisms of their height have, or three quarters, and no obtuse ones
+/// for that.
+#[test]
+fn low_layers_of_brackets_have_no_obtuse_angles() {
+    let mut some = Random(59);
+    for _ in 0..cases(8) {
+        let (what, space, size) = bracket(&mut some);
+        let height = size * some.between(0.1, 0.14);
+        let layered = made(&space, size, Some(layers(2, height, 1.2, None)));
+        let angles = layered.mesh.quality().expect("tetrahedra").dihedral;
+        let right = (height / size).atan().to_degrees();
+        println!("{what}: {:.1} to {:.1}, right prisms {right:.1}", angles.min, angles.max);
+        assert!(angles.min > 0.7 * right && angles.max < 160.0, "{what}, size {size}, {height}: {angles:?}");
     }
 }
 
