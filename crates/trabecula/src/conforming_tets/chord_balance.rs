@@ -80,6 +80,16 @@ struct Chords {
     coarse: bool,
 }
 
+/// Sums over the faces of one surface at a node.
+#[derive(Default)]
+struct FaceSums {
+    area: f64,
+    /// Area times mean distance.
+    volume: f64,
+    /// Area along the normal.
+    outward: Vec3,
+}
+
 /// The nodes of layers by column: those of a column are shifted together.
 struct ColumnNodes<'a> {
     filled: &'a FilledLayers,
@@ -152,18 +162,22 @@ impl Shaping<'_> {
             .collect();
         let distance = |s: usize, e: [u32; 2]| edges.binary_search(&(s, e)).map_or(0.0, |i| found[i]);
         let outward: Vec<Vec3> = faces.par_iter().map(|(f, s)| self.outward(*f, *s)).collect();
-        // (area, area times mean distance, area along the normal) at each node on each surface, added in the order of the faces.
-        let mut sums: FxHashMap<(u32, usize), ([f64; 2], Vec3)> = FxHashMap::default();
+        // At each node on each surface, added in the order of the faces.
+        let mut sums: FxHashMap<(u32, usize), FaceSums> = FxHashMap::default();
         for (([a, b, c], s), outward) in faces.iter().zip(outward) {
             let area = norm(outward);
             let mean = (distance(*s, [*a, *b]) + distance(*s, [*a, *c]) + distance(*s, [*b, *c])) / 3.0;
             for n in [a, b, c] {
                 let first = images(&self.next, *n).min().unwrap_or(*n);
                 let sum = sums.entry((first, *s)).or_default();
-                *sum = ([sum.0[0] + area, sum.0[1] + area * mean], add(sum.1, outward));
+                *sum = FaceSums {
+                    area: sum.area + area,
+                    volume: sum.volume + area * mean,
+                    outward: add(sum.outward, outward),
+                };
             }
         }
-        let mut at: Vec<((u32, usize), ([f64; 2], Vec3))> = sums.into_iter().collect();
+        let mut at: Vec<((u32, usize), FaceSums)> = sums.into_iter().collect();
         at.sort_unstable_by_key(|a| a.0);
         let by_node: Vec<_> = at.chunk_by(|a, b| a.0.0 == b.0.0).collect();
         by_node
@@ -171,17 +185,17 @@ impl Shaping<'_> {
             .filter_map(|of| {
                 let n = of[0].0.0;
                 let p = self.nodes[n as usize];
-                let wanted: Vec<(usize, f64)> = of.iter().map(|((_, s), ([area, sum], _))| (*s, -sum / area)).collect();
+                let wanted: Vec<(usize, f64)> = of.iter().map(|((_, s), sum)| (*s, -sum.volume / sum.area)).collect();
                 // A node on a crease of one surface, which has no gradient there.
-                let ((_, s), ([_, sum], outward)) = of[0];
+                let ((_, s), FaceSums { volume, outward, .. }) = of[0];
                 let on_crease = *coarse && self.on[n as usize] == only(s) | HELD;
                 let on_crease = on_crease && !self.surfaces[s].creases.segments.is_empty();
                 let by = if on_crease {
-                    scale(outward, -sum / dot(outward, outward))
+                    scale(outward, -volume / dot(outward, outward))
                 } else {
                     balanced(self.surfaces, self.on[n as usize], p, &wanted)?
                 };
-                let area: f64 = of.iter().map(|(_, ([area, _], _))| area).sum();
+                let area: f64 = of.iter().map(|(_, sum)| sum.area).sum();
                 let far = norm(sub(add(p, by), before[n as usize])) > FAR * area.sqrt();
                 (!far || !self.leaves_region(n, before[n as usize], add(p, by))).then_some((n, by))
             })
