@@ -29,6 +29,7 @@ pub(crate) use node_surfaces::{HELD, MOST, SurfaceSet, members, only, onto};
 pub(crate) use partition::{Partition, Tet, edge_images, images};
 pub(crate) use patch_cuts::Patched;
 pub(crate) use prepared::{components, prepared};
+pub(crate) use prism_layers::FilledLayers;
 pub use prism_layers::{MadeLayers, PrismLayers};
 pub(crate) use shaping::{GONE, Shaping};
 pub(crate) use surface_cuts::evaluated;

@@ -38,8 +38,7 @@ const STRETCH: [f64; 2] = [0.67, 1.5];
 pub struct Background {
     /// The tetrahedra, with the nodes of the boundary on the region's surface.
     pub mesh: TetMesh,
-    /// The nodes of the same tetrahedra shifted so that the volume between their flat faces and the surface balances; not shifted where there
-    /// are layers.
+    /// The nodes of the same tetrahedra shifted so that the volume between their flat faces and the surface balances, layers as they are.
     pub balanced: Vec<Vec3>,
     /// The volume (mm³) left out where the boundary would be non-manifold, of flat tetrahedra at it, and of small detached fragments.
     pub left_out: f64,
@@ -188,10 +187,8 @@ fn shaped(mut shaping: Shaping, cube: f64, dropped: f64, layers: Option<&PrismLa
     let tets: Vec<[u32; 4]> = shaping.tets.iter().filter(|t| **t != GONE).copied().collect();
     let of = |nodes: &[Vec3]| TetMesh { nodes: nodes.to_vec(), tets: tets.clone(), zones: Vec::new() }.compact();
     let mesh = of(&shaping.nodes);
-    // Flat tetrahedra leave the nodes of layers no room: some would move and others not.
-    if made.is_none() {
-        shaping.balance(true);
-    }
+    let (made, filled) = made.unzip();
+    shaping.balance(true, &filled.unwrap_or_default());
     Ok(Background { mesh, balanced: of(&shaping.nodes).nodes, left_out: dropped + shelled, layers: made })
 }
 

@@ -12,7 +12,7 @@ use geometry::union_find::{find, singles, unite};
 use rayon::prelude::*;
 
 use crate::conforming_tets::{
-    GONE, Partition, Shaping, SurfaceSet, Tet, components, images, interfaces, only, prepared,
+    FilledLayers, GONE, Partition, Shaping, SurfaceSet, Tet, components, images, interfaces, only, prepared,
 };
 use crate::region::Region;
 use crate::solid::Solid;
@@ -142,7 +142,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     let loose = if options.largest && one { keep_largest(&mut shaping) } else { 0.0 };
     if options.order == 1 {
-        shaping.balance(false);
+        shaping.balance(false, &FilledLayers::default());
     }
     let mut made = assembled(shaping, &domains, (&planes, &bounds), named, options).map_err(Stopped::Refused)?;
     (made.dropped, made.loose, made.step) = (dropped, loose, cubes.step());

@@ -12,6 +12,9 @@ use geometry::math::{Aabb, Interval, Vec3, norm, sub};
 use geometry::surface_patches::{PatchGroup, patch_groups};
 use rayon::prelude::*;
 
+/// The most rounds of cuts of tetrahedra that nodes draw to a group by moving onto it.
+const DRAWN: usize = 4;
+
 /// A surface that is a mesh with feature edges, and the groups of its patches, which are surfaces too.
 pub(crate) struct Patched {
     /// The number of the mesh among the surfaces.
@@ -97,13 +100,24 @@ impl Partition<'_> {
         for g in patched.groups() {
             let dependent = self.met(patched, g);
             self.cut_where(g, &dependent, step);
-            // Nodes that moved onto the group have drawn others to it.
-            let drawn = self.drawn_to(patched, g);
-            if drawn.contains(&true) {
-                self.cut_where(g, &drawn, step);
-            }
+            self.cut_drawn(patched, g, step);
+        }
+        // Cuts along other groups have moved nodes along this one.
+        for g in patched.groups() {
+            self.cut_drawn(patched, g, step);
         }
         self.settle(patched, step);
+    }
+
+    /// Cuts tetrahedra along a group of patches to which nodes that moved have drawn them.
+    fn cut_drawn(&mut self, patched: &Patched, group: usize, step: f64) {
+        for _ in 0..DRAWN {
+            let drawn = self.drawn_to(patched, group);
+            if !drawn.contains(&true) {
+                return;
+            }
+            self.cut_where(group, &drawn, step);
+        }
     }
 
     /// Notes on which side of a mesh those lie that it cannot reach.

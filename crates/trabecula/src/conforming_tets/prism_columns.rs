@@ -7,7 +7,7 @@
 use super::node_surfaces::{SurfaceSet, onto};
 use super::prism_layers::MadeLayers;
 use super::shaping::{POOR, Shaping};
-use super::tet_shape::shape;
+use super::tet_shape::{shape, shapes};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
 
@@ -86,8 +86,8 @@ pub(super) struct Columns {
     pub levels: Vec<f64>,
     /// The faces at each column.
     around: Vec<Vec<u32>>,
-    /// The shape that the tetrahedra over each face shall have.
-    wanted: Vec<f64>,
+    /// The shapes that the tetrahedra over each face shall have, by their least and by their greatest angle.
+    pub wanted: Vec<[f64; 2]>,
     /// The normal of each face at each column over the part of the way asked for that is along it.
     across: Vec<Vec<Vec3>>,
 }
@@ -202,7 +202,8 @@ impl Columns {
                     corners.swap(0, 1);
                 }
                 if !has_twice(&corners.map(|c| c.0)) {
-                    sum += short_of(shape(corners.map(|c| c.1)), self.wanted[face]);
+                    let found = shapes(corners.map(|c| c.1));
+                    sum += found.iter().zip(self.wanted[face]).map(|(s, wanted)| short_of(*s, wanted)).sum::<f64>();
                 }
             }
             if sum > most {
@@ -219,20 +220,22 @@ fn short_of(shape: f64, wanted: f64) -> f64 {
     if shape <= 0.0 { f64::INFINITY } else { (wanted / shape - 1.0).max(0.0).powi(2) }
 }
 
-/// The shape that tetrahedra over a face shall have: that of the worst of right prisms, less a part, but no better than is fair.
-fn wanted(face: [Vec3; 3], ends: &[f64]) -> f64 {
+/// The shapes that tetrahedra over a face shall have: those of the worst of right prisms, less a part, but no better than is fair. Low prisms
+/// have small angles, which is no reason for obtuse ones.
+fn wanted(face: [Vec3; 3], ends: &[f64]) -> [f64; 2] {
     let inwards = inwards(face);
-    let mut worst = f64::INFINITY;
+    let mut worst = [f64::INFINITY; 2];
     let mut before = 0.0;
     for end in ends {
         let prism = face.map(|p| [p, add(p, scale(inwards, end - before))]);
         for mut corners in staircase(prism) {
             corners.swap(0, 1);
-            worst = worst.min(shape(corners));
+            let found = shapes(corners);
+            worst = [worst[0].min(found[0]), worst[1].min(found[1])];
         }
         before = *end;
     }
-    (ENOUGH * worst).clamp(f64::MIN_POSITIVE, POOR)
+    worst.map(|w| (ENOUGH * w).clamp(f64::MIN_POSITIVE, POOR))
 }
 
 /// The unit normal of a face.

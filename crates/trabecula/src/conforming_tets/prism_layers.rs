@@ -61,6 +61,17 @@ pub struct MadeLayers {
     pub at: Vec3,
 }
 
+/// What layers are made of.
+#[derive(Default)]
+pub(crate) struct FilledLayers {
+    /// The nodes of each column, from the boundary inwards.
+    pub columns: Vec<Vec<u32>>,
+    /// The number of the first tetrahedron; others follow.
+    pub first: usize,
+    /// The shape that each shall have.
+    pub wanted: Vec<f64>,
+}
+
 /// The shortest solution of the normal equations of a node, but for directions in which they say little.
 fn shortest(matrix: &Mat3, right: Vec3) -> Vec3 {
     let trace: f64 = (0..3).map(|i| matrix[i][i]).sum();
@@ -74,7 +85,7 @@ impl Shaping<'_> {
     ///
     /// # Errors
     /// No face of the boundary is chosen, or none that has a node within the choice; there would be more than `most` tetrahedra.
-    pub fn layered(&mut self, layers: &PrismLayers, most: usize) -> Result<MadeLayers, Fault> {
+    pub fn layered(&mut self, layers: &PrismLayers, most: usize) -> Result<(MadeLayers, FilledLayers), Fault> {
         let (chosen, others) = self.chosen_faces(layers.on.as_ref());
         if chosen.is_empty() {
             let message = "no triangle of the boundary has its middle in this region; move it, or leave it out";
@@ -108,8 +119,8 @@ impl Shaping<'_> {
         for (p, on) in columns.pushed.iter().zip(&boundary) {
             self.on[p.node as usize] = if p.is_pushed() { p.along } else { *on };
         }
-        let prisms = self.fill(&columns, &boundary);
-        Ok(columns.made(prisms))
+        let (prisms, filled) = self.fill(&columns, &boundary);
+        Ok((columns.made(prisms), filled))
     }
 
     /// The faces of the boundary that have their middles in a region, counter-clockwise seen from outside, and the others.
@@ -165,9 +176,9 @@ impl Shaping<'_> {
         nodes.map(way).collect()
     }
 
-    /// Fills the space behind the pushed nodes with a column of prisms over each face; their number. `boundary` has the surfaces on
+    /// Fills the space behind the pushed nodes with a column of prisms over each face; their number too. `boundary` has the surfaces on
     /// which each node was.
-    fn fill(&mut self, columns: &Columns, boundary: &[SurfaceSet]) -> usize {
+    fn fill(&mut self, columns: &Columns, boundary: &[SurfaceSet]) -> (usize, FilledLayers) {
         let last = columns.levels.len() - 1;
         // The nodes of each pushed one from the surface inwards.
         let mut nodes: Vec<Vec<u32>> = Vec::with_capacity(columns.pushed.len());
@@ -187,8 +198,9 @@ impl Shaping<'_> {
             }
             nodes.push(column);
         }
+        let (first, mut wanted) = (self.tets.len(), Vec::new());
         let mut prisms = 0;
-        for face in &columns.faces {
+        for (face, [small, large]) in columns.faces.iter().zip(&columns.wanted) {
             let (sorted, outward) = ascending(*face);
             let [a, b, c] = sorted.map(|i| &nodes[i]);
             for level in 0..last {
@@ -196,9 +208,11 @@ impl Shaping<'_> {
                 let made = staircase([a, b, c].map(|column| [column[level], column[level + 1]]));
                 made.into_iter().for_each(|t| self.add_tet(t, outward));
                 prisms += usize::from(self.tets.len() > before);
+                wanted.resize(self.tets.len() - first, small.min(*large));
             }
         }
-        prisms
+        nodes.iter_mut().for_each(Vec::dedup);
+        (prisms, FilledLayers { columns: nodes, first, wanted })
     }
 
     /// Adds a tetrahedron, of a prism over a face that `outward` says to be counter-clockwise, unless two of its nodes are one.

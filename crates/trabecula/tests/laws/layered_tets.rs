@@ -184,16 +184,89 @@ fn layers_of_parts_with_edges_have_no_flat_tetrahedra() {
     }
 }
 
-/// Brackets of two boxes that have planes in common, on which nodes move as on any other.
+/// A bracket of two boxes that have planes in common, on which nodes move as on any other, its dimensions, and a size for it.
+fn bracket(some: &mut Random) -> (String, Region, f64) {
+    let [thick, other] = [0; 2].map(|_| some.between(4.0, 8.0));
+    let [w, d, h] = [0; 3].map(|_| some.between(15.0, 40.0));
+    let legs = vec![cuboid([0.0; 3], [w, d, thick]), cuboid([0.0; 3], [other, d, h])];
+    let space = Arc::new(Union::new(legs).expect("union"));
+    (format!("{w} x {d} x {h}, {thick} and {other} thick"), space, thick * some.between(0.6, 1.2))
+}
+
 #[test]
 fn layers_of_brackets_have_no_flat_tetrahedra() {
     let mut some = Random(37);
     for _ in 0..cases(6) {
-        let [thick, other] = [0; 2].map(|_| some.between(4.0, 8.0));
-        let [w, d, h] = [0; 3].map(|_| some.between(15.0, 40.0));
-        let legs = vec![cuboid([0.0; 3], [w, d, thick]), cuboid([0.0; 3], [other, d, h])];
-        let space: Region = Arc::new(Union::new(legs).expect("union"));
-        let size = thick * some.between(0.6, 1.2);
-        fair_layers(&format!("{w} x {d} x {h}, {thick} and {other} thick"), &space, size, &mut some);
+        let (what, space, size) = bracket(&mut some);
+        fair_layers(&what, &space, size, &mut some);
+    }
+}
+
+/// Layers that are low against the size have angles as small as right prisms of their height have, or three quarters, and no obtuse ones
+/// for that.
+#[test]
+fn low_layers_of_brackets_have_no_obtuse_angles() {
+    let mut some = Random(59);
+    for _ in 0..cases(8) {
+        let (what, space, size) = bracket(&mut some);
+        let height = size * some.between(0.1, 0.14);
+        let layered = made(&space, size, Some(layers(2, height, 1.2, None)));
+        let angles = layered.mesh.quality().expect("tetrahedra").dihedral;
+        let right = (height / size).atan().to_degrees();
+        println!("{what}: {:.1} to {:.1}, right prisms {right:.1}", angles.min, angles.max);
+        assert!(angles.min > 0.7 * right && angles.max < 160.0, "{what}, size {size}, {height}: {angles:?}");
+    }
+}
+
+/// A slanted rod, a tube or a plate with two holes, and its volume.
+fn round_part(kind: usize, some: &mut Random) -> (Region, f64) {
+    let rod = |base: Vec3, axis: Vec3, radius: f64, height: f64| -> Region {
+        Arc::new(Cylinder::new(base, axis, radius, height).expect("cylinder"))
+    };
+    let less = |parts: Vec<Region>| -> Region { Arc::new(Difference::new(parts).expect("difference")) };
+    let (z, pi) = ([0.0, 0.0, 1.0], std::f64::consts::PI);
+    match kind {
+        0 => {
+            let axis = [some.between(-1.0, 1.0), some.between(-1.0, 1.0), 1.0];
+            let (radius, height) = (some.between(5.0, 7.0), some.between(20.0, 30.0));
+            (rod([0.1, 0.2, 0.3], axis, radius, height), pi * radius * radius * height)
+        }
+        1 => {
+            let (hole, wall) = (some.between(5.0, 8.0), some.between(4.0, 6.0));
+            let around = rod([0.0; 3], z, hole + wall, 12.0);
+            let volume = 12.0 * pi * ((hole + wall).powi(2) - hole * hole);
+            (less(vec![around, rod([0.0, 0.0, -1.0], z, hole, 14.0)]), volume)
+        }
+        _ => {
+            let (thick, hole) = (some.between(5.0, 8.0), some.between(3.0, 4.0));
+            let holes = [[9.0, 8.0, -1.0], [30.0, 16.0, -1.0]].map(|at| rod(at, z, hole, thick + 2.0));
+            let volume = thick * (40.0 * 24.0 - 2.0 * pi * hole * hole);
+            (less([cuboid([0.0; 3], [40.0, 24.0, thick])].into_iter().chain(holes).collect()), volume)
+        }
+    }
+}
+
+/// Layers move with the nodes of the boundary that balance its flat faces: the part's volume to 0.3 % at a fifteenth of its longest side,
+/// and angles that are hardly worse.
+#[test]
+fn layers_of_curved_parts_have_their_volume() {
+    let mut some = Random(43);
+    for i in 0..cases(9) as usize {
+        let (space, volume) = round_part(i % 3, &mut some);
+        let size = space.bounds().size().into_iter().fold(0.0, f64::max) / 15.0;
+        let count = 1 + (some.share() * 2.0) as u32;
+        let height = size * some.between(0.2, 0.35) / f64::from(count);
+        let what = format!("kind {}, size {size}, {count} layers of {height}", i % 3);
+        let layered = made(&space, size, Some(layers(count, height, 1.0, None)));
+        let balanced = TetMesh { nodes: layered.balanced, ..layered.mesh.clone() };
+        sound(&what, &balanced);
+        let [by_chords, by_faces] = [&layered.mesh, &balanced].map(|m| (m.volume() / volume - 1.0).abs());
+        let [before, after] = [&layered.mesh, &balanced].map(|m| m.quality().expect("tetrahedra").dihedral);
+        println!(
+            "{what}: volume off {by_faces:.1e} of {by_chords:.1e}, least angle {:.1} of {:.1}",
+            after.min, before.min
+        );
+        assert!(by_faces < 3e-3 && by_faces < 0.5 * by_chords, "{what}: {by_faces} of {by_chords}");
+        assert!(after.min > 0.9 * before.min, "{what}: {} of {}", after.min, before.min);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::common::{Random, ball, cases, cuboid, fault, region};
+use crate::common::{Random, ball, cases, cuboid, fault, region, within};
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
@@ -247,25 +247,49 @@ fn edges_and_corners_of_a_mesh_are_met() {
     }
 }
 
-/// A channel of triangles with walls thinner than a size, inner corners of which lie on edges of the lattice.
-#[test]
-fn inner_corners_of_a_thin_channel_are_met() {
-    let outline =
-        [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [18.5, 20.0], [18.5, 1.5], [1.5, 1.5], [1.5, 20.0], [0.0, 20.0]];
-    let vertices = [0.0, 40.0].iter().flat_map(|z| outline.map(|[x, y]| [x, y, *z])).collect();
+/// A channel of triangles of a length, width, height and wall thickness.
+fn channel([l, w, h, t]: [f64; 4], turn: impl Fn(Vec3) -> Vec3) -> Mesh {
+    let outline = [[0.0, 0.0], [w, 0.0], [w, h], [w - t, h], [w - t, t], [t, t], [t, h], [0.0, h]];
+    let vertices = [0.0, l].iter().flat_map(|z| outline.map(|[x, y]| [x, y, *z])).map(turn).collect();
     let end = [[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4], [0, 5, 6], [0, 6, 7]];
     let ends = end.iter().flat_map(|[a, b, c]| [[*a, *c, *b], [a + 8, b + 8, c + 8]]);
     let walls = (0..8u32).flat_map(|i| {
         let j = (i + 1) % 8;
         [[i, j, j + 8], [i, j + 8, i + 8]]
     });
-    let triangles = Mesh { vertices, triangles: ends.chain(walls).collect() };
+    Mesh { vertices, triangles: ends.chain(walls).collect() }
+}
+
+/// A channel with walls thinner than a size, inner corners of which lie on edges of the lattice.
+#[test]
+fn inner_corners_of_a_thin_channel_are_met() {
+    let triangles = channel([40.0, 20.0, 20.0, 1.5], |p| p);
     let region: Region = Arc::new(MeshRegion::new(triangles, Repair::Refuse).expect("region"));
     let (mesh, fit) = mesh(&region, &Grade::Constant(2.0));
     sound("channel", &mesh);
     angles("channel", &mesh);
     assert!(fit.to_part.max < 1e-9 && fit.from_part.max < 1e-9 && fit.lost.is_empty(), "{fit:?}");
     assert!((mesh.volume() - 3420.0).abs() < 1e-9 * 3420.0, "{}", mesh.volume());
+}
+
+/// The same turned at random: cuts along one patch move nodes along others, which draws tetrahedra to these.
+#[test]
+fn corners_of_turned_thin_channels_are_met() {
+    let mut some = Random(47);
+    for _ in 0..cases(16) {
+        let sizes =
+            [some.between(15.0, 50.0), some.between(10.0, 30.0), some.between(10.0, 30.0), some.between(0.8, 3.0)];
+        let size = sizes[3] * some.between(0.8, 2.6);
+        let triangles = channel(sizes, turned(&mut some));
+        let volume = triangles.volume();
+        let region: Region = Arc::new(MeshRegion::new(triangles, Repair::Refuse).expect("region"));
+        let made = background(&region, &region.bounds(), &Grade::Constant(size), &within(&region, 3000, 4), None);
+        let made = made.expect("mesh");
+        let what = format!("channel of {sizes:?}, size {size}");
+        sound(&what, &made.mesh);
+        angles(&what, &made.mesh);
+        assert!((made.mesh.volume() / volume - 1.0).abs() < 1e-6, "{what}: {} of {volume}", made.mesh.volume());
+    }
 }
 
 /// A plate with holes of a radius of half the size: finer tetrahedra around them, nothing filled.
@@ -334,6 +358,52 @@ fn flat_faces_balance_about_curved_surfaces() {
         assert!(faces.p99 < size / 15.0, "{what}: {faces:?}");
         assert!(faces.p99 < 0.7 * chords.p99 && faces.max < 0.85 * chords.max, "{what}: {faces:?} of {chords:?}");
         println!("{what}: volume off {by_faces:.1e} of {by_chords:.1e}, p99 {:.3} of {:.3}", faces.p99, chords.p99);
+    }
+}
+
+/// A ball of facets half a size wide with waves of two sizes: it turns by 10 to 40 degrees from facet to facet.
+fn wavy_ball(some: &mut Random) -> Mesh {
+    let (around, along) = (80u32, 40u32);
+    let height = some.between(0.008, 0.014);
+    let waves: [(Vec3, f64); 4] = core::array::from_fn(|_| {
+        let k = some.point(1.0);
+        (scale(k, some.between(14.0, 20.0) / norm(k)), some.between(0.0, 6.3))
+    });
+    let vertex = |j: u32, k: u32| {
+        let share = |i: u32, of: u32| std::f64::consts::PI * f64::from(i) / f64::from(of);
+        let (t, f) = (share(j, along), 2.0 * share(k, around));
+        let p = [t.sin() * f.cos(), t.sin() * f.sin(), -t.cos()];
+        scale(p, 1.0 + height * waves.iter().map(|(k, phase)| (dot(*k, p) + phase).sin()).sum::<f64>())
+    };
+    let between = (1..along).flat_map(|j| (0..around).map(move |k| (j, k)));
+    let vertices: Vec<Vec3> =
+        [(0, 0)].into_iter().chain(between).chain([(along, 0)]).map(|(j, k)| vertex(j, k)).collect();
+    let last = vertices.len() as u32 - 1;
+    let at = |j: u32, k: u32| 1 + (j - 1) * around + k % around;
+    let ends = (0..around).flat_map(|k| [[0, at(1, k + 1), at(1, k)], [last, at(along - 1, k), at(along - 1, k + 1)]]);
+    let middle = (1..along - 1)
+        .flat_map(|j| (0..around).map(move |k| (j, k)))
+        .flat_map(|(j, k)| [[at(j, k), at(j, k + 1), at(j + 1, k + 1)], [at(j, k), at(j + 1, k + 1), at(j + 1, k)]]);
+    Mesh { vertices, triangles: ends.chain(middle).collect() }
+}
+
+/// Nodes on creases of a mesh that turns from facet to facet balance too: half of its nodes are on some.
+#[test]
+fn flat_faces_balance_about_details_finer_than_them() {
+    let mut some = Random(53);
+    for i in 0..cases(3) {
+        let triangles = wavy_ball(&mut some);
+        let volume = triangles.volume();
+        let space: Region = Arc::new(MeshRegion::new(triangles, Repair::Refuse).expect("region"));
+        let made = background(&space, &space.bounds(), &Grade::Constant(2.0 / 15.0), &within(&space, 3000, 4), None);
+        let made = made.expect("mesh");
+        let what = format!("wavy ball {i}");
+        let balanced = TetMesh { nodes: made.balanced, ..made.mesh.clone() };
+        sound(&what, &balanced);
+        angles(&what, &balanced);
+        let [by_chords, by_faces] = [&made.mesh, &balanced].map(|m| (m.volume() / volume - 1.0).abs());
+        println!("{what}: volume off {by_faces:.1e} of {by_chords:.1e}");
+        assert!(by_faces < 5e-4 && by_faces < 0.3 * by_chords, "{what}: {by_faces} of {by_chords}");
     }
 }
 
