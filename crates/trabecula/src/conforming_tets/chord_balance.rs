@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 use super::near_sheets::NearSheets;
 use super::node_surfaces::{HELD, SurfaceSet, balanced, members, only, tangent};
 use super::partition::images;
-use super::prism_layers::FilledLayers;
+use super::prism_columns::FilledLayers;
 use super::shaping::{GONE, GOOD, POOR, Shaping};
 use super::tet_shape::shape;
 use crate::implicit::Surface;

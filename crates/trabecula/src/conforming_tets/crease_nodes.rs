@@ -6,9 +6,9 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::chord_balance::{distances, interfaces};
-use super::mending::Change;
 use super::node_surfaces::{HELD, SurfaceSet, members, only};
 use super::shaping::Shaping;
+use super::tet_change::Change;
 use super::tet_shape::shape;
 use crate::implicit::Surface;
 use geometry::feature_edges::Creases;

@@ -3,10 +3,10 @@
 //!
 //! The triangulation of the ring is optimal by dynamic programming (Klincsek 1980; Freitag, Ollivier-Gooch 1997).
 
-use super::mending::Change;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::partition::SAGITTA;
 use super::shaping::{GONE, Shaping};
+use super::tet_change::Change;
 use super::tet_shape::shape;
 use geometry::math::{norm, sub};
 use geometry::progress::checkpoint;

@@ -7,8 +7,9 @@
 use super::near_sheets::NearSheets;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
+use super::tet_change::Change;
 use super::tet_shape::shape;
-use geometry::math::{Aabb, Vec3, add, scale};
+use geometry::math::{Aabb, add, scale};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{EDGES, FACES};
 
@@ -26,18 +27,6 @@ const LEAST: f64 = 0.01;
 const STEPS: usize = 40;
 /// The least relative gain.
 const GAIN: f64 = 1.05;
-
-/// A change that can be taken back.
-pub(super) enum Change {
-    /// A node that was elsewhere.
-    Moved(u32, Vec3),
-    /// A node that was on more surfaces.
-    Freed(u32, SurfaceSet),
-    /// A new node.
-    Added,
-    /// Tetrahedra, with their nodes and domains, in place of which there are others; how many numbers there were.
-    Replaced { gone: Vec<(u32, [u32; 4], u8)>, made: Vec<u32>, count: usize },
-}
 
 /// The first change of a neighbourhood.
 #[derive(Clone, Copy)]

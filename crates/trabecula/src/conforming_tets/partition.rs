@@ -1,7 +1,7 @@
 //! A background of tetrahedra that is cut along the surfaces of a solid, one after another.
 
 use super::node_surfaces::{SurfaceSet, members, only};
-use super::patch_cuts::Patched;
+use super::patched_surface::Patched;
 use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, sub};

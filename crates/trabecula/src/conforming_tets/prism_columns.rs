@@ -5,11 +5,36 @@
 //! of very different lengths. The mesh beneath is improved in between.
 
 use super::node_surfaces::{SurfaceSet, onto};
-use super::prism_layers::MadeLayers;
 use super::shaping::{POOR, Shaping};
 use super::tet_shape::{shape, shapes};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::progress::checkpoint;
+
+/// What layers are made of.
+#[derive(Default)]
+pub(crate) struct FilledLayers {
+    /// The nodes of each column, from the boundary inwards.
+    pub columns: Vec<Vec<u32>>,
+    /// The number of the first tetrahedron; others follow.
+    pub first: usize,
+    /// The shape that each shall have.
+    pub wanted: Vec<f64>,
+}
+
+/// The layers that were made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MadeLayers {
+    /// Number of prisms and wedges.
+    pub prisms: usize,
+    /// The mean over their area of the heights in those that are asked for, of nodes where layers do not taper.
+    pub mean: f64,
+    /// The share of their area where they are lower than nine tenths of these.
+    pub lower: f64,
+    /// The least of these.
+    pub least: f64,
+    /// Where it is, mm.
+    pub at: Vec3,
+}
 
 /// Rounds of pushing and improvement, and the parts of the way that are tried in each.
 const ROUNDS: usize = 24;

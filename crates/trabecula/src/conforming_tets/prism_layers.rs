@@ -10,7 +10,7 @@
 
 use super::chord_balance::interfaces;
 use super::node_surfaces::{HELD, SurfaceSet};
-use super::prism_columns::{Columns, Pushed, ascending, has_twice, staircase};
+use super::prism_columns::{Columns, FilledLayers, MadeLayers, Pushed, ascending, has_twice, staircase};
 use super::shaping::Shaping;
 use super::tet_shape::shape;
 use crate::region::Region;
@@ -44,32 +44,6 @@ impl PrismLayers {
         };
         heights.scan(0.0, sum).collect()
     }
-}
-
-/// The layers that were made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MadeLayers {
-    /// Number of prisms and wedges.
-    pub prisms: usize,
-    /// The mean over their area of the heights in those that are asked for, of nodes where layers do not taper.
-    pub mean: f64,
-    /// The share of their area where they are lower than nine tenths of these.
-    pub lower: f64,
-    /// The least of these.
-    pub least: f64,
-    /// Where it is, mm.
-    pub at: Vec3,
-}
-
-/// What layers are made of.
-#[derive(Default)]
-pub(crate) struct FilledLayers {
-    /// The nodes of each column, from the boundary inwards.
-    pub columns: Vec<Vec<u32>>,
-    /// The number of the first tetrahedron; others follow.
-    pub first: usize,
-    /// The shape that each shall have.
-    pub wanted: Vec<f64>,
 }
 
 /// The shortest solution of the normal equations of a node, but for directions in which they say little.

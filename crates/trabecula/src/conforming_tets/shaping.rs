@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::mending::Change;
 use super::node_surfaces::{SurfaceSet, onto, tangent};
 use super::partition::images;
+use super::tet_change::Change;
 use super::tet_shape::shape;
 use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
