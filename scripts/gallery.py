@@ -19,7 +19,7 @@ SHOWN = (
     ("kelvin_stem", None, 240, 12, TALL),
     ("stress_bracket", 20, 300, 20, LONG),
     ("heat_exchanger", 24, 30, 35, WIDE),
-    ("helmet_liner", 20, 30, -20, WIDE),
+    ("helmet_liner", 24, 30, -20, WIDE),
     ("octet_filleted", None, 30, 25, WIDE),
     ("diamond_cylinder", None, 30, 25, WIDE),
     ("swirl", 16, 30, 25, WIDE),

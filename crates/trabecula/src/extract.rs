@@ -80,11 +80,13 @@ pub fn region_volume(region: &Region, edge: f64, progress: &dyn Progress) -> Res
     Ok(surface(&full, edge, progress)?.mesh.volume())
 }
 
-/// Of an estimate: most tiles that are searched, most that a surface may cross, triangles that are enough, tiles at a time.
+/// Of an estimate: most tiles that are searched, most that a surface may cross, triangles that are enough, tiles at a time, deviations of the
+/// mean that are enough to be sure.
 const LOOKED_AT: usize = 1024;
 const WORKED: usize = 64;
 const FOUND: usize = 1_000_000;
 const BATCH: usize = 16;
+const SURE: f64 = 4.0;
 
 /// A step through `n` things that comes to all of them and leaves them evenly filled on the way: coprime to n, near its golden
 /// section.
@@ -161,14 +163,24 @@ impl SurfaceMaker for GridSurface<'_> {
         Ok(sums.finish(sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?))
     }
 
-    /// Estimated from tiles that are spread evenly over the grid, until enough of them may hold a surface or enough triangles
-    /// were found: the work is bounded, and the same on every machine. The deviation of the mean is that of the tiles over the
-    /// root of their number.
     fn estimate(&self, edge: f64) -> Result<Estimate, Fault> {
+        self.sampled(edge, 0.0)
+    }
+
+    fn exceeding(&self, edge: f64, triangles: f64) -> Result<Option<Estimate>, Fault> {
+        Ok(Some(self.sampled(edge, triangles)?).filter(|e| e.triangles > triangles))
+    }
+}
+
+impl GridSurface<'_> {
+    /// Estimated from tiles that are spread evenly over the grid, until enough of them may hold a surface, enough triangles were found, or
+    /// there are fewer than `below` by some deviations: the work is bounded, and the same on every machine. The deviation of the mean
+    /// is that of the tiles over the root of their number.
+    fn sampled(&self, edge: f64, below: f64) -> Result<Estimate, Fault> {
         let grid = Grid::new(self.0, edge)?;
         let total: usize = grid.tiles().iter().product();
         let (most, stride) = (total.min(LOOKED_AT), stride(total));
-        let (mut sampled, mut worked, mut found) = (0, 0, 0);
+        let (mut sampled, mut worked, mut found, mut squares) = (0, 0, 0, 0.0);
         while sampled < most && worked < WORKED && found < FOUND {
             let batch = sampled..(sampled + BATCH).min(most);
             sampled = batch.end;
@@ -179,6 +191,12 @@ impl SurfaceMaker for GridSurface<'_> {
             let each: Vec<usize> = each.flatten_iter().collect();
             worked += each.len();
             found += each.iter().sum::<usize>();
+            squares += each.iter().map(|n| (*n as f64).powi(2)).sum::<f64>();
+            let (mean, n) = (found as f64 / sampled as f64, sampled as f64);
+            let deviation = ((squares / n - mean * mean).max(0.0) / n).sqrt();
+            if worked >= BATCH && (mean + SURE * deviation) * (total as f64) < below {
+                break;
+            }
         }
         let triangles = found as f64 * total as f64 / sampled as f64;
         Ok(Estimate {

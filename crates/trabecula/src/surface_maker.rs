@@ -80,6 +80,14 @@ pub trait SurfaceMaker {
     /// # Errors
     /// A resolution at which no mesh can be made.
     fn estimate(&self, resolution: f64) -> Result<Estimate, Fault>;
+
+    /// The same where it takes more than this number of triangles; `None` where it surely takes fewer.
+    ///
+    /// # Errors
+    /// As `estimate`.
+    fn exceeding(&self, resolution: f64, triangles: f64) -> Result<Option<Estimate>, Fault> {
+        Ok(Some(self.estimate(resolution)?).filter(|e| e.triangles > triangles))
+    }
 }
 
 /// How a surface is to be made.

@@ -22,8 +22,8 @@ fn tokens(text: &str) -> Vec<String> {
     while let Some(c) = rest.chars().next() {
         let length = if rest.starts_with("//") {
             rest.find('\n').unwrap_or(rest.len())
-        } else if rest.starts_with("r#\"") {
-            3 + rest[3..].find("\"#").expect("the end of a raw text") + 2
+        } else if let Some(raw) = rest.strip_prefix("r#\"") {
+            3 + raw.find("\"#").expect("the end of a raw text") + 2
         } else if c == '"' {
             let mut from = 1;
             while let Some(n) = rest[from..].find(['"', '\\']).filter(|n| rest[from + n..].starts_with('\\')) {
@@ -144,7 +144,7 @@ impl Crate {
     }
 
     /// A path from the crate, if it leads into it.
-    fn from_crate(&self, of: &Module, path: &[String]) -> Option<Module> {
+    fn path_in_crate(&self, of: &Module, path: &[String]) -> Option<Module> {
         let ups = path.iter().take_while(|p| *p == "super").count();
         let (base, rest) = match path[0].as_str() {
             "crate" => (Vec::new(), &path[1..]),
@@ -165,7 +165,7 @@ impl Crate {
         let others = source.handed_on.iter().chain(&source.imports);
         let named = others.filter(|i| i.name.as_ref().or(i.path.last()).is_some_and(|n| n == name || n == "*"));
         let found = named.filter_map(|import| {
-            let mut path = self.from_crate(&module, &import.path)?;
+            let mut path = self.path_in_crate(&module, &import.path)?;
             if path.last().is_some_and(|n| n == "*") {
                 path.pop();
                 let holds = self.0.get(&path).is_some_and(|s| s.defined.contains(name));
@@ -179,7 +179,7 @@ impl Crate {
     /// Which files each imports.
     fn imports(&self) -> BTreeMap<&Module, BTreeSet<Module>> {
         let each = self.0.iter().map(|(module, source)| {
-            let paths = source.imports.iter().filter_map(|i| self.from_crate(module, &i.path));
+            let paths = source.imports.iter().filter_map(|i| self.path_in_crate(module, &i.path));
             let found = paths.map(|p| self.defining(&p, 0)).filter(|m| m != module);
             (module, found.collect())
         });

@@ -212,6 +212,10 @@ impl SurfaceMaker for CompensatedGrid<'_> {
     fn estimate(&self, resolution: f64) -> Result<Estimate, Fault> {
         GridSurface(&self.0.solid).estimate(resolution)
     }
+
+    fn exceeding(&self, resolution: f64, triangles: f64) -> Result<Option<Estimate>, Fault> {
+        GridSurface(&self.0.solid).exceeding(resolution, triangles)
+    }
 }
 
 #[cfg(test)]

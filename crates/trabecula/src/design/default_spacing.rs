@@ -54,11 +54,8 @@ impl Built {
         let repeat = smallest_repeat(self);
         let counted = wanted.max((wavelength / COUNTED).min(self.solid.transition.unwrap_or(f64::INFINITY)));
         // What cannot be estimated cannot be meshed: the mesh says why.
-        let found = self.surface().estimate(counted).ok()?;
-        let triangles = found.triangles * (counted / wanted).powi(2);
-        if triangles <= TRIANGLES {
-            return None;
-        }
+        let times = (counted / wanted).powi(2);
+        let triangles = self.surface().exceeding(counted, TRIANGLES / times).ok()??.triangles * times;
         let walls = gridded(self, &report.lattices).filter_map(|l| l.thickness).map(|t| t.least());
         let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
         let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL, wavelength / FEWEST]);

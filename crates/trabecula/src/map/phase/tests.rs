@@ -1,8 +1,11 @@
 use super::super::judged::compared;
 use super::super::phase_grid::Grid;
 use super::*;
+use crate::grade::Grade;
 use crate::grade::{Formula, Linear};
 use crate::map::Affine;
+use crate::map::{Aligned, Orientation};
+use geometry::math::dot;
 use geometry::math::{cross, sub};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
