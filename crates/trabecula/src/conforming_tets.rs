@@ -16,6 +16,7 @@ mod near_sheets;
 mod node_surfaces;
 mod partition;
 mod patch_cuts;
+mod plane_sections;
 mod prepared;
 mod prism_columns;
 mod prism_layers;
