@@ -17,6 +17,7 @@ mod node_surfaces;
 mod partition;
 mod patch_cuts;
 mod patched_surface;
+mod plane_sections;
 mod prepared;
 mod prism_columns;
 mod prism_layers;

@@ -35,6 +35,10 @@ pub use named_sets::is_own_name;
 /// Most cubes of the background.
 const CUBES: f64 = 4e9;
 
+/// The most backgrounds that are tried for a periodic cell, each finer than the one before: where a surface nearly touches a bounding plane,
+/// its chords may touch it at one image alone.
+const BACKGROUNDS: usize = 8;
+
 /// How a volume mesh is made.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -91,7 +95,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     let domains = Domains::new(solid, options.of, by_patches).map_err(Stopped::Refused)?;
     let bounds = solid.region.bounds();
     let planes = bounding_planes(&domains, &bounds);
-    let cubes = Cubes::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);
+    let mut cubes = Cubes::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);
     if cubes.count.iter().map(|n| *n as f64).product::<f64>() > CUBES {
         let m = format!(
             "an edge of {} mm makes more than four thousand million cubes; use a greater one",
@@ -101,21 +105,18 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     let total = domains.own as u64 + 18;
     let done = std::sync::atomic::AtomicU64::new(0);
-    let goes_on = || progress.step(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
-    let mut partition = background(&domains, &cubes, &planes);
+    let goes_on = || progress.step(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed).min(total), total);
+    let mut partition = cut(&domains, &cubes, &planes, options, &goes_on)?;
     if options.periodic {
-        let (p, lattice) = (&partition, domains.lattice);
-        partition.next =
-            cyclic_nodes::cycles(&cubes, &planes, &p.nodes, p.surfaces, lattice).map_err(Stopped::Refused)?;
+        for _ in 1..BACKGROUNDS {
+            if partition.is_periodic(&|p| cubes.may_lack_image(p)) {
+                break;
+            }
+            cubes = cubes.finer();
+            partition = cut(&domains, &cubes, &planes, options, &goes_on)?;
+        }
     }
     let step = cubes.step().into_iter().fold(0.0, f64::max);
-    let structural: Vec<usize> = planes.iter().flatten().flatten().copied().collect();
-    for s in (0..domains.own).filter(|s| !structural.contains(s)) {
-        if !goes_on() {
-            return Err(Stopped::Interrupted);
-        }
-        partition.cut(s, step);
-    }
     // Of a periodic cell components hold together by images.
     let one = options.of != Of::All && !options.periodic;
     let (mut shaping, mut dropped) = prepared(partition, one);
@@ -144,7 +145,8 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     if options.order == 1 {
         shaping.balance(false, &FilledLayers::default());
     }
-    let mut made = assembled(shaping, &domains, (&planes, &bounds), named, options).map_err(Stopped::Refused)?;
+    let mut made =
+        assembled(shaping, &domains, (&planes, &bounds, &cubes), named, options).map_err(Stopped::Refused)?;
     (made.dropped, made.loose, made.step) = (dropped, loose, cubes.step());
     Ok(made)
 }
@@ -206,11 +208,39 @@ fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Parti
     Partition { surfaces: &domains.surfaces, patched: &domains.patched, trees: &domains.trees, nodes, on, next, tets }
 }
 
+/// The background, cut along all surfaces.
+///
+/// # Errors
+/// Periodic where the solid is not; an interruption.
+fn cut<'a>(
+    domains: &'a Domains,
+    cubes: &Cubes,
+    planes: &Planes,
+    options: &Options,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Partition<'a>, Stopped> {
+    let mut partition = background(domains, cubes, planes);
+    if options.periodic {
+        let (p, lattice) = (&partition, domains.lattice);
+        partition.next =
+            cyclic_nodes::cycles(cubes, planes, &p.nodes, p.surfaces, lattice).map_err(Stopped::Refused)?;
+    }
+    let step = cubes.step().into_iter().fold(0.0, f64::max);
+    let structural: Vec<usize> = planes.iter().flatten().flatten().copied().collect();
+    for s in (0..domains.own).filter(|s| !structural.contains(s)) {
+        if !goes_on() {
+            return Err(Stopped::Interrupted);
+        }
+        partition.cut(s, step);
+    }
+    Ok(partition)
+}
+
 /// The improved mesh with sets, pairs and, of order 2, nodes on edges.
 fn assembled(
     shaping: Shaping,
     domains: &Domains,
-    (planes, bounds): (&Planes, &Aabb),
+    (planes, bounds, cubes): (&Planes, &Aabb, &Cubes),
     named: &Named,
     options: &Options,
 ) -> Result<Made, Fault> {
@@ -255,6 +285,9 @@ fn assembled(
     };
     let names = domains.names.iter().map(|n| n.to_string()).collect();
     let mut mesh = FeMesh { nodes, tets, middles, domain, domains: names, pairs, period, ..FeMesh::default() };
+    if options.periodic {
+        cyclic_nodes::matched(&mesh, cubes, faces.iter().filter(|f| f.2).map(|f| f.0))?;
+    }
     named_sets::add_sets(&mut mesh, domains, &faces, (planes, bounds), named.bodies);
     let empty = named_sets::add_regions(&mut mesh, &faces, named.sets);
     // A region of the solid's surface may hold none of a fluid's.

@@ -3,7 +3,7 @@
 //!
 //! The triangulation of the ring is optimal by dynamic programming (Klincsek 1980; Freitag, Ollivier-Gooch 1997).
 
-use super::node_surfaces::{HELD, SurfaceSet};
+use super::node_surfaces::{HELD, SurfaceSet, members};
 use super::partition::SAGITTA;
 use super::shaping::{GONE, Shaping};
 use super::tet_change::Change;
@@ -115,7 +115,8 @@ impl Shaping<'_> {
     /// and it follows that surface as well.
     fn may_flip(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
         let periodic = |n: u32| self.next[n as usize] != n;
-        if [a, b, c, d].into_iter().all(periodic) || !self.at_edge([c, d]).is_empty() {
+        let planar = [a, b].into_iter().any(|n| self.in_plane([n, c, d]));
+        if planar || [a, b, c, d].into_iter().all(periodic) || !self.at_edge([c, d]).is_empty() {
             return false;
         }
         let set = [a, b, c, d].into_iter().fold(SurfaceSet::MAX, |s, n| s & self.on[n as usize]);
@@ -131,6 +132,12 @@ impl Shaping<'_> {
         let (mut v, mut g) = ([0.0], [[0.0; 3]]);
         surface.field.gradients(&[middle], &mut v, &mut g);
         v[0].abs() <= SAGITTA * norm(g[0]) * norm(sub(p, q))
+    }
+
+    /// Whether a triangle lies in a bounding plane of a periodic cell: there it must have an image.
+    fn in_plane(&self, of: [u32; 3]) -> bool {
+        let common = of.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
+        of.iter().all(|n| self.next[*n as usize] != *n) && members(common).any(|s| self.surfaces[s].plane.is_some())
     }
 
     /// The tetrahedra over and under the triangulation of a ring whose worst shape is best, if that is better than `bar`.
@@ -227,6 +234,9 @@ impl Shaping<'_> {
                 continue;
             }
             let new = t.map(|k| if k == n { m } else { k });
+            if FACES.iter().any(|f| f.iter().any(|k| new[*k] == m) && self.in_plane(f.map(|k| new[k]))) {
+                return false;
+            }
             if shape(new.map(|n| self.nodes[n as usize])) <= bar {
                 return false;
             }

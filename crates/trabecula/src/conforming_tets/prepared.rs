@@ -2,7 +2,7 @@
 
 use super::boundary_repair::repair;
 use super::chord_balance::interfaces;
-use super::node_surfaces::{HELD, SurfaceSet};
+use super::node_surfaces::{HELD, SurfaceSet, only};
 use super::partition::Partition;
 use super::shaping::Shaping;
 use geometry::tetmesh::TetMesh;
@@ -30,8 +30,22 @@ pub(crate) fn prepared<'a>(partition: Partition<'a>, one: bool) -> (Shaping<'a>,
         let set = f.iter().fold(SurfaceSet::MAX, |s, n| s & partition.on[*n as usize]);
         f.iter().for_each(|n| on[*n as usize] |= if set == 0 { HELD } else { set });
     }
+    tie(&partition, &mut on);
     let nodes = (partition.nodes, on, partition.next);
     (Shaping::new(partition.surfaces, nodes, (tets, domain)), dropped)
+}
+
+/// Makes images lie on the same surfaces but for the bounding planes, and stay on these.
+fn tie(partition: &Partition, on: &mut [SurfaceSet]) {
+    let bounding = |s: &usize| partition.surfaces[*s].cut && partition.surfaces[*s].plane.is_some();
+    let planes = (0..partition.surfaces.len()).filter(bounding).fold(0, |set, s| set | only(s));
+    let first = |n: &u32| partition.next[*n as usize] != *n && partition.images(*n).min() == Some(*n);
+    for n in (0..on.len() as u32).filter(first) {
+        let all = partition.images(n).fold(0, |set, m| set | on[m as usize]) & !planes;
+        for m in partition.images(n) {
+            on[m as usize] = all | partition.on[m as usize] & planes;
+        }
+    }
 }
 
 /// The number of components that are connected by nodes.

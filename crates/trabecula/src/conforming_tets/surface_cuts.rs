@@ -6,6 +6,7 @@
 
 use super::node_surfaces::{SurfaceSet, only, onto};
 use super::partition::{Partition, Tet, images};
+use super::plane_sections::PlaneSections;
 use super::tet_shape::shape;
 use crate::field::Field;
 use geometry::math::{Vec3, add, norm, sub};
@@ -188,9 +189,15 @@ impl Partition<'_> {
             .collect();
         moves.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let around = self.around(moves.iter().flat_map(|m| self.images(m.1)));
-        for (_, n, by) in moves {
+        let sections = PlaneSections::new(self);
+        for (distance, n, by) in moves {
             checkpoint();
             let images: Vec<u32> = images(&self.next, n).collect();
+            let first = images.iter().min().copied().unwrap_or(n);
+            // Nodes on the surface up to rounding are on it whatever follows: edges would be cut there without length.
+            if distance > ROUNDING * step && images.len() > 1 && !sections.stays_line(first, values) {
+                continue;
+            }
             let old: Vec<Vec3> = images.iter().map(|n| self.nodes[*n as usize]).collect();
             let of = |n: &u32| around.of(*n).iter();
             let worst = |p: &Self| {

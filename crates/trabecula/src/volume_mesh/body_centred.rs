@@ -11,6 +11,8 @@ use rayon::prelude::*;
 
 /// Cubes along each edge of a block that is kept or skipped as a whole.
 const BLOCK: usize = 4;
+/// Distance of nodes that are at one place, as a fraction of half the edge of a cube.
+const ROUNDING: f64 = 1e-9;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -59,6 +61,25 @@ impl Cubes {
     fn middle(&self, axis: usize, i: usize) -> f64 {
         let (lo, hi, n) = (self.bounds.min[axis], self.bounds.max[axis], self.count[axis]);
         lo + (hi - lo) * ((i as f64 + 0.5) / n as f64)
+    }
+
+    /// Cubes of which there is one more along each axis, in the same box.
+    pub fn finer(&self) -> Cubes {
+        Cubes { count: self.count.map(|n| n + 1), ..self.clone() }
+    }
+
+    /// Whether a node of a periodic cell may lack images: at an edge of the cell where a node of the background, or the middle between two,
+    /// is. A surface that goes exactly through one, as those of symmetric cells do, leaves matter at some of its images alone.
+    pub fn may_lack_image(&self, p: Vec3) -> bool {
+        let step = self.step();
+        let free: Vec<usize> =
+            (0..3).filter(|a| p[*a] != self.bounds.min[*a] && p[*a] != self.bounds.max[*a]).collect();
+        let between = |a: usize| 2.0 * (p[a] - self.bounds.min[a]) / step[a];
+        match free[..] {
+            [] => true,
+            [a] => (between(a) - between(a).round()).abs() < ROUNDING,
+            _ => false,
+        }
     }
 
     /// Edges of a cube (mm).

@@ -1,13 +1,13 @@
 //! Periodic images: nodes of opposite bounding planes, tied from the beginning.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::body_centred::Cubes;
 use crate::conforming_tets::SurfaceSet;
 use crate::conforming_tets::images;
 use crate::implicit::Surface;
 use geometry::fault::{Fault, number};
-use geometry::fe_mesh::Pair;
+use geometry::fe_mesh::{FeMesh, Pair};
 use geometry::math::Vec3;
 
 /// Greatest difference of a surface between opposite planes, as a fraction of its change along a cube.
@@ -78,4 +78,49 @@ pub(super) fn pairs(nodes: &[Vec3], on: &[SurfaceSet], next: &[u32], upper: [Sur
         }
     }
     out
+}
+
+/// Whether nodes and faces at opposite planes are the same in all bits, and pairs hold all nodes at upper ones, but for nodes that may lack
+/// an image. `faces` are those of the boundary.
+///
+/// # Errors
+/// They are not.
+pub(super) fn matched(mesh: &FeMesh, cubes: &Cubes, faces: impl Iterator<Item = (u32, u8)>) -> Result<(), Fault> {
+    let bounds = &cubes.bounds;
+    let faces: Vec<[u32; 3]> = faces.map(|f| mesh.face(f)).collect();
+    let paired: FxHashSet<u32> = mesh.pairs.iter().map(|p| p.node).collect();
+    let off = |p: &&Pair| {
+        let [at, image] = [p.node, p.image].map(|n| mesh.nodes[n as usize]);
+        (0..3).any(|k| (at[k], image[k]) != if p.along[k] { (bounds.max[k], bounds.min[k]) } else { (at[k], at[k]) })
+    };
+    let strict: Vec<u32> =
+        (0..mesh.nodes.len() as u32).filter(|n| !cubes.may_lack_image(mesh.nodes[*n as usize])).collect();
+    for axis in 0..3 {
+        // Adding zero makes the two zeros one.
+        let key = |n: u32| [1, 2].map(|k| (mesh.nodes[n as usize][(axis + k) % 3] + 0.0).to_bits());
+        let planes = [bounds.min, bounds.max].map(|bound| {
+            let there = |n: &u32| mesh.nodes[*n as usize][axis] == bound[axis];
+            let nodes: FxHashSet<[u64; 2]> = strict.iter().copied().filter(there).map(key).collect();
+            let all = faces.iter().filter(|f| f.iter().all(there)).map(|f| {
+                let mut corners = f.map(key);
+                corners.sort_unstable();
+                corners
+            });
+            (nodes, all.collect::<FxHashSet<[[u64; 2]; 3]>>())
+        });
+        let [(nodes, faces), (other_nodes, other_faces)] = &planes;
+        let loose = strict.iter().filter(|n| mesh.nodes[**n as usize][axis] == bounds.max[axis] && !paired.contains(n));
+        let torn = mesh.pairs.iter().filter(|p| p.along[axis]).filter(off);
+        let nodes = nodes.symmetric_difference(other_nodes).count().max(loose.count()).max(torn.count());
+        let faces = faces.symmetric_difference(other_faces).count();
+        if nodes + faces > 0 {
+            let [a, b] = PLANES[axis];
+            let message = format!(
+                "{nodes} nodes and {faces} triangles at {a} and {b} have no image on the other: the surface nearly touches these planes; \
+                 use another edge, or move the lattice a little"
+            );
+            return Err(Fault::new("periodic", message));
+        }
+    }
+    Ok(())
 }

@@ -46,17 +46,19 @@ pub(super) fn mid_nodes(
         }
     }
     let middle = |[a, b]: [u32; 2]| scale(add(corners[a as usize], corners[b as usize]), 0.5);
-    let first =
-        |e: [u32; 2]| edge_images(corners, next, e).into_iter().map(|[a, b]| sorted(a, b)).fold(e, |m, o| m.min(o));
+    // Edges with images move as the first of them.
+    let first = |e: [u32; 2]| {
+        let images = edge_images(corners, next, e).into_iter().map(|[a, b]| sorted(a, b));
+        images.filter(|o| edges.binary_search(o).is_ok()).fold(e, |m, o| m.min(o))
+    };
     let shift = |i: usize| -> Vec3 {
-        let e = edges[i];
-        let set: SurfaceSet = on[i];
+        let own = first(edges[i]);
+        let set: SurfaceSet = on[number(own) as usize];
         if members(set).all(|s| surfaces[s].plane.is_some()) {
             return [0.0; 3];
         }
-        let own = first(e);
         let [p, q] = own.map(|n| corners[n as usize]);
-        let to = onto(surfaces, on[number(own) as usize], middle(own), REACH * norm(sub(p, q)));
+        let to = onto(surfaces, set, middle(own), REACH * norm(sub(p, q)));
         to.map_or([0.0; 3], |to| sub(to, middle(own)))
     };
     let mut shifts: Vec<Vec3> = (0..edges.len()).into_par_iter().map(shift).collect();

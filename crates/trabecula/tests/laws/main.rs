@@ -20,6 +20,7 @@ mod local_thickness;
 mod measured;
 mod noisy_stress;
 mod patches;
+mod periodic_cells;
 mod periods;
 mod phase;
 mod pore;

@@ -171,7 +171,7 @@ fn struts_are_measured_where_they_are_narrowest() {
             }
             2.0 * radius(at[0], at[1])
         };
-        let least = (4..=10).map(|i| ball(0.05 * f64::from(i))).fold(f64::INFINITY, f64::min);
+        let least = (0..=10).map(|i| ball(0.05 * f64::from(i))).fold(f64::INFINITY, f64::min);
         let middle = ball(0.5);
         let found = gyroid.thickness(Part::Lower, iso, &cubic(1.0)).expect("a neck");
         println!("{fraction}: {found} {least} half-way {middle}");
