@@ -13,7 +13,7 @@ use super::partition::images;
 use super::prism_columns::FilledLayers;
 use super::shaping::{GONE, GOOD, POOR, Shaping};
 use super::tet_shape::shape;
-use crate::implicit::Surface;
+use crate::implicit::{Plane, Surface};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::FACES;
@@ -197,7 +197,7 @@ impl Shaping<'_> {
                 };
                 let area: f64 = of.iter().map(|(_, sum)| sum.area).sum();
                 let far = norm(sub(add(p, by), before[n as usize])) > FAR * area.sqrt();
-                (!far || !self.leaves_region(n, before[n as usize], add(p, by))).then_some((n, by))
+                (!self.leaves_region(n, before[n as usize], add(p, by), far)).then_some((n, by))
             })
             .collect()
     }
@@ -315,10 +315,14 @@ impl Shaping<'_> {
         back
     }
 
-    /// Whether a displacement takes a node through a surface of the region.
-    fn leaves_region(&self, n: u32, p: Vec3, to: Vec3) -> bool {
+    /// Whether a displacement takes a node through a plane of the region, however little, or `far` through another of its surfaces.
+    fn leaves_region(&self, n: u32, p: Vec3, to: Vec3, far: bool) -> bool {
         let on = self.on[n as usize];
-        let through = |s: &Surface| s.field.value(p) <= 0.0 && s.field.value(to) > 0.0;
+        let through = |s: &Surface| match s.plane {
+            Some(Plane { axis, at, below: true }) => p[axis] <= at && to[axis] > at,
+            Some(Plane { axis, at, below: false }) => p[axis] >= at && to[axis] < at,
+            None => far && s.field.value(p) <= 0.0 && s.field.value(to) > 0.0,
+        };
         (0..).zip(self.surfaces).any(|(i, s)| s.cut && on & only(i) == 0 && through(s))
     }
 }
