@@ -83,6 +83,15 @@ pub struct Plane {
     pub below: bool,
 }
 
+impl Plane {
+    /// Whether a move from `p` to `to` leaves the solid half-space.
+    pub fn is_left(&self, p: Vec3, to: Vec3) -> bool {
+        let sign = if self.below { 1.0 } else { -1.0 };
+        let beyond = |x: Vec3| sign * (x[self.axis] - self.at) > 0.0;
+        !beyond(p) && beyond(to)
+    }
+}
+
 impl Surface {
     /// A smooth implicit surface of a lattice.
     pub fn smooth(field: Arc<dyn Implicit>) -> Surface {

@@ -13,7 +13,7 @@ use super::partition::images;
 use super::prism_columns::FilledLayers;
 use super::shaping::{GONE, GOOD, POOR, Shaping};
 use super::tet_shape::shape;
-use crate::implicit::{Plane, Surface};
+use crate::implicit::Surface;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 use geometry::tetmesh::FACES;
@@ -319,8 +319,7 @@ impl Shaping<'_> {
     fn leaves_region(&self, n: u32, p: Vec3, to: Vec3, far: bool) -> bool {
         let on = self.on[n as usize];
         let through = |s: &Surface| match s.plane {
-            Some(Plane { axis, at, below: true }) => p[axis] <= at && to[axis] > at,
-            Some(Plane { axis, at, below: false }) => p[axis] >= at && to[axis] < at,
+            Some(plane) => plane.is_left(p, to),
             None => far && s.field.value(p) <= 0.0 && s.field.value(to) > 0.0,
         };
         (0..).zip(self.surfaces).any(|(i, s)| s.cut && on & only(i) == 0 && through(s))

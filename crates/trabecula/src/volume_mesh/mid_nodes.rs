@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use crate::conforming_tets::edge_images;
-use crate::conforming_tets::{SurfaceSet, members, onto};
+use crate::conforming_tets::{SurfaceSet, members, only, onto};
 use crate::implicit::Surface;
 use geometry::fe_mesh::{Pair, jacobian};
 use geometry::math::{Vec3, add, norm, scale, sub};
@@ -59,7 +59,10 @@ pub(super) fn mid_nodes(
         }
         let [p, q] = own.map(|n| corners[n as usize]);
         let to = onto(surfaces, set, middle(own), REACH * norm(sub(p, q)));
-        to.map_or([0.0; 3], |to| sub(to, middle(own)))
+        // Where the surface leaves the region through a plane, chords end in the plane.
+        let planes = (0..).zip(surfaces).filter(|(s, of)| of.cut && set & only(*s) == 0).filter_map(|(_, of)| of.plane);
+        let stays = |to: &Vec3| planes.clone().all(|plane| !plane.is_left(middle(own), *to));
+        to.filter(stays).map_or([0.0; 3], |to| sub(to, middle(own)))
     };
     let mut shifts: Vec<Vec3> = (0..edges.len()).into_par_iter().map(shift).collect();
     let of: Vec<[u32; 6]> = tets.par_iter().map(|t| EDGES.map(|[a, b]| number(sorted(t[a], t[b])))).collect();
