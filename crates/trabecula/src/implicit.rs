@@ -93,6 +93,11 @@ impl Plane {
 }
 
 impl Surface {
+    /// The plane that bounds the region here, if it is one.
+    pub fn bounding_plane(&self) -> Option<Plane> {
+        self.plane.filter(|_| self.cut)
+    }
+
     /// A smooth implicit surface of a lattice.
     pub fn smooth(field: Arc<dyn Implicit>) -> Surface {
         Surface {

@@ -137,7 +137,8 @@ impl Shaping<'_> {
     /// Whether a triangle lies in a bounding plane of a periodic cell: there it must have an image.
     fn in_plane(&self, of: [u32; 3]) -> bool {
         let common = of.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
-        of.iter().all(|n| self.next[*n as usize] != *n) && members(common).any(|s| self.surfaces[s].plane.is_some())
+        of.iter().all(|n| self.next[*n as usize] != *n)
+            && members(common).any(|s| self.surfaces[s].bounding_plane().is_some())
     }
 
     /// The tetrahedra over and under the triangulation of a ring whose worst shape is best, if that is better than `bar`.

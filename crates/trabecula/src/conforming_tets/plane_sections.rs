@@ -77,7 +77,7 @@ impl Partition<'_> {
         let faces = self.tets.iter().flat_map(|t| FACES.map(|f| f.map(|c| t.nodes[c])));
         faces.filter(move |f| f.iter().all(tied)).filter_map(|f| {
             let common = f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
-            let plane = members(common).find_map(|s| self.surfaces[s].plane)?;
+            let plane = members(common).find_map(|s| self.surfaces[s].bounding_plane())?;
             let mut own = f.map(|n| self.images(n).min().unwrap_or(n));
             own.sort_unstable();
             Some((plane, own))
@@ -93,7 +93,7 @@ impl Partition<'_> {
         }
         let mut used = vec![false; self.nodes.len()];
         self.tets.iter().flat_map(|t| t.nodes).for_each(|n| used[n as usize] = true);
-        let bounding = |s: usize| self.surfaces[s].cut && self.surfaces[s].plane.is_some();
+        let bounding = |s: usize| self.surfaces[s].bounding_plane().is_some();
         let alone = |n: u32| self.next[n as usize] == n && members(self.on[n as usize]).any(bounding);
         let whole = |n: u32| !alone(n) && self.images(n).all(|m| used[m as usize]) || may_lack(self.nodes[n as usize]);
         planes.values().all(|sides| *sides == 3) && (0..).zip(&used).filter(|(_, used)| **used).all(|(n, _)| whole(n))

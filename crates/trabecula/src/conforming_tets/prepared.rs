@@ -37,7 +37,7 @@ pub(crate) fn prepared<'a>(partition: Partition<'a>, one: bool) -> (Shaping<'a>,
 
 /// Makes images lie on the same surfaces but for the bounding planes, and stay on these.
 fn tie(partition: &Partition, on: &mut [SurfaceSet]) {
-    let bounding = |s: &usize| partition.surfaces[*s].cut && partition.surfaces[*s].plane.is_some();
+    let bounding = |s: &usize| partition.surfaces[*s].bounding_plane().is_some();
     let planes = (0..partition.surfaces.len()).filter(bounding).fold(0, |set, s| set | only(s));
     let first = |n: &u32| partition.next[*n as usize] != *n && partition.images(*n).min() == Some(*n);
     for n in (0..on.len() as u32).filter(first) {

@@ -60,7 +60,8 @@ pub(super) fn mid_nodes(
         let [p, q] = own.map(|n| corners[n as usize]);
         let to = onto(surfaces, set, middle(own), REACH * norm(sub(p, q)));
         // Where the surface leaves the region through a plane, chords end in the plane.
-        let planes = (0..).zip(surfaces).filter(|(s, of)| of.cut && set & only(*s) == 0).filter_map(|(_, of)| of.plane);
+        let others = (0..).zip(surfaces).filter(|(s, _)| set & only(*s) == 0);
+        let planes = others.filter_map(|(_, surface)| surface.bounding_plane());
         let stays = |to: &Vec3| planes.clone().all(|plane| !plane.is_left(middle(own), *to));
         to.filter(stays).map_or([0.0; 3], |to| sub(to, middle(own)))
     };
