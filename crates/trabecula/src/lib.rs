@@ -32,7 +32,7 @@
 //! outside. Evaluating a field cannot fail: every mistake is found when a design is built. Results are the same bytes for any
 //! number of threads.
 //!
-//! The layers of the modules, lowest first, stand in ARCHITECTURE.md and are kept by `tests/tidy.rs`.
+//! The layers of the modules, lowest first, stand in ARCHITECTURE.md and are kept by `tests/tidy/`.
 
 pub mod analysis;
 pub mod beam_mesh;

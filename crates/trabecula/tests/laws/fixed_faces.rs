@@ -5,18 +5,21 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm};
 use trabecula::grade::Grade;
-use trabecula::map::{Aligned, Mapping, Orientation, Phase, Settings, Wanted};
+use trabecula::map::{Aligned, Mapping, Orientation, Phase, PhaseRequest, Settings};
 use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
-fn wanted(wavelength: f64, rotate: Vec3, fix: Vec<Region>) -> Wanted {
-    Wanted {
+fn wanted(wavelength: f64, rotate: Vec3, fix: Vec<Region>) -> PhaseRequest {
+    PhaseRequest {
         fix,
         offset: [0.3, 0.2, -0.1],
-        ..Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), Orientation::Angles(rotate.map(Grade::Constant)))
+        ..PhaseRequest::new(
+            [0; 3].map(|_| Grade::Constant(wavelength)),
+            Orientation::Angles(rotate.map(Grade::Constant)),
+        )
     }
 }
 
-fn solve(region: &Region, wanted: &Wanted) -> Result<Phase, String> {
+fn solve(region: &Region, wanted: &PhaseRequest) -> Result<Phase, String> {
     let settings = Settings { region: Some(&**region), ..Settings::default() };
     Phase::solve(&region.bounds(), wanted, &settings).map_err(|f| f.to_string())
 }
@@ -63,7 +66,7 @@ fn a_curved_wall_has_whole_cells_through_it() {
     });
     let errors = [0.5, 0.25].map(|step| {
         let align = Some(Aligned::new(4.0).expect("depth"));
-        let wanted = Wanted { align, ..wanted(2.0, [0.0; 3], faces.to_vec()) };
+        let wanted = PhaseRequest { align, ..wanted(2.0, [0.0; 3], faces.to_vec()) };
         let settings = Settings { region: Some(&*panel), step: Some(step), ..Settings::default() };
         let map = Phase::solve(&panel.bounds(), &wanted, &settings).expect("solved");
         let mut worst = 0.0f64;

@@ -37,6 +37,7 @@ mod stretch;
 mod surface;
 mod surface_frames;
 mod tets;
+mod tets_balance;
 mod thickness;
 mod tiling;
 mod tiling_amounts;

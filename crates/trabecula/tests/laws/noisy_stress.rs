@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::{cuboid, mean, off_axis, points, within};
 use geometry::math::{Aabb, Vec3, determinant, dot, norm, scale};
 use trabecula::grade::{Grade, Samples};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, Settings, Stretch, TwoAxes, Wanted};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Settings, Stretch, TwoAxes};
 use trabecula::region::{Cylinder, Difference, Region};
 
 const STEP: f64 = 0.75;
@@ -27,7 +27,7 @@ fn samples<const N: usize>(b: &Aabb, of: impl Fn(Vec3, &mut dyn FnMut() -> f64) 
 }
 
 fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Phase, String> {
-    let wanted = Wanted { smooth, ..Wanted::new([0; 3].map(|_| Grade::Constant(WAVELENGTH)), orientation) };
+    let wanted = PhaseRequest { smooth, ..PhaseRequest::new([0; 3].map(|_| Grade::Constant(WAVELENGTH)), orientation) };
     Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)
 }
 
@@ -153,8 +153,11 @@ fn a_plate_with_a_hole_is_followed_through_noise() {
         let stress = samples(&b, |p, random| kirsch(p).map(|v| v + 3.0 * noise * random()));
         let wavelength = [0; 3].map(|_| Grade::Constant(WAVELENGTH));
         let stretch = (noise > 0.01).then(|| Stretch::new([0.67, 1.5]).expect("range"));
-        let wanted =
-            Wanted { smooth: Some(WAVELENGTH), stretch, ..Wanted::new(wavelength, Orientation::Stress(stress.into())) };
+        let wanted = PhaseRequest {
+            smooth: Some(WAVELENGTH),
+            stretch,
+            ..PhaseRequest::new(wavelength, Orientation::Stress(stress.into()))
+        };
         let settings = Settings { region: Some(&*part), ..Settings::default() };
         let map = Phase::solve(&b, &wanted, &settings).unwrap_or_else(|f| panic!("{noise}: {f}"));
         assert!(far.iter().all(|p| determinant(&map.jacobian(*p)) > 0.0));

@@ -13,7 +13,7 @@ use trabecula::field::Block;
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, Round, Settings, TwoAxes, Wanted};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Round, Settings, TwoAxes};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region};
 use trabecula::solid::Solid;
 
@@ -21,8 +21,8 @@ fn formula(text: &str) -> Grade {
     Grade::from(Formula::parse(text).expect("formula"))
 }
 
-fn wanted(wavelength: f64, orientation: Orientation) -> Wanted {
-    Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
+fn wanted(wavelength: f64, orientation: Orientation) -> PhaseRequest {
+    PhaseRequest::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
 }
 
 fn tube(base: Vec3, axis: Vec3, radii: [f64; 2], height: f64) -> Region {
@@ -32,7 +32,7 @@ fn tube(base: Vec3, axis: Vec3, radii: [f64; 2], height: f64) -> Region {
     Arc::new(Difference::new(vec![outer, inner]).expect("tube"))
 }
 
-fn solve(region: &Region, wanted: &Wanted, step: Option<f64>) -> Phase {
+fn solve(region: &Region, wanted: &PhaseRequest, step: Option<f64>) -> Phase {
     let settings = Settings { region: Some(&**region), step, ..Settings::default() };
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
 }
@@ -136,7 +136,7 @@ fn swirling() -> Phase {
     let still = || Grade::Constant(0.0);
     let x = Axis::Vector([formula(&v[0]), formula(&v[1]), still()]);
     let z = Axis::Vector([still(), still(), Grade::Constant(1.0)]);
-    let wanted = Wanted {
+    let wanted = PhaseRequest {
         wavelength: [formula(&edge), formula(&edge), Grade::Constant(2.0)],
         ..wanted(2.0, Orientation::Frame(TwoAxes::new(x, z)))
     };

@@ -11,7 +11,7 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Map, Orientation, Phase, Settings, Wanted};
+use trabecula::map::{Map, Orientation, Phase, PhaseRequest, Settings};
 use trabecula::region::{Cuboid, Region};
 use trabecula::solid::Solid;
 
@@ -24,9 +24,9 @@ fn cell(name: &str) -> Arc<Cell> {
 }
 
 fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
-    let wanted = Wanted {
+    let wanted = PhaseRequest {
         offset: [0.1, 0.2, 0.3],
-        ..Wanted::new(wavelength.map(formula), Orientation::Angles(angles.map(formula)))
+        ..PhaseRequest::new(wavelength.map(formula), Orientation::Angles(angles.map(formula)))
     };
     Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))
 }

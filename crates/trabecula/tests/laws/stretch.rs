@@ -5,13 +5,13 @@ use geometry::math::{Aabb, Vec3, determinant};
 use trabecula::design::{Built, Design, NoFiles};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Mapping, Orientation, Phase, Settings, Stretch, Wanted};
+use trabecula::map::{Mapping, Orientation, Phase, PhaseRequest, Settings, Stretch};
 use trabecula::region::Cylinder;
 
-fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> Wanted {
-    Wanted {
+fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> PhaseRequest {
+    PhaseRequest {
         stretch: range.map(|r| Stretch::new(r).expect("range")),
-        ..Wanted::new(
+        ..PhaseRequest::new(
             [0; 3].map(|_| Grade::Constant(3.0)),
             Orientation::Angles(rotate.map(|f| Grade::from(Formula::parse(f).expect("formula")))),
         )

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm, unit};
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, Settings, TwoAxes, Wanted};
+use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, PhaseRequest, Settings, TwoAxes};
 use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
-fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> Wanted {
-    Wanted {
+fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> PhaseRequest {
+    PhaseRequest {
         align: depth.map(|d| Aligned::new(d).expect("depth")),
-        ..Wanted::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
+        ..PhaseRequest::new([0; 3].map(|_| Grade::Constant(wavelength)), orientation)
     }
 }
 
@@ -19,7 +19,7 @@ fn angles(of: Vec3) -> Orientation {
     Orientation::Angles(of.map(Grade::Constant))
 }
 
-fn solve(region: &Region, wanted: &Wanted) -> Phase {
+fn solve(region: &Region, wanted: &PhaseRequest) -> Phase {
     let settings = Settings { region: Some(&**region), ..Settings::default() };
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
 }
@@ -80,7 +80,7 @@ fn cells_within_are_turned_as_asked() {
     };
     let (s, c) = 30f64.to_radians().sin_cos();
     let found = [1.0, 10.0, 100.0].map(|angle_weight| {
-        let turned = Wanted { angle_weight, ..wanted(1.0, angles([0.0, 0.0, 30.0]), Some(4.0)) };
+        let turned = PhaseRequest { angle_weight, ..wanted(1.0, angles([0.0, 0.0, 30.0]), Some(4.0)) };
         let map = solve(&region, &turned);
         let edges = points.iter().filter_map(|p| normal(p).map(|n| off_axis(&map.jacobian(*p), n)));
         let middle = points.iter().filter(|p| norm([p[0] - 10.0, p[1] - 10.0, 0.0]) < 3.0);

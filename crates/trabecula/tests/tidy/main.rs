@@ -1,6 +1,7 @@
 //! The house rules that a machine can check, over the sources of all crates.
 //!
 //! - *Layers*: a module of `trabecula` imports only from modules of lower layers. (Between crates cargo checks it.)
+//! - *Circles*: no two files of a crate import each other (`import_circles`).
 //! - *Length*: a function has at most 100 lines, a file at most 600; tables of data apart.
 //! - *Names*: no file name occurs twice in a crate, so that a name leads to one place.
 //! - *Words*: messages and documentation use the field's terms (docs/glossary.md), not private ones.
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 
 use sources::{CRATES, files, is_test, root, shipped};
 
+mod import_circles;
 mod sources;
 
 /// The modules of `trabecula`, layer by layer. A module imports from lower layers only: not from its neighbours in its own.

@@ -5,9 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sources::{files, is_test, root, shipped};
-
-mod sources;
+use crate::sources::{files, is_test, root, shipped};
 
 /// The doors are left out: the Python classes of a mesh and a solid make each other.
 const CRATES: [&str; 4] = ["geometry", "beams", "homogenise", "trabecula"];

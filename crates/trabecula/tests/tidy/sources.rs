@@ -1,6 +1,4 @@
-//! The sources of all crates, for tests of the house.
-
-#![allow(dead_code, reason = "no test uses all of it")]
+//! The sources of all crates.
 
 use std::fs;
 use std::path::{Path, PathBuf};
