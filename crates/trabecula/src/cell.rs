@@ -198,8 +198,9 @@ impl Cell {
         })
     }
 
-    /// Minimum wall thickness (sheet) or narrowest neck diameter (lower, upper) at level `iso`, in mm, where
-    /// phases relate to millimetres by u = `to_phase` · x. `None` where the part is empty or full.
+    /// Minimum wall thickness (sheet) or narrowest neck diameter (lower, upper) at level `iso`, in mm, where phases relate to
+    /// millimetres by u = `to_phase` · x: of a neck, that of the largest ball that travels through the network, or of a narrower
+    /// one about a saddle of f. `None` where the part is empty or full.
     pub fn thickness(&self, part: Part, iso: f64, to_phase: &Mat3) -> Option<f64> {
         match part {
             Part::Sheet => thickness::wall(&|u, v, g| self.gradients(u, v, g), iso, to_phase),

@@ -131,8 +131,8 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
     (a, geometry::math::cross(n, a))
 }
 
-/// Narrowest neck diameter (mm) of the lower (f ≤ iso) or upper (f ≥ iso) part, where u = `to_phase` · x: twice the
-/// least distance from a neck's saddle to the surface f = iso.
+/// Least diameter (mm) of the necks of the lower (f ≤ iso) or upper (f ≥ iso) part at their saddles, where u = `to_phase` · x: twice
+/// the least distance from a saddle of f to the surface f = iso.
 ///
 /// `necks` are those of [`necks`](super::necks): phases and levels. Where every neck is
 /// closed and the components are disconnected it is zero. `None` where the part is empty or full, and for sheets.
