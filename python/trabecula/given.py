@@ -75,7 +75,8 @@ if TYPE_CHECKING:
 
 def named(builder: Any) -> Any:
     """The function or data class; a keyword that it does not have is refused with the nearest that it has."""
-    function = vars(builder)["__init__"] if isinstance(builder, type) else builder
+    of_class = isinstance(builder, type)
+    function = vars(builder)["__init__"] if of_class else builder
     known = parameters(function)
 
     @functools.wraps(function)
@@ -83,8 +84,8 @@ def named(builder: Any) -> Any:
         check_keywords(builder.__name__, given, known)
         return function(*args, **given)
 
-    if isinstance(builder, type):
-        builder.__init__ = call  # type: ignore[misc]  # its own, of no subclass
+    if of_class:
+        builder.__init__ = call
         return builder
     return call
 
