@@ -1,15 +1,15 @@
 //! Branches of frames at covered lines: labels of axes that agree all over the part outside the cores but across cuts, and the rotation
 //! at each cut.
 
-use core::f64::consts::SQRT_2;
 use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
 use super::branch_cuts::{BranchCuts, Move};
+use super::cube_turns::nearest_turn;
+use super::phase_request::PhaseRequest;
 use super::phase_target::{Laid, Target};
-use super::phase_wanted::Wanted;
-use super::singular_lines::{Alike, agreement};
+use super::singular_lines::Alike;
 use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};
 
@@ -30,7 +30,7 @@ pub(super) fn labels(laid: &Laid, target: &Target, count: &[bool], cuts: &Branch
                 let own = product(&frames[n], &labels[n].unwrap_or(IDENTITY));
                 for m in grid.neighbours(n) {
                     if labels[m].is_none() && (count[m] || !inner) && !cuts.any([n, m]) {
-                        labels[m] = Some(nearest(&own, &frames[m], &turns));
+                        labels[m] = Some(nearest_turn(&frames[m], &own, &turns));
                         queue.push_back(m);
                     }
                 }
@@ -56,13 +56,13 @@ pub(super) fn rotations(
     target: &Target,
     count: &[bool],
     cuts: &mut BranchCuts,
-    wanted: &Wanted,
+    wanted: &PhaseRequest,
 ) -> Result<(), Fault> {
     let (grid, frames, turns) = (&laid.grid, &target.frames, wanted.alike().turns());
     let edges = (0..grid.len()).into_par_iter().filter(|n| count[*n]).flat_map_iter(|n| {
         let above = grid.neighbours(n).filter(move |m| *m > n && count[*m]);
         let turns = &turns;
-        above.map(move |m| (n, m, nearest(&frames[n], &frames[m], turns)))
+        above.map(move |m| (n, m, nearest_turn(&frames[m], &frames[n], turns)))
     });
     let crossed = |n: usize, m: usize| -> Vec<(usize, i32)> {
         (0..cuts.len()).map(|line| (line, cuts.crossed(line, [n, m]))).filter(|(_, sense)| *sense != 0).collect()
@@ -118,7 +118,7 @@ fn check_lengths(laid: &Laid, target: &Target, turns: &[Mat3]) -> Result<(), Fau
 }
 
 /// Explains that axes do not agree at a place without a cut.
-fn unlike(at: Vec3, wanted: &Wanted) -> Fault {
+fn unlike(at: Vec3, wanted: &PhaseRequest) -> Fault {
     let message = format!(
         "axes do not come back to themselves round a hole of the part, or round a place that is too short for a line, near {}: core covers \
          lines alone; {}, or leave core out",
@@ -126,16 +126,6 @@ fn unlike(at: Vec3, wanted: &Wanted) -> Fault {
         wanted.smoother()
     );
     Fault::new("core", message)
-}
-
-/// The rotation after which a frame is nearest to another: the two agree by one and twice the cosine of the angle.
-fn nearest(to: &Mat3, frame: &Mat3, turns: &[Mat3]) -> Mat3 {
-    // Mostly they agree as they are: within an eighth of a turn no other rotation is nearer.
-    if agreement(to, frame) > 1.0 + SQRT_2 {
-        return IDENTITY;
-    }
-    let all = turns.iter().map(|t| (agreement(to, &product(frame, t)), *t));
-    all.fold((f64::NEG_INFINITY, IDENTITY), |best, t| if t.0 > best.0 { t } else { best }).1
 }
 
 impl Target {

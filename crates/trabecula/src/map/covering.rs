@@ -9,9 +9,9 @@ use super::edge_squares::weights;
 use super::judged::{Judged, fold_at_node, fold_between};
 use super::pace;
 use super::periods::{least, nearest};
-use super::phase_found::Found;
+use super::phase_candidate::Candidate;
+use super::phase_request::{PhaseRequest, Settings};
 use super::phase_target::{LEAST_ROOT, Laid, Target, wavelengths};
-use super::phase_wanted::{Settings, Wanted};
 use super::singular_lines::{Alike, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::winding::Winding;
@@ -45,7 +45,7 @@ pub struct Cores {
 /// A map of one value but for the branches at covered lines.
 pub(super) struct Covered {
     pub laid: Laid,
-    pub found: Found,
+    pub found: Candidate,
     pub lines: Vec<SingularLine>,
     pub cores: Cores,
 }
@@ -55,7 +55,7 @@ impl Covering {
     pub(super) fn solve(
         &self,
         bounds: &Aabb,
-        wanted: &Wanted,
+        wanted: &PhaseRequest,
         settings: &Settings,
         (coarse, lines): (f64, &[SingularLine]),
     ) -> Result<Option<Covered>, Fault> {
@@ -104,7 +104,7 @@ impl Covering {
     }
 
     /// The radius of cores, mm.
-    fn radius(&self, wanted: &Wanted, lines: &[SingularLine]) -> Result<f64, Fault> {
+    fn radius(&self, wanted: &PhaseRequest, lines: &[SingularLine]) -> Result<f64, Fault> {
         if let Some(radius) = self.radius {
             return Ok(radius);
         }
@@ -127,7 +127,7 @@ fn too_fine(radius: f64) -> Fault {
 }
 
 /// Refuses what does not go with cores.
-pub(super) fn refuse(wanted: &Wanted) -> Result<(), Fault> {
+pub(super) fn refuse(wanted: &PhaseRequest) -> Result<(), Fault> {
     let clash = |key: &str, why: &str| {
         let message = format!("core covers singular lines here, and {why}; leave {key} or core out");
         Err(Fault::new(key, message))
@@ -153,7 +153,7 @@ pub(super) fn refuse(wanted: &Wanted) -> Result<(), Fault> {
 }
 
 /// A smooth polyline along a singular line, from surface to surface.
-fn path(line: &SingularLine, laid: &Laid, wanted: &Wanted, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
+fn path(line: &SingularLine, laid: &Laid, wanted: &PhaseRequest, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
     if line.is_closed() {
         let message = format!(
             "a singular line is closed, {}: core covers lines from surface to surface; {}, or leave core out",
@@ -224,12 +224,12 @@ fn lead_on(line: &mut [Vec3], by: f64) {
 /// count.
 fn found(
     laid: Laid,
-    wanted: &Wanted,
+    wanted: &PhaseRequest,
     settings: &Settings,
     target: Target,
     mut cuts: BranchCuts,
     cores: &Cores,
-) -> Result<(Laid, Found), Fault> {
+) -> Result<(Laid, Candidate), Fault> {
     let Cores { tube, .. } = cores;
     let plain = || vec![1.0; laid.grid.len()];
     let mut roots = target.roots(&laid, wanted)?.unwrap_or_else(plain);
@@ -269,7 +269,7 @@ fn found(
     }
     let Some(solution) = first else { return Err(Fault::new("core", "no map was found")) };
     let judged = Judged::of(&laid, wanted, Some(&part), &target, &solution)?;
-    Ok((laid, Found { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
+    Ok((laid, Candidate { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
 }
 
 /// Moves phases that no rotation fixes so that their mean is that of K̄ x, as where there are no lines.
@@ -284,7 +284,7 @@ fn anchor(values: &mut [Vec3], laid: &Laid, cuts: &BranchCuts, mean: &Mat3, root
 }
 
 /// Refuses cells of the part that are torn: those next to lines that are not in the cores.
-fn torn(branches: &CutCells, part: &dyn Field, radius: f64, wanted: &Wanted) -> Result<(), Fault> {
+fn torn(branches: &CutCells, part: &dyn Field, radius: f64, wanted: &PhaseRequest) -> Result<(), Fault> {
     // The corners and the middle of a cell, which is at most a fourth of the radius across.
     let out = branches.torn().find_map(|b| {
         let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] });

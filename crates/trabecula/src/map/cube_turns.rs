@@ -1,6 +1,8 @@
-//! The rotations of a cube.
+//! The rotations of a cube, and which of them brings a frame nearest to another.
 
-use geometry::math::{Mat3, determinant, product};
+use core::f64::consts::SQRT_2;
+
+use geometry::math::{IDENTITY, Mat3, determinant, product};
 
 /// The 24 rotations of a cube.
 pub(super) fn cube() -> Vec<Mat3> {
@@ -19,13 +21,26 @@ pub(super) fn cube() -> Vec<Mat3> {
     all
 }
 
-/// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
-pub(super) fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
-    let agree = |m: &Mat3| -> f64 { m.as_flattened().iter().zip(to.as_flattened()).map(|(a, b)| a * b).sum() };
-    // Turns of the cube are a quarter or more: within an eighth, whose cosine this is, there is no nearer one.
-    if agree(f) > 1.0 + core::f64::consts::SQRT_2 {
-        return *f;
+/// One and twice the cosine of the angle between two frames.
+fn agreement(a: &Mat3, b: &Mat3) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+}
+
+/// Whether two frames are within an eighth of a turn, as most neighbours are: no turn by a quarter or more brings them nearer.
+pub(super) fn is_near(a: &Mat3, b: &Mat3) -> bool {
+    agreement(a, b) > 1.0 + SQRT_2
+}
+
+/// Of turns by a quarter or more, and none, the one after which a frame is nearest to another.
+pub(super) fn nearest_turn(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
+    if is_near(f, to) {
+        return IDENTITY;
     }
-    let all = turns.iter().map(|t| product(f, t));
-    all.max_by(|a, b| agree(a).total_cmp(&agree(b))).unwrap_or(*f)
+    let all = turns.iter().map(|t| (agreement(&product(f, t), to), t));
+    all.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(IDENTITY, |best| *best.1)
+}
+
+/// The frame after that turn.
+pub(super) fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
+    product(f, &nearest_turn(f, to, turns))
 }

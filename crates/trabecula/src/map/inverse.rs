@@ -104,7 +104,7 @@ impl Phase {
 mod tests {
     use super::*;
     use crate::grade::{Formula, Grade};
-    use crate::map::{Affine, Map, Orientation, Round, Settings, Wanted};
+    use crate::map::{Affine, Map, Orientation, PhaseRequest, Round, Settings};
     use std::sync::Arc;
 
     #[test]
@@ -113,9 +113,9 @@ mod tests {
         let turn = Grade::from(Formula::parse("3*x").expect("formula"));
         let still = Grade::Constant(0.0);
         let wave = Grade::Constant(3.0);
-        let wanted = Wanted {
+        let wanted = PhaseRequest {
             offset: [0.2, 0.3, -0.1],
-            ..Wanted::new([wave.clone(), wave.clone(), wave], Orientation::Angles([still.clone(), still, turn]))
+            ..PhaseRequest::new([wave.clone(), wave.clone(), wave], Orientation::Angles([still.clone(), still, turn]))
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

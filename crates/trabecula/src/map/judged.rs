@@ -6,8 +6,8 @@ use super::cut_cells::CutCells;
 use super::distortion::{self, Distortion, Frames};
 use super::frame;
 use super::phase_grid::Grid;
+use super::phase_request::PhaseRequest;
 use super::phase_target::{Laid, Target, wavelengths};
-use super::phase_wanted::Wanted;
 use super::solution::Solution;
 use super::surface_feet::feet;
 use crate::field::Field;
@@ -38,7 +38,7 @@ pub(super) struct Judged {
 impl Judged {
     pub fn of(
         laid: &Laid,
-        wanted: &Wanted,
+        wanted: &PhaseRequest,
         region: Option<&dyn Field>,
         target: &Target,
         solution: &Solution,
@@ -176,7 +176,7 @@ fn scattered(grid: &Grid, region: &dyn Field) -> Vec<Vec3> {
 /// those of the nodes, from which points have their signs and axes, or, if they are smoothed, their frames. Across cuts they are those of
 /// the branch of the first node about the point.
 pub(super) fn targets(
-    wanted: &Wanted,
+    wanted: &PhaseRequest,
     range: f64,
     grid: &Grid,
     frames: &[Mat3],

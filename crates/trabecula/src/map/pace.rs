@@ -7,8 +7,8 @@
 
 use super::frame::Orientation;
 use super::phase_grid::Grid;
+use super::phase_request::PhaseRequest;
 use super::phase_target::wavelengths;
-use super::phase_wanted::Wanted;
 use super::spline;
 use crate::field::Field;
 use crate::grade::Grade;
@@ -45,7 +45,7 @@ pub(super) struct Chosen {
 /// The grid that resolves the least wavelength and what varies, or has the requested spacing `step` (mm).
 pub(super) fn choose(
     bounds: &Aabb,
-    wanted: &Wanted,
+    wanted: &PhaseRequest,
     step: Option<f64>,
     region: Option<&dyn Field>,
 ) -> Result<Chosen, Fault> {
@@ -100,7 +100,7 @@ impl Chosen {
 }
 
 /// The grid that resolves the least wavelength, or has the requested spacing `step` (mm).
-fn start(bounds: &Aabb, wanted: &Wanted, step: Option<f64>) -> Result<Grid, Fault> {
+fn start(bounds: &Aabb, wanted: &PhaseRequest, step: Option<f64>) -> Result<Grid, Fault> {
     let size = bounds.size();
     let coarse: Vec<Vec3> = {
         let g = Grid::over(bounds, [13; 3]);
@@ -195,7 +195,7 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The target at points throughout the region.
 struct Probe<'a> {
-    wanted: &'a Wanted,
+    wanted: &'a PhaseRequest,
     bounds: Aabb,
     points: Vec<Vec3>,
     /// The greatest difference of two principal values of a stress.
@@ -204,7 +204,7 @@ struct Probe<'a> {
 
 impl<'a> Probe<'a> {
     /// `None` where the target does not vary.
-    fn new(bounds: &Aabb, wanted: &'a Wanted, region: Option<&dyn Field>) -> Result<Option<Probe<'a>>, Fault> {
+    fn new(bounds: &Aabb, wanted: &'a PhaseRequest, region: Option<&dyn Field>) -> Result<Option<Probe<'a>>, Fault> {
         if wanted.orientation.is_constant() && wanted.wavelength.iter().all(|g| g.constant().is_some()) {
             return Ok(None);
         }

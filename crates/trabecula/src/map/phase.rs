@@ -15,9 +15,9 @@ use super::integral::{Integral, Problem};
 use super::judged::{Judged, fold_at_node, fold_between, targets};
 use super::pace;
 use super::periods::{Angles, Period, tried};
-use super::phase_found::Found;
+use super::phase_candidate::Candidate;
+use super::phase_request::{PhaseRequest, Settings};
 use super::phase_target::{Laid, Target};
-use super::phase_wanted::{Settings, Wanted};
 use super::region_holes::{MOST, Sought};
 use super::remedy::{folded, remedy};
 use super::singular_lines::{SingularLine, singular_lines};
@@ -46,7 +46,7 @@ const PADDING: usize = 2;
 pub struct Phase {
     solution: Solution,
     periods: Vec<Period>,
-    wanted: Wanted,
+    wanted: PhaseRequest,
     shift: Vec3,
     /// Least and greatest target wavelength, mm.
     wavelengths: [f64; 2],
@@ -75,13 +75,13 @@ impl Phase {
     /// # Errors
     /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
     /// grid that is too coarse or too large; a map that folds.
-    pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
+    pub fn solve(bounds: &Aabb, wanted: &PhaseRequest, settings: &Settings) -> Result<Phase, Fault> {
         let Some(range) = wanted.stretch else {
             return Phase::solved_once(bounds, wanted, settings);
         };
         // The grid for a range is another one, and cells held in it may fold or be stretched by more than those of the map without:
         // that is taken where it keeps to the range, or comes nearer to it.
-        let free = Phase::solved_once(bounds, &Wanted { stretch: None, ..wanted.clone() }, settings);
+        let free = Phase::solved_once(bounds, &PhaseRequest { stretch: None, ..wanted.clone() }, settings);
         let excess = |made: &Phase| range.excess(made.distortion.stretch);
         let free = free.map(|made| Phase { wanted: wanted.clone(), ..made });
         if free.as_ref().is_ok_and(|free| excess(free) <= 1.0) {
@@ -94,7 +94,7 @@ impl Phase {
         }
     }
 
-    fn solved_once(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
+    fn solved_once(bounds: &Aabb, wanted: &PhaseRequest, settings: &Settings) -> Result<Phase, Fault> {
         let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
         // A part mostly touches its bounds: there cells are held within a range only if the grid has some on both sides.
         let grid = match (wanted.stretch, settings.region) {
@@ -128,7 +128,7 @@ impl Phase {
         let solution =
             Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
         let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
-        let mut found = Found { target, weights, solution, periods: Vec::new(), mean, steps, judged };
+        let mut found = Candidate { target, weights, solution, periods: Vec::new(), mean, steps, judged };
         let mut tried = String::new();
         if found.judged.fold.is_some() || found.judged.missed > MISSED[0] {
             let (closed, words) = closed(&laid, wanted, settings, ratio)?;
@@ -150,9 +150,9 @@ impl Phase {
     /// The map of what was found, if it does not fold.
     fn of(
         bounds: &Aabb,
-        wanted: &Wanted,
+        wanted: &PhaseRequest,
         settings: &Settings,
-        (laid, found): (Laid, Found),
+        (laid, found): (Laid, Candidate),
         (hasty, mut tried): (Option<String>, String),
     ) -> Result<Phase, Fault> {
         let wavelength = found.target.wavelength(&laid);
@@ -170,7 +170,8 @@ impl Phase {
             return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
         let hasty = hasty.or_else(|| pace::thin(&laid.grid, found.judged.deepest));
-        let Found { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } = found;
+        let Candidate { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } =
+            found;
         let stress_range = target.range;
         let shift = wanted.shift(&mean);
         let corner = norm(laid.grid.step);
@@ -351,7 +352,7 @@ impl Mapping for Phase {
 }
 
 /// The singular lines of a target, but for short ones.
-fn lines(laid: &Laid, wanted: &Wanted, target: &Target) -> Vec<SingularLine> {
+fn lines(laid: &Laid, wanted: &PhaseRequest, target: &Target) -> Vec<SingularLine> {
     let least = 0.5 * target.wavelength(laid).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
     singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
 }
@@ -371,31 +372,37 @@ fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
     smallest.fold([f64::INFINITY, 0.0], |[a, b], w| [a.min(w), b.max(w)])
 }
 
-impl Found {
+impl Candidate {
     /// Whether it is taken where phases of one value would be: its error is far less, and it does not fold where they do not.
-    fn is_better_than(&self, single: &Found) -> bool {
+    fn is_better_than(&self, single: &Candidate) -> bool {
         let (own, other) = (&self.judged, &single.judged);
         (own.fold.is_none() || other.fold.is_some()) && own.missed <= MISSED[1] * other.missed
     }
 
     /// The solution with whole phases on faces.
-    fn fixed(self, laid: &Laid, wanted: &Wanted, region: &dyn Field) -> Result<Found, Fault> {
-        let Found { target, weights, solution, periods, mean, steps, .. } = self;
+    fn fixed(self, laid: &Laid, wanted: &PhaseRequest, region: &dyn Field) -> Result<Candidate, Fault> {
+        let Candidate { target, weights, solution, periods, mean, steps, .. } = self;
         let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
         let solution = fixed(&problem, laid, region, &wanted.fix, wanted.shift(&mean), solution)?;
         let weights = problem.weights;
         let judged = Judged::of(laid, wanted, Some(region), &target, &solution)?;
-        Ok(Found { target, weights, solution, periods, mean, steps, judged })
+        Ok(Candidate { target, weights, solution, periods, mean, steps, judged })
     }
 
     /// The solution whose cells are stretched within a range; where that folds and the one without a range does not, the latter.
-    fn bounded(self, laid: &Laid, wanted: &Wanted, region: Option<&dyn Field>, range: Stretch) -> Result<Found, Fault> {
+    fn bounded(
+        self,
+        laid: &Laid,
+        wanted: &PhaseRequest,
+        region: Option<&dyn Field>,
+        range: Stretch,
+    ) -> Result<Candidate, Fault> {
         let [least, most] = range.range();
         let [low, high] = self.judged.distortion.stretch;
         if self.judged.fold.is_none() && low >= least && high <= most {
             return Ok(self);
         }
-        let Found { target, weights, solution, periods, mean, steps, judged: before } = self;
+        let Candidate { target, weights, solution, periods, mean, steps, judged: before } = self;
         let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
         // The cells of the grid that the region reaches into.
         let reach = norm(laid.grid.step);
@@ -422,13 +429,18 @@ impl Found {
             (None, Some(_)) => (solution, before),
             _ => (held, judged),
         };
-        Ok(Found { target, weights, solution, periods, mean, steps, judged })
+        Ok(Candidate { target, weights, solution, periods, mean, steps, judged })
     }
 }
 
 /// The map whose phases close round all holes, if the region has some: of the best whole numbers of cells the first that does not fold, or
 /// if all do and where they may, the best. Also what was tried, in words.
-fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Result<(Option<Found>, String), Fault> {
+fn closed(
+    laid: &Laid,
+    wanted: &PhaseRequest,
+    settings: &Settings,
+    ratio: f64,
+) -> Result<(Option<Candidate>, String), Fault> {
     let Some(region) = settings.region else { return Ok((None, String::new())) };
     let sought = Sought { grid: &laid.grid, depth: &laid.depth, region };
     let count = sought.count();
@@ -458,7 +470,7 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
             let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
             if judged.fold.is_none() {
                 let words = tried(&periods);
-                return Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words));
+                return Ok((Some(Candidate { target, weights, solution, periods, mean, steps, judged }), words));
             }
         }
         first.get_or_insert((solution, periods));
@@ -469,7 +481,7 @@ fn closed(laid: &Laid, wanted: &Wanted, settings: &Settings, ratio: f64) -> Resu
         return Ok((None, words));
     }
     let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
-    Ok((Some(Found { target, weights, solution, periods, mean, steps, judged }), words))
+    Ok((Some(Candidate { target, weights, solution, periods, mean, steps, judged }), words))
 }
 
 #[cfg(test)]

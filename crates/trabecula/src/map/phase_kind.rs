@@ -2,8 +2,8 @@
 
 use super::stress_kind::{StressKind, each};
 use super::{
-    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, Settings, Stretch, TwoAxes,
-    Wanted, given_twice, shared,
+    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, PhaseRequest, Settings,
+    Stretch, TwoAxes, given_twice, shared,
 };
 use crate::environment::Environment;
 use crate::field::Field;
@@ -340,7 +340,7 @@ impl PhaseKind {
         }
         let align = self.aligned(&wavelength).map_err(|f| DesignError::fault(path, f))?;
         let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
-        let wanted = Wanted {
+        let wanted = PhaseRequest {
             wavelength,
             by_principal: matches!(self.wavelength, Some(GradeOrThree::Principal(_))),
             orientation: self.orientation.build(path, environment)?,

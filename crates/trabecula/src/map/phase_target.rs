@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::frame::Frames;
 use super::phase_grid::Grid;
-use super::phase_wanted::Wanted;
+use super::phase_request::PhaseRequest;
 use super::principal_lengths::along_axes;
 use super::smooth_frames::Smoothing;
 use super::surface_frames::Surface;
@@ -37,7 +37,7 @@ pub(super) struct Laid {
 }
 
 impl Laid {
-    pub fn over(bounds: &Aabb, grid: Grid, wanted: &Wanted, region: Option<&dyn Field>) -> Result<Laid, Fault> {
+    pub fn over(bounds: &Aabb, grid: Grid, wanted: &PhaseRequest, region: Option<&dyn Field>) -> Result<Laid, Fault> {
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
         let clamp = |p: &Vec3| core::array::from_fn(|a| p[a].clamp(bounds.min[a], bounds.max[a]));
         let beyond = grid.origin.iter().zip(bounds.min).any(|(o, b)| *o < b);
@@ -136,7 +136,7 @@ pub(super) struct Target {
 impl Target {
     /// Signs and axes that are not given are chosen so that neighbours agree, the nearest to the part first, if it is known how far each
     /// node is `outside`.
-    pub fn new(laid: &Laid, wanted: &Wanted, outside: Option<&[f64]>) -> Result<Target, Fault> {
+    pub fn new(laid: &Laid, wanted: &PhaseRequest, outside: Option<&[f64]>) -> Result<Target, Fault> {
         let weight: Vec<f64> = (0..laid.grid.len()).map(|n| laid.nearness(FALL, n).powi(2)).collect();
         let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
         let Frames { at_nodes: frames, trust, range } = wanted.orientation.frames(
@@ -168,7 +168,7 @@ impl Target {
     }
 
     /// The roots of the weights of nodes, as surroundings count where phases have one value everywhere.
-    pub fn roots(&self, laid: &Laid, wanted: &Wanted) -> Result<Option<Vec<f64>>, Fault> {
+    pub fn roots(&self, laid: &Laid, wanted: &PhaseRequest) -> Result<Option<Vec<f64>>, Fault> {
         laid.roots(wanted.weight.as_ref(), self.trust.as_deref(), FALL)
     }
 }

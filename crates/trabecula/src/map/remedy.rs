@@ -2,12 +2,12 @@
 
 use super::covering;
 use super::frame::Orientation;
-use super::phase_wanted::Wanted;
+use super::phase_request::PhaseRequest;
 use super::singular_lines::{Alike, SingularLine};
 use geometry::fault::{Fault, number, position};
 use geometry::math::Vec3;
 
-impl Wanted {
+impl PhaseRequest {
     /// What makes directions vary more slowly where `smooth` is possible, else where the surface alone gives them.
     pub(super) fn smoother(&self) -> &'static str {
         match (&self.orientation, self.align) {
@@ -35,7 +35,7 @@ impl Wanted {
 }
 
 /// What may keep a map from folding, whose cells are at most `longest` mm long.
-pub(super) fn remedy(wanted: &Wanted, longest: f64, covered: bool, singular: &[SingularLine]) -> String {
+pub(super) fn remedy(wanted: &PhaseRequest, longest: f64, covered: bool, singular: &[SingularLine]) -> String {
     let slower = "let orientation and wavelength vary more slowly";
     let smoother = match (&wanted.orientation, wanted.smooth) {
         (Orientation::Angles(_), _) => wanted.align.map(|_| wanted.smoother().to_string()),

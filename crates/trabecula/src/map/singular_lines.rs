@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use super::cube_turns::{is_near, nearest};
 use super::phase_grid::Grid;
 use super::pierced_faces::{Pierced, length, matched, polylines};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
@@ -146,8 +147,7 @@ impl Alike {
     fn is_near(&self, a: &Mat3, b: &Mat3) -> bool {
         match self {
             Alike::Line => dot(third(a), third(b)) > 0.0,
-            // Twice the cosine of an eighth of a turn, and one.
-            Alike::Turned(_) => agreement(a, b) > 1.0 + core::f64::consts::SQRT_2,
+            Alike::Turned(_) => is_near(a, b),
         }
     }
 
@@ -161,11 +161,7 @@ impl Alike {
             }
             Alike::Turned(all) => {
                 // The rotations in space, one after the other, as quaternions: a whole turn is −1.
-                let step = |(a, b): (&Mat3, &Mat3)| {
-                    let near =
-                        all.iter().map(|t| product(b, t)).max_by(|p, q| agreement(a, p).total_cmp(&agreement(a, q)));
-                    quaternion(&product(&near.unwrap_or(*b), &transpose(a)))
-                };
+                let step = |(a, b): (&Mat3, &Mat3)| quaternion(&product(&nearest(b, a, all), &transpose(a)));
                 // Each edge is followed in one direction, so that both faces at it see the same.
                 let steps = (0..4).map(|i| match i {
                     0 | 1 => step((&frames[i], &frames[i + 1])),
@@ -182,11 +178,6 @@ impl Alike {
 
 fn third(m: &Mat3) -> Vec3 {
     [m[0][2], m[1][2], m[2][2]]
-}
-
-/// One and twice the cosine of the angle between two frames.
-pub(super) fn agreement(a: &Mat3, b: &Mat3) -> f64 {
-    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
 }
 
 /// The unit quaternion of a rotation by at most half a turn, w ≥ 0.

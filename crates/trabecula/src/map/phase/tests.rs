@@ -18,9 +18,9 @@ fn bounds(min: Vec3, max: Vec3) -> Aabb {
     Aabb { min, max }
 }
 
-fn about_z(angle: &str, wavelength: Grade) -> Wanted {
+fn about_z(angle: &str, wavelength: Grade) -> PhaseRequest {
     let zero = || Grade::Constant(0.0);
-    Wanted::new(
+    PhaseRequest::new(
         [wavelength.clone(), wavelength.clone(), wavelength],
         Orientation::Angles([zero(), zero(), formula(angle)]),
     )
@@ -39,10 +39,10 @@ fn what_does_not_vary_is_the_affine_map() {
     let angles = [20.0, 35.0, 50.0];
     let wavelength = [4.0, 5.0, 3.0];
     let offset = [0.3, -0.2, 5.0];
-    let wanted = Wanted {
+    let wanted = PhaseRequest {
         weight: Some(formula("1 + x*x")),
         offset,
-        ..Wanted::new(wavelength.map(Grade::Constant), Orientation::Angles(angles.map(Grade::Constant)))
+        ..PhaseRequest::new(wavelength.map(Grade::Constant), Orientation::Angles(angles.map(Grade::Constant)))
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
     let affine = Affine::rigid(wavelength, angles, offset, &[]).expect("map");
@@ -234,8 +234,8 @@ fn the_region_counts_and_its_surroundings_hardly() {
 #[test]
 fn what_cannot_be_solved_is_refused_with_its_place() {
     let b = bounds([0.0; 3], [10.0, 10.0, 10.0]);
-    let solve = |w: &Wanted, step| Phase::solve(&b, w, &Settings { step, ..Settings::default() }).err();
-    let refused = |w: &Wanted, key: &str, words: &str| {
+    let solve = |w: &PhaseRequest, step| Phase::solve(&b, w, &Settings { step, ..Settings::default() }).err();
+    let refused = |w: &PhaseRequest, key: &str, words: &str| {
         let f = solve(w, None).expect("refused");
         assert!(f.at == key && f.message.contains(words), "{f}");
     };
@@ -249,7 +249,7 @@ fn what_cannot_be_solved_is_refused_with_its_place() {
     assert!(leap.contains("jumps from 2 to 5 mm") && !leap.contains("smaller step"), "{leap}");
     let steep = solve(&about_z("0*x", formula("3 + 2*tanh(8*(x-5.1))")), Some(0.5)).expect("refused").message;
     assert!(steep.contains("smaller step"), "{steep}");
-    let weighed = |w: f64| Wanted { weight: Some(Grade::Constant(w)), ..about_z("x", Grade::Constant(2.0)) };
+    let weighed = |w: f64| PhaseRequest { weight: Some(Grade::Constant(w)), ..about_z("x", Grade::Constant(2.0)) };
     refused(&weighed(-1.0), "weight", "-1; a weight is a finite number from 0 up");
     refused(&weighed(0.0), "weight", "0 everywhere");
     let fine = solve(&about_z("x", Grade::Constant(2.0)), Some(1e-4)).expect("refused");
@@ -266,7 +266,7 @@ fn errors_go_where_they_weigh_least() {
     let one = |_: Vec3| 1.0;
     let left = |p: Vec3| (-p[0] / 4.0).exp();
     let solve = |weight| {
-        let wanted = Wanted { weight, ..turned.clone() };
+        let wanted = PhaseRequest { weight, ..turned.clone() };
         Phase::solve(&b, &wanted, &Settings::default()).expect("solved")
     };
     let miss = |map: &Phase, weight: &dyn Fn(Vec3) -> f64| -> f64 {
@@ -288,7 +288,7 @@ fn errors_go_where_they_weigh_least() {
     assert!(miss(&even, &one) < 0.97 * miss(&heavy, &one));
     assert!(miss(&heavy, &left) < 0.97 * miss(&even, &left));
     for bad in ["x - 1", "0*x"] {
-        let wanted = Wanted { weight: Some(formula(bad)), ..turned.clone() };
+        let wanted = PhaseRequest { weight: Some(formula(bad)), ..turned.clone() };
         let fault = Phase::solve(&b, &wanted, &Settings::default()).err();
         assert_eq!(fault.expect("refused").at, "weight", "{bad}");
     }
@@ -302,7 +302,7 @@ fn angles_are_bought_with_spacings() {
     let ball = crate::region::Sphere::new([8.0, 8.0, 2.0], 7.0).expect("ball");
     for region in [None, Some(&ball as &dyn Field)] {
         let solve = |angle_weight, angle: &str| {
-            let wanted = Wanted { angle_weight, ..about_z(angle, Grade::Constant(2.0)) };
+            let wanted = PhaseRequest { angle_weight, ..about_z(angle, Grade::Constant(2.0)) };
             let settings = Settings { region, ..Settings::default() };
             Phase::solve(&b, &wanted, &settings)
         };
@@ -336,7 +336,7 @@ fn misfits_are_those_of_the_report() {
     // Tension along a direction that turns, the same in all directions across it.
     let bar = ["cos(0.07*x)^2", "sin(0.07*x)^2", "0", "0", "0", "cos(0.07*x)*sin(0.07*x)"].map(formula);
     let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
-    let laid = |stress: [Grade; 6]| Wanted { orientation: Orientation::Stress(stress.into()), ..turned.clone() };
+    let laid = |stress: [Grade; 6]| PhaseRequest { orientation: Orientation::Stress(stress.into()), ..turned.clone() };
     for wanted in [turned.clone(), laid(stress), laid(bar)] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.solution.grid();
@@ -486,9 +486,9 @@ fn a_wider_range_is_met_where_a_narrower_one_gives_such_a_map() {
     let mut met = 0;
     for angles in turned {
         let made = |range: [f64; 2]| {
-            let wanted = Wanted {
+            let wanted = PhaseRequest {
                 stretch: Some(Stretch::new(range).expect("range")),
-                ..Wanted::new([3.0; 3].map(Grade::Constant), Orientation::Angles(angles.map(formula)))
+                ..PhaseRequest::new([3.0; 3].map(Grade::Constant), Orientation::Angles(angles.map(formula)))
             };
             let settings = Settings { region: Some(&ball), folds: true, step: None };
             Phase::solve(&b, &wanted, &settings).expect("solved")
@@ -511,7 +511,7 @@ fn aligned_cells_are_asked_for_along_the_normal_at_the_surface() {
     let b = bounds([0.0; 3], [24.0; 3]);
     let cube = crate::region::Cuboid::new([0.0; 3], [24.0; 3]).expect("box");
     for angle in [5.0, 20.0, -30.0] {
-        let wanted = Wanted {
+        let wanted = PhaseRequest {
             align: Some(Aligned::new(6.0).expect("depth")),
             ..about_z(&format!("{angle}"), Grade::Constant(3.0))
         };
@@ -546,7 +546,8 @@ fn whole_cells_go_round_a_tube_of_any_size() {
     let tube = tube.expect("tube");
     let b = bounds([-12.1, -12.1, 0.0], [12.1, 12.1, 6.5]);
     for length in [2.6, 2.8, 3.0] {
-        let wanted = Wanted::new([length; 3].map(Grade::Constant), Orientation::Stress(stress.map(formula).into()));
+        let wanted =
+            PhaseRequest::new([length; 3].map(Grade::Constant), Orientation::Stress(stress.map(formula).into()));
         let map = Phase::solve(&b, &wanted, &Settings { region: Some(&tube), ..Settings::default() }).expect("solved");
         let [period] = map.periods() else { panic!("{length}: {:?}", map.distortion()) };
         let round = period.cells.iter().map(|n| n.abs()).max().expect("three");

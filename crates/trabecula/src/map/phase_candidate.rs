@@ -8,7 +8,7 @@ use super::solution::Solution;
 use geometry::math::Mat3;
 
 /// A solution, and what it was found for.
-pub(super) struct Found {
+pub(super) struct Candidate {
     pub target: Target,
     /// What errors count.
     pub weights: Weights,

@@ -16,7 +16,7 @@ use geometry::math::{Mat3, Vec3, dot};
 const LEAST_RATIO: f64 = 0.001;
 /// The target of a map.
 #[derive(Clone)]
-pub struct Wanted {
+pub struct PhaseRequest {
     /// Cell edges (mm) along the cell's axes, or the principal directions of a stress.
     pub wavelength: [Grade; 3],
     /// Whether they are those along the principal directions of a stress, the greatest value's first.
@@ -42,10 +42,10 @@ pub struct Wanted {
     pub core: Option<Covering>,
 }
 
-impl Wanted {
+impl PhaseRequest {
     /// Cells of these edges (mm) along their axes, turned so, and nothing else.
-    pub fn new(wavelength: [Grade; 3], orientation: Orientation) -> Wanted {
-        Wanted {
+    pub fn new(wavelength: [Grade; 3], orientation: Orientation) -> PhaseRequest {
+        PhaseRequest {
             wavelength,
             by_principal: false,
             orientation,
