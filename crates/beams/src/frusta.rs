@@ -86,9 +86,9 @@ impl Quadors {
 /// How far the nodes of a chain may be from the meridian of one quadric, as a share of its radius: files give some seven digits.
 const SAME: f64 = 1e-4;
 
-/// What became of chains of frusta.
+/// The beams that chains of frusta were joined to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Joined {
+pub struct JoinedChains {
     /// The beams that were chains: the last ones.
     pub beams: core::ops::Range<u32>,
     /// Number of frusta that were parts of them.
@@ -98,8 +98,8 @@ pub struct Joined {
 /// Makes one beam of each chain of frusta that represents one quadric as [`Quadors::frusta`] does: the radius of its two ends is then
 /// that of the quadric at mid length. Its hubs have balls, of their own or as other beams' ends. What goes on from a hub to a contact
 /// circle behind its centre is dropped, as its ball holds it. Other chains stay.
-pub fn join_chains(graph: &mut BeamGraph) -> Joined {
-    let mut joined = Joined { beams: graph.beams.len() as u32..graph.beams.len() as u32, frusta: 0 };
+pub fn join_chains(graph: &mut BeamGraph) -> JoinedChains {
+    let mut joined = JoinedChains { beams: graph.beams.len() as u32..graph.beams.len() as u32, frusta: 0 };
     if graph.flat.is_empty() {
         return joined;
     }

@@ -52,7 +52,7 @@ pub mod pattern;
 pub mod quador;
 mod step;
 
-pub use frusta::{Frusta, Joined, join_chains};
+pub use frusta::{Frusta, JoinedChains, join_chains};
 pub use graph::{Beam, Graph, Hub, Profile, Wireframe};
 pub use pattern::{Pattern, PatternField};
 pub use quador::slice::{Plane, Slice};

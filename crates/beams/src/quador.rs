@@ -64,7 +64,7 @@ mod stereographic;
 mod tessellation;
 
 pub use bezier::Bezier;
-pub use block_fill::Wanted;
+pub use block_fill::FillRequest;
 pub use closest::{Closest, ClosestPoints};
 pub use collisions::Collision;
 pub use fillet_sizes::HubFillets;
@@ -73,7 +73,7 @@ pub use hub_quadric::Quadric;
 pub use integral::MassProperties;
 pub use pencil::Pencil;
 pub use periodic_cell::PeriodicCell;
-pub use rational_patch::{Patch, TrimCurve, homogeneous_matrix};
+pub use rational_patch::{RationalPatch, TrimCurve, homogeneous_matrix};
 pub use rays::Hit;
 pub use tessellation::{Measures, Tessellation};
 

@@ -14,7 +14,7 @@ use geometry::math::{Vec3, add, cross};
 use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
-use crate::quador::brep::{Brep, CurveKey, Piece, Surface, Use};
+use crate::quador::brep::{Brep, CurveKey, EdgeUse, HubGroup, Surface};
 use crate::quador::slice::Plane;
 
 /// What a STEP file contains.
@@ -57,9 +57,9 @@ pub fn write_step(
     out: &mut dyn io::Write,
 ) -> Result<StepSummary, Stopped> {
     let many = assembly.unwrap_or(quadors.len() > SHELL);
-    let pieces = if many { quadors.pieces(planes) } else { Vec::new() };
-    if assembly.unwrap_or(2 * pieces.len() <= quadors.len()) && many {
-        return write_assembly(quadors, &pieces, title, out);
+    let groups = if many { quadors.hub_groups(planes) } else { Vec::new() };
+    if assembly.unwrap_or(2 * groups.len() <= quadors.len()) && many {
+        return write_assembly(quadors, &groups, title, out);
     }
     let brep = quadors.brep(planes).map_err(Stopped::Refused)?;
     let components = brep.components();
@@ -132,7 +132,7 @@ fn write_solids(
 
 fn write_assembly(
     quadors: &Quadors,
-    pieces: &[Piece],
+    groups: &[HubGroup],
     title: Title,
     out: &mut dyn io::Write,
 ) -> Result<StepSummary, Stopped> {
@@ -140,19 +140,19 @@ fn write_assembly(
     let mut file = Part21::new(out, title).map_err(Stopped::Io)?;
     let whole = Product::write(&mut file).map_err(Stopped::Io)?;
     let planar = file.parameter_plane().map_err(Stopped::Io)?;
-    let mut parts = Vec::with_capacity(pieces.len());
+    let mut parts = Vec::with_capacity(groups.len());
     let mut summary = StepSummary::default();
     let mut solids = 0;
-    for piece in pieces {
+    for group in groups {
         checkpoint();
-        let brep = quadors.piece(piece).map_err(Stopped::Refused)?;
+        let brep = quadors.group_brep(group).map_err(Stopped::Refused)?;
         let mut components = brep.components();
         let mut volume = 0.0;
         let mut kept = Vec::with_capacity(components.len());
         for faces in &components {
             let within = volume_within(&brep, faces)?;
             // What moved planes leave is no solid.
-            let is_solid = !piece.is_cut() || within > SLIVER * quadors.typical_radius().powi(3);
+            let is_solid = !group.is_cut() || within > SLIVER * quadors.typical_radius().powi(3);
             if is_solid && within <= 0.0 {
                 return Err(refused(CAVITY));
             }
@@ -164,15 +164,15 @@ fn write_assembly(
         if components.is_empty() {
             continue;
         }
-        summary.volume += volume * piece.hubs.len() as f64;
-        solids += components.len() * piece.hubs.len();
+        summary.volume += volume * group.hubs.len() as f64;
+        solids += components.len() * group.hubs.len();
         let mut write = || {
             let product = whole.another(&mut file, &format!("{} hub {}", title.name, parts.len() + 1))?;
             let solids = write_solids(&brep, &components, &mut file, planar, &mut summary)?;
             product.finish(&mut file, &solids)
         };
         let shape = write().map_err(Stopped::Io)?;
-        parts.push((shape, piece.hubs.iter().map(|h| quadors.center(*h as usize)).collect()));
+        parts.push((shape, group.hubs.iter().map(|h| quadors.center(*h as usize)).collect()));
     }
     if parts.is_empty() {
         return Err(nothing_left());
@@ -334,7 +334,7 @@ impl Writer<'_, '_> {
         Ok(made)
     }
 
-    fn oriented_edge(&mut self, (edge, forward): Use, curves: &HashMap<u32, Vec<Id>>) -> io::Result<Id> {
+    fn oriented_edge(&mut self, (edge, forward): EdgeUse, curves: &HashMap<u32, Vec<Id>>) -> io::Result<Id> {
         let id = match self.edges[edge as usize] {
             Some(id) => id,
             None => {

@@ -38,13 +38,13 @@ const STRAIGHT: f64 = 0.0175;
 
 /// The creases that end at a vertex: how many, the sum of their directions, and the last of them.
 #[derive(Clone, Copy, Default)]
-struct About {
+struct VertexCreases {
     count: usize,
     sum: Vec3,
     last: u32,
 }
 
-impl About {
+impl VertexCreases {
     /// Whether two meet there and turn by no more than an angle.
     fn runs_on(&self, angle: f64) -> bool {
         self.count == 2 && norm(self.sum) <= 2.0 * (angle / 2.0).sin()
@@ -54,7 +54,7 @@ impl About {
 /// The creases of a mesh: edges of two triangles whose normals differ.
 pub fn creases(mesh: &Mesh) -> Creases {
     let mut creases = Creases::default();
-    let mut about: HashMap<u32, About> = HashMap::new();
+    let mut about: HashMap<u32, VertexCreases> = HashMap::new();
     // Which creases go on in a straight line.
     let mut straight: Vec<(u32, [u32; 2])> = Vec::new();
     for edge in Edges::of(&mesh.triangles).each() {
@@ -76,7 +76,7 @@ pub fn creases(mesh: &Mesh) -> Creases {
             if at.count == 1 {
                 straight.push((v, [at.last, number]));
             }
-            *at = About { count: at.count + 1, sum: add(at.sum, way), last: number };
+            *at = VertexCreases { count: at.count + 1, sum: add(at.sum, way), last: number };
         }
     }
     straight.retain(|(v, _)| about[v].runs_on(STRAIGHT));

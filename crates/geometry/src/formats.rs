@@ -43,7 +43,7 @@ pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
 pub use text::column;
-pub use threemf::{BeamLattice, Cap, Companions, Frustum, object_names, read_object, write_beam_lattice};
+pub use threemf::{BeamLattice, Cap, CompanionMeshes, Frustum, object_names, read_object, write_beam_lattice};
 pub use vti::{pvti, vti_frame, write_vti};
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;

@@ -64,7 +64,7 @@ impl Background {
 
 /// What a picture shows besides the form of a surface; a legend says what is what.
 #[derive(Clone, Debug, Default)]
-pub struct Look {
+pub struct RenderOptions {
     /// The colours of the surface.
     pub colours: Option<Colours>,
     /// Lines, seen through the surface too. A surface without colours is pale then.
@@ -82,8 +82,8 @@ pub struct Look {
     pub marks: Marks,
 }
 
-impl Look {
-    /// Whether a picture has room for the legend and the marks of this look: there is none for them in a small one.
+impl RenderOptions {
+    /// Whether a picture has room for the legend and the marks: there is none for them in a small one.
     pub fn fits(&self, view: &View) -> bool {
         let paper = Paper { size: view.size, channels: 3, bytes: Vec::new() };
         let marked = self.marks != Marks::default();
@@ -101,19 +101,19 @@ const SAMPLES: usize = 6_000_000;
 /// Draws the surface; returns rows from the top, RGB, or RGBA (not premultiplied) on a transparent background.
 ///
 /// Fitted to the bounds but for a margin of 4 % on each side, above legend and marks, +Z up, nine samples a pixel. The lattice is smooth
-/// and warm, cuts by the region's boundary are flat and cool, unless the look has colours of its own. The picture is the same for any number of threads. A side of 0 pixels
+/// and warm, cuts by the region's boundary are flat and cool, unless the options have colours. The picture is the same for any number of threads. A side of 0 pixels
 /// gives no rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
-pub fn render(surface: &SurfaceMesh, view: &View, look: &Look) -> Vec<u8> {
-    render_in_bands(surface, view, look, SAMPLES)
+pub fn render(surface: &SurfaceMesh, view: &View, options: &RenderOptions) -> Vec<u8> {
+    render_in_bands(surface, view, options, SAMPLES)
 }
 
 /// Draws about `samples` samples at once.
-fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usize) -> Vec<u8> {
-    let channels = look.background.channels();
+fn render_in_bands(surface: &SurfaceMesh, view: &View, options: &RenderOptions, samples: usize) -> Vec<u8> {
+    let channels = options.background.channels();
     let mut paper = Paper { size: view.size, channels, bytes: Vec::new() };
-    let legend = legend::rows(look, view, &paper);
+    let legend = legend::rows(options, view, &paper);
     let foot = legend::height(&legend, &paper) * OVER;
-    let Some((bytes, per_mm)) = picture(surface, view, look, (foot, true), samples) else {
+    let Some((bytes, per_mm)) = picture(surface, view, options, (foot, true), samples) else {
         return Vec::new();
     };
     paper.bytes = bytes;
@@ -128,7 +128,7 @@ fn render_in_bands(surface: &SurfaceMesh, view: &View, look: &Look, samples: usi
 fn picture(
     surface: &SurfaceMesh,
     view: &View,
-    look: &Look,
+    options: &RenderOptions,
     (foot, hatched): (usize, bool),
     samples: usize,
 ) -> Option<(Vec<u8>, Option<f64>)> {
@@ -139,25 +139,25 @@ fn picture(
     }
     let bounds = surface.mesh.bounds();
     let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
-    let channels = look.background.channels();
+    let channels = options.background.channels();
     let mut bytes = vec![0u8; channels * pixels];
     let mut per_mm = None;
     if drawn {
         let size = [w * OVER, h * OVER];
         let room = [size[0], size[1].saturating_sub(foot).max(1)];
-        let section = look.section.map(|s| s.before_faces(&bounds));
+        let section = options.section.map(|s| s.before_faces(&bounds));
         let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
         let camera = Camera::new(&bounds, &shown, view, room);
         per_mm = Some(camera.samples_per_mm(1.0 / camera.distance) / OVER as f64);
-        let finish = match (&look.colours, &look.lines) {
-            (Some(colours), _) => Finish::Coloured(colours, look.section_colours.as_ref()),
+        let finish = match (&options.colours, &options.lines) {
+            (Some(colours), _) => Finish::Coloured(colours, options.section_colours.as_ref()),
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let mut body = Layer::new(surface, &camera, size, (finish, look.normals.as_deref()), section);
+        let mut body = Layer::new(surface, &camera, size, (finish, options.normals.as_deref()), section);
         body.shader.hatched = hatched;
-        let tubes = look.lines.as_ref().map(Tubes::of);
+        let tubes = options.lines.as_ref().map(Tubes::of);
         let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, (Finish::Lines(t), None), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
@@ -167,10 +167,10 @@ fn picture(
             if let Some((over, drawn)) = lines.as_ref().map(|l| l.draw(first, count)) {
                 lines::overlay(&mut picture, &raster, &drawn, &over);
             }
-            resolve(&picture, view.size, i * rows / OVER, look.background, part);
+            resolve(&picture, view.size, i * rows / OVER, options.background, part);
         }
     } else {
-        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, look.background, &mut bytes);
+        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, options.background, &mut bytes);
     }
     Some((bytes, per_mm))
 }

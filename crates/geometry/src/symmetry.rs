@@ -9,7 +9,7 @@ mod orbit;
 mod site;
 mod spelling;
 
-pub use orbit::Side;
+pub use orbit::ComplexPart;
 
 use crate::fault::Fault;
 use crate::math::Vec3;

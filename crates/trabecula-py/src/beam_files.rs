@@ -4,7 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use beams::graph::UnitCell;
-use geometry::formats::{Companions, GRAPH_FORMATS, Indexed};
+use geometry::formats::{CompanionMeshes, GRAPH_FORMATS, Indexed};
 use geometry::math::Vec3;
 use geometry::progress::Stopped;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -117,7 +117,7 @@ pub fn write_beam_lattice<'py>(
     fn mesh(of: &Option<Py<Mesh>>) -> Option<&dyn Indexed> {
         of.as_ref().map(|m| m.get().mesh() as &dyn Indexed)
     }
-    let meshes = Companions { clip: mesh(&clip), shown: mesh(&shown) };
+    let meshes = CompanionMeshes { clip: mesh(&clip), shown: mesh(&shown) };
     let made = run(py, threads, None, |_| {
         let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path).map_err(Stopped::Io)?);
         let mut aside = file::nameless(&path, ".1").map_err(Stopped::Io)?;

@@ -26,12 +26,12 @@ const NUMBERS: usize = 7;
 const PLAIN: u64 = u64::MAX;
 
 /// A layer as its file has it, and its figures.
-struct Made {
+struct EncodedLayer {
     figures: LayersReport,
     encoded: Encoded,
 }
 
-impl Made {
+impl EncodedLayer {
     /// Adds its bytes to `data`, and what is known besides to `partial`.
     fn pack(self, data: &mut Vec<u8>, partial: &mut Vec<u8>) {
         let it = self.figures;
@@ -43,7 +43,7 @@ impl Made {
     }
 
     /// The next layer of what `pack` has put together.
-    fn unpack(data: &mut impl Read, partial: &[u8]) -> Result<Made, Stopped> {
+    fn unpack(data: &mut impl Read, partial: &[u8]) -> Result<EncodedLayer, Stopped> {
         let number = |i: usize| partial[8 * i..].first_chunk().map_or(0, |b| u64::from_le_bytes(*b));
         let mut bytes = Vec::new();
         data.take(number(0)).read_to_end(&mut bytes).map_err(Stopped::Io)?;
@@ -59,7 +59,7 @@ impl Made {
             volume: f64::from_bits(number(5)),
             largest: f64::from_bits(number(6)),
         };
-        Ok(Made { figures, encoded: Encoded::of_parts(bytes, (about[1] != PLAIN).then_some(about)) })
+        Ok(EncodedLayer { figures, encoded: Encoded::of_parts(bytes, (about[1] != PLAIN).then_some(about)) })
     }
 }
 
@@ -81,11 +81,11 @@ impl LayerRanges {
         &self,
         layers: Range<usize>,
         progress: &dyn Progress,
-        mut take: impl FnMut(usize, Made) -> Result<(), Stopped>,
+        mut take: impl FnMut(usize, EncodedLayer) -> Result<(), Stopped>,
     ) -> Result<(), Stopped> {
         let encode = |index: usize, layer: &Layer| {
             let encoded = (self.format.encode)(&self.stack, index, layer);
-            encoded.map(|encoded| (index, Made { figures: LayersReport::from(layer), encoded }))
+            encoded.map(|encoded| (index, EncodedLayer { figures: LayersReport::from(layer), encoded }))
         };
         self.layers.get().slicer.each(layers, progress, encode, |made| {
             let (index, made) = made.map_err(Stopped::Io)?;
@@ -97,13 +97,13 @@ impl LayerRanges {
     fn write(
         &self,
         path: &Path,
-        fill: impl FnOnce(&mut dyn FnMut(Made) -> Result<(), Stopped>) -> Result<(), Stopped>,
+        fill: impl FnOnce(&mut dyn FnMut(EncodedLayer) -> Result<(), Stopped>) -> Result<(), Stopped>,
     ) -> Result<LayersReport, Stopped> {
         let mut out = BufWriter::with_capacity(1 << 20, file::anew(path).map_err(Stopped::Io)?);
         let mut aside = file::nameless(path, ".1").map_err(Stopped::Io)?;
         let mut writer = (self.format.open)(&self.stack, &mut out, &mut aside).map_err(Stopped::Io)?;
         let mut total = LayersReport::default();
-        fill(&mut |made: Made| {
+        fill(&mut |made: EncodedLayer| {
             total.add(&made.figures);
             writer.put(made.encoded, made.figures.largest).map_err(Stopped::Io)
         })?;
@@ -205,7 +205,7 @@ impl LayerRanges {
             let (mut done, total) = (0, self.count());
             self.write(&path, |put| {
                 for layer in partials.iter().flat_map(|range| range.chunks_exact(8 * NUMBERS)) {
-                    put(Made::unpack(&mut data, layer)?)?;
+                    put(EncodedLayer::unpack(&mut data, layer)?)?;
                     done += 1;
                     if !p.step(done as u64, total as u64) {
                         return Err(Stopped::Interrupted);

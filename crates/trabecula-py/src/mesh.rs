@@ -7,8 +7,8 @@ use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{
-    Amount, Background, Colours, Lines, Look, Marks, Page, PlaneGrid, Projection, Section, SectionColours, Shares,
-    Tint, View, line_drawing, line_drawing_fits, png, render,
+    Amount, Background, Colours, Lines, Marks, Page, PlaneGrid, Projection, RenderOptions, Section, SectionColours,
+    Shares, Tint, View, line_drawing, line_drawing_fits, png, render,
 };
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
@@ -136,19 +136,19 @@ impl Camera {
     }
 }
 
-fn look(
+fn render_options(
     Annotations { section, scale_bar, axes }: Annotations,
     tint: Option<ScaleColours>,
     shares: Option<NamedShares>,
     lines: Option<NamedLines>,
     inside: Option<GridColours>,
-) -> Look {
+) -> RenderOptions {
     let scale = tint.map(|ScaleColours { title, values, span, up }| {
         let amount = up.map_or_else(|| Amount::AtVertices(values), Amount::Overhang);
         Colours::Scale(Tint { title, amount, span })
     });
     let parts = shares.map(|NamedShares { title, names, values }| Colours::Shares(Shares { title, names, values }));
-    Look {
+    RenderOptions {
         colours: scale.or(parts),
         lines: lines.map(|NamedLines { caption, names, lines, radius }| Lines { caption, names, lines, radius }),
         section: section.map(|(normal, offset)| Section { normal, offset }),
@@ -157,7 +157,7 @@ fn look(
             values,
         }),
         marks: Marks { scale_bar, axes },
-        ..Look::default()
+        ..RenderOptions::default()
     }
 }
 
@@ -494,12 +494,13 @@ impl Mesh {
             "transparent" => Background::Transparent,
             _ => Background::Shaded,
         };
-        let (view, mut look) = (seen.view(), Look { background, ..look(cut, tint, shares, lines, inside) });
+        let (view, mut options) =
+            (seen.view(), RenderOptions { background, ..render_options(cut, tint, shares, lines, inside) });
         let bytes = run(py, None, None, |_| {
-            look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
-            png(&render(&self.surface, &view, &look), view.size, background.channels(), dpi)
+            options.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
+            png(&render(&self.surface, &view, &options), view.size, background.channels(), dpi)
         })?;
-        Ok((PyBytes::new(py, &bytes), look.fits(&view)))
+        Ok((PyBytes::new(py, &bytes), options.fits(&view)))
     }
 
     /// A line drawing as the text of an SVG file, on a page (size, unit, width of lines) of the aspect of the view; colours and lines as for
@@ -518,16 +519,16 @@ impl Mesh {
         lines: Option<NamedLines>,
         inside: Option<GridColours>,
     ) -> PyResult<(String, bool)> {
-        let (view, mut look) = (seen.view(), look(cut, tint, shares, lines, inside));
+        let (view, mut options) = (seen.view(), render_options(cut, tint, shares, lines, inside));
         let text = run(py, None, None, |_| {
-            look.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
+            options.normals = solid.map(|s| corner_normals(s.get().as_field(), &self.surface));
             line_drawing(
                 &self.surface,
                 &view,
-                &look,
+                &options,
                 &Page { size: page.size, unit: &page.unit, line_width: page.line_width },
             )
         })?;
-        Ok((text, line_drawing_fits(&look, &view)))
+        Ok((text, line_drawing_fits(&options, &view)))
     }
 }

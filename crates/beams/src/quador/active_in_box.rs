@@ -44,12 +44,12 @@ impl HalfBeamSet {
 
 /// A box in the frame of a hub: its centre and half its edges.
 #[derive(Clone, Copy)]
-pub(super) struct Around {
+pub(super) struct CentredBox {
     pub at: Vec3,
     pub half: Vec3,
 }
 
-impl Around {
+impl CentredBox {
     /// The largest magnitude of the change of a linear function with this gradient from the centre.
     #[inline]
     pub(super) fn reach(&self, a: Vec3) -> f64 {
@@ -70,13 +70,13 @@ impl Around {
 
 /// Half-beams of a hub by their numbers in it, in ascending order, with their G and R close together in memory.
 #[derive(Default)]
-pub(super) struct FewHalfBeams {
+pub(super) struct PackedHalfBeams {
     numbers: Vec<usize>,
     g: Vec<AffineFunction>,
     taus: Vec<f64>,
 }
 
-impl FewHalfBeams {
+impl PackedHalfBeams {
     pub(super) fn set(&self) -> HalfBeamSet {
         let mut set = HalfBeamSet::NONE;
         self.numbers.iter().for_each(|i| set.add(*i));
@@ -96,7 +96,7 @@ impl FewHalfBeams {
     }
 
     /// Takes the half-beams that can be active in a box, of those that can be in a box around it.
-    pub(super) fn take_active(&mut self, hub: &Hub, outer: HalfBeamSet, around: &Around) {
+    pub(super) fn take_active(&mut self, hub: &Hub, outer: HalfBeamSet, around: &CentredBox) {
         self.numbers.clear();
         let (mut first, mut most) = (usize::MAX, f64::NEG_INFINITY);
         for i in outer.of(hub.g.len()) {
@@ -127,7 +127,7 @@ impl FewHalfBeams {
     }
 
     /// Keeps one or two half-beams if they alone can be active in a box, one of them with a positive G throughout.
-    fn keep_alone(&mut self, hub: &Hub, first: usize, around: &Around) {
+    fn keep_alone(&mut self, hub: &Hub, first: usize, around: &CentredBox) {
         let mut above = self.numbers.iter().copied().filter(|k| *k != first && !hub.is_below(*k, first, around));
         let (second, third) = (above.next(), above.next());
         if third.is_some() {
@@ -147,19 +147,25 @@ impl FewHalfBeams {
 impl Hub<'_> {
     /// Whether half-beam k is surely not active where i alone is, and smaller.
     #[inline]
-    fn is_below(&self, k: usize, i: usize, around: &Around) -> bool {
+    fn is_below(&self, k: usize, i: usize, around: &CentredBox) -> bool {
         let (of, leader) = (&self.g[k], &self.g[i]);
         around.is_negative(&of.plus(-self.tau(i, k), leader), &[of, leader], 1.0)
     }
 
     #[inline]
-    fn is_positive(&self, i: usize, around: &Around) -> bool {
+    fn is_positive(&self, i: usize, around: &CentredBox) -> bool {
         let g = &self.g[i];
         around.is_negative(&AffineFunction { a: scale(g.a, -1.0), b: -g.b }, &[g], 1.0)
     }
 
     /// Whether none of `rest`, which are below `first`, is active in a box where only it and `second` can be.
-    fn are_alone(&self, first: usize, second: usize, mut rest: impl Iterator<Item = usize>, around: &Around) -> bool {
+    fn are_alone(
+        &self,
+        first: usize,
+        second: usize,
+        mut rest: impl Iterator<Item = usize>,
+        around: &CentredBox,
+    ) -> bool {
         let (of, with) = (&self.g[first], &self.g[second]);
         let leads = !around.is_negative(&with.plus(-1.0, of), &[with, of], 1.0);
         let tau = self.tau(first, second);

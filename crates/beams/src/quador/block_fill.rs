@@ -1,13 +1,13 @@
 //! The field at all nodes of a structured block: the hubs that can matter are found for parts of it instead of for each node.
 
 use super::Quadors;
-use super::active_in_box::FewHalfBeams;
+use super::active_in_box::PackedHalfBeams;
 use super::hub_in_box::{HubInBox, MOST_POINTS};
 use geometry::math::{Aabb, Interval, norm};
 
-/// Which nodes of a block need which values.
+/// Which nodes of a block are to be filled, and with which values.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct FillRequest<'a> {
     /// The nodes that need a value: one word for each row along x, of at most 64 nodes; all if there is none.
     pub nodes: Option<&'a [u64]>,
     /// Whether a node may have any value of its sign, at least the diagonal of a grid cell in magnitude, if all nodes of the cells
@@ -18,7 +18,7 @@ pub struct Wanted<'a> {
 struct Fill<'a> {
     quadors: &'a Quadors,
     axes: [&'a [f64]; 3],
-    wanted: Wanted<'a>,
+    request: FillRequest<'a>,
     /// How far around a part its bounds hold, mm: by a grid cell if only nodes near the surface need their values.
     around: f64,
     /// Diagonal of the largest grid cell, mm.
@@ -26,27 +26,27 @@ struct Fill<'a> {
     /// The hubs of the parts from the whole block to the present one.
     hubs: Vec<HubInBox>,
     /// Of the hub at hand those that can be active.
-    few: FewHalfBeams,
+    few: PackedHalfBeams,
     out: &'a mut [f32],
 }
 
 impl Quadors {
     /// Fills `out` (x fastest) with the field at the nodes of a block, given by ascending coordinates along each axis (mm). The
     /// values are those of `value`, rounded; nodes that are not wanted may have any.
-    pub fn fill(&self, axes: [&[f64]; 3], wanted: Wanted, out: &mut [f32]) {
+    pub fn fill(&self, axes: [&[f64]; 3], request: FillRequest, out: &mut [f32]) {
         if axes.iter().any(|axis| axis.is_empty()) {
             return;
         }
         let widest = axes.map(|axis| axis.windows(2).fold(0.0f64, |most, w| most.max(w[1] - w[0])));
-        let around = if wanted.near { widest.into_iter().fold(0.0, f64::max) * (1.0 + 1e-9) } else { 0.0 };
+        let around = if request.near { widest.into_iter().fold(0.0, f64::max) * (1.0 + 1e-9) } else { 0.0 };
         let mut fill = Fill {
             quadors: self,
             axes,
-            wanted,
+            request,
             around,
             diagonal: norm(widest),
             hubs: Vec::new(),
-            few: FewHalfBeams::default(),
+            few: PackedHalfBeams::default(),
             out,
         };
         let shape = axes.map(<[f64]>::len);
@@ -77,7 +77,7 @@ impl Fill<'_> {
         let sign = if range.lo > 0.0 { 1.0 } else { -1.0 };
         if own == self.hubs.len() {
             self.constant(lo, hi, self.quadors.cap);
-        } else if self.wanted.near && (range.lo > 0.0 || range.hi < 0.0) {
+        } else if self.request.near && (range.lo > 0.0 || range.hi < 0.0) {
             let far = sign * range.lo.abs().min(range.hi.abs()).max(self.diagonal);
             self.constant(lo, hi, far);
         } else {
@@ -105,7 +105,7 @@ impl Fill<'_> {
         let mut range = Interval::new(self.quadors.cap, self.quadors.cap);
         for n in first..own {
             let outer = self.hubs[n];
-            if outer.least > range.hi || self.wanted.near && range.hi < 0.0 {
+            if outer.least > range.hi || self.request.near && range.hi < 0.0 {
                 break;
             }
             let apart = self.quadors.apart(outer.hub, bounds);
@@ -128,7 +128,7 @@ impl Fill<'_> {
     }
 
     fn is_wanted(&self, lo: [usize; 3], hi: [usize; 3]) -> bool {
-        let Some(words) = self.wanted.nodes else {
+        let Some(words) = self.request.nodes else {
             return true;
         };
         let mask = (u64::MAX >> (64 - (hi[0] - lo[0]))) << lo[0];
@@ -196,7 +196,7 @@ mod tests {
                 let words: Vec<u64> = (0..rows).map(|row| if row % 3 == 0 { 0 } else { 0x6f_fff0 }).collect();
                 let fill = |nodes, near| {
                     let mut out = vec![f32::NAN; xs.len() * rows];
-                    q.fill(axes, Wanted { nodes, near }, &mut out);
+                    q.fill(axes, FillRequest { nodes, near }, &mut out);
                     out
                 };
                 let (all, some, near) = (fill(None, false), fill(Some(&words), false), fill(None, true));
@@ -234,7 +234,7 @@ mod tests {
                     (0..24).map(|i| from + step * f64::from(i)).collect::<Vec<f64>>()
                 });
                 let mut out = vec![f32::NAN; 24 * 24 * 24];
-                q.fill(axes.each_ref().map(Vec::as_slice), Wanted { nodes: None, near: false }, &mut out);
+                q.fill(axes.each_ref().map(Vec::as_slice), FillRequest { nodes: None, near: false }, &mut out);
                 for (at, v) in out.iter().enumerate() {
                     let p = [at % 24, at / 24 % 24, at / 576];
                     let p = [0, 1, 2].map(|a| axes[a][p[a]]);

@@ -17,14 +17,14 @@ use super::stereographic::Stereographic;
 
 mod cuts;
 mod face_surfaces;
+mod hub_groups;
 mod outline;
 mod parameter_curves;
-mod pieces;
 mod plane_trim;
 mod volume;
 
+pub(crate) use hub_groups::HubGroup;
 pub(crate) use parameter_curves::CurveKey;
-pub(crate) use pieces::Piece;
 
 const NONE: u32 = u32::MAX;
 
@@ -51,7 +51,7 @@ pub(crate) struct Edge {
 }
 
 /// A use of an edge by a face: its number, and whether it is traversed from its first corner.
-pub(crate) type Use = (u32, bool);
+pub(crate) type EdgeUse = (u32, bool);
 
 /// What a face is part of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,7 @@ pub(crate) struct Face {
     /// Its quadric.
     pub quadric: Quadric,
     /// Boundary loops with the face on the left, seen from outside.
-    pub loops: Vec<Vec<Use>>,
+    pub loops: Vec<Vec<EdgeUse>>,
     /// Its surface.
     pub surface: Surface,
     kind: Kind,
@@ -174,10 +174,10 @@ impl Brep<'_> {
     }
 
     /// The boundary loops of a face, where edges that were divided are replaced by their parts.
-    pub(crate) fn loops(&self, face: &Face) -> Vec<Vec<Use>> {
-        let whole = |l: &Vec<Use>| {
+    pub(crate) fn loops(&self, face: &Face) -> Vec<Vec<EdgeUse>> {
+        let whole = |l: &Vec<EdgeUse>| {
             let mut out = Vec::with_capacity(l.len());
-            let mut todo: Vec<Use> = l.iter().rev().copied().collect();
+            let mut todo: Vec<EdgeUse> = l.iter().rev().copied().collect();
             while let Some((edge, forward)) = todo.pop() {
                 match self.edge(edge).parts {
                     [NONE, _] => out.push((edge, forward)),
@@ -200,7 +200,7 @@ impl Brep<'_> {
     }
 
     /// The curve of an edge in a frame, in its direction of traversal.
-    pub(crate) fn curve(&self, (edge, forward): Use, frame: &Frame) -> Bezier<3> {
+    pub(crate) fn curve(&self, (edge, forward): EdgeUse, frame: &Frame) -> Bezier<3> {
         let Edge { hub, mut curve, .. } = *self.edge(edge);
         curve.points = curve.points.map(|p| self.placed(p, hub, frame));
         if !forward {
@@ -210,7 +210,7 @@ impl Brep<'_> {
     }
 
     /// The first corner of an edge in its direction of traversal.
-    fn start(&self, (edge, forward): Use) -> u32 {
+    fn start(&self, (edge, forward): EdgeUse) -> u32 {
         self.edge(edge).ends[usize::from(!forward)]
     }
 

@@ -3,7 +3,7 @@
 use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 use super::Quadors;
-use super::active_in_box::{Around, FewHalfBeams, HalfBeamSet};
+use super::active_in_box::{CentredBox, HalfBeamSet, PackedHalfBeams};
 use super::affine_function::AffineFunction;
 use super::hub::Hub;
 
@@ -34,15 +34,15 @@ impl HubInBox {
 impl Quadors {
     /// The range of one hub's value over a box.
     pub(crate) fn hub_bound(&self, i: usize, b: &Aabb) -> Interval {
-        self.hub_in_box(&HubInBox::anywhere(i as u32), b, &mut FewHalfBeams::default()).1
+        self.hub_in_box(&HubInBox::anywhere(i as u32), b, &mut PackedHalfBeams::default()).1
     }
 
     /// What of a hub matters in a box, and the range of its value there, from what matters in a box around it.
-    pub(super) fn hub_in_box(&self, outer: &HubInBox, b: &Aabb, few: &mut FewHalfBeams) -> (HubInBox, Interval) {
+    pub(super) fn hub_in_box(&self, outer: &HubInBox, b: &Aabb, few: &mut PackedHalfBeams) -> (HubInBox, Interval) {
         let ball = &self.balls[outer.hub as usize];
         let hub = self.hub(outer.hub as usize);
         let half = scale(b.size(), 0.5);
-        let around = Around { at: sub(b.center(), ball.center), half };
+        let around = CentredBox { at: sub(b.center(), ball.center), half };
         let x = around.at;
         few.take_active(&hub, outer.active, &around);
         let [lo, hi] = few.of(&hub).range(&around, ball.curvature);
@@ -88,7 +88,7 @@ impl Quadors {
 
     /// Lowers values at positions in a box (at most `MOST_POINTS`, by coordinate) to those of a hub. They are the least of the
     /// same values as one by one, to the last bit.
-    pub(super) fn lower(&self, within: &HubInBox, points: [&[f64]; 3], least: &mut [f64], few: &mut FewHalfBeams) {
+    pub(super) fn lower(&self, within: &HubInBox, points: [&[f64]; 3], least: &mut [f64], few: &mut PackedHalfBeams) {
         let (ball, hub) = (&self.balls[within.hub as usize], self.hub(within.hub as usize));
         let mut values = [0.0; MOST_POINTS];
         let values = &mut values[..least.len()];
@@ -142,7 +142,7 @@ impl Quadors {
 
 impl Hub<'_> {
     /// Bounds of S − N over a box, for an upper bound of half the second derivative of N.
-    fn range(&self, around: &Around, curvature: f64) -> [f64; 2] {
+    fn range(&self, around: &CentredBox, curvature: f64) -> [f64; 2] {
         let (x, h2) = (around.at, dot(around.half, around.half));
         let s = dot(x, x) - self.radius * self.radius;
         let (q, slope, curvature) = match *self.g {

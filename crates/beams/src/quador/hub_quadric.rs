@@ -97,7 +97,7 @@ impl Quadric {
 
 /// The part of space in which exactly certain half-beams of a hub are active.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
+pub(super) struct QuadricPiece {
     /// The quadric.
     pub quadric: Quadric,
     /// For each half-beam of a hub with fillets the function that vanishes where it becomes active, and is positive where it is.
@@ -121,9 +121,9 @@ fn quadric(hub: &Hub, squares: &[AffineFunction]) -> Quadric {
 }
 
 /// As `piece_quadric`, with the planes around it for given G, which may be perturbed.
-pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) -> Piece {
+pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) -> QuadricPiece {
     if hub.sharp() {
-        return Piece { quadric: piece_quadric(hub, label), toggles: Vec::new() };
+        return QuadricPiece { quadric: piece_quadric(hub, label), toggles: Vec::new() };
     }
     if label.count_ones() < 2 {
         let mut toggles: Vec<AffineFunction> = (0..hub.half_beams.len()).map(g).collect();
@@ -138,7 +138,7 @@ pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) 
                 quadric(hub, &[s.g])
             }
         };
-        return Piece { quadric, toggles };
+        return QuadricPiece { quadric, toggles };
     }
     let active = active(hub, label);
     let factor = Factor::new(&active, |i, j| hub.tau(i, j));
@@ -151,7 +151,7 @@ pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) 
         // G above Ry of the others, as seen from the piece without it.
         toggles[*i] = AffineFunction::default().plus(1.0 / factor.inverse_diagonal(k), &y[k]);
     }
-    Piece { quadric, toggles }
+    QuadricPiece { quadric, toggles }
 }
 
 fn active(hub: &Hub, label: u64) -> Vec<usize> {

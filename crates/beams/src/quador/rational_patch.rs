@@ -28,7 +28,7 @@ pub struct TrimCurve {
 
 /// A piece of a face in rational form.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Patch {
+pub struct RationalPatch {
     /// Index of the face.
     pub face: u32,
     /// Its quadric, in the hub's frame.
@@ -46,7 +46,7 @@ pub struct Patch {
 /// A boundary curve in space, and its arc.
 type BoundaryCurve = (Bezier<3>, Option<u32>);
 
-impl Patch {
+impl RationalPatch {
     /// The parametrisation.
     fn chart(&self) -> Stereographic {
         Stereographic { quadric: self.quadric, pole: self.pole, origin: self.origin, axes: self.axes }
@@ -86,9 +86,9 @@ impl Patch {
         pole: Vec3,
         origin: Vec3,
         boundary: &[Vec<BoundaryCurve>],
-    ) -> Option<Patch> {
+    ) -> Option<RationalPatch> {
         let chart = Stereographic::new(quadric, pole, origin);
-        let mut patch = Patch { face, quadric, pole, origin, axes: chart.axes, trims: Vec::new() };
+        let mut patch = RationalPatch { face, quadric, pole, origin, axes: chart.axes, trims: Vec::new() };
         for boundary_loop in boundary {
             let mut loops = Vec::new();
             let mut todo: Vec<(BoundaryCurve, u32)> = boundary_loop.iter().rev().map(|s| (*s, 6)).collect();
@@ -114,14 +114,20 @@ impl Patch {
     }
 
     /// The patch of a simply connected piece of a face, with a pole across the hub or near there.
-    fn with_opposite_pole(face: u32, quadric: Quadric, origin: Vec3, boundary: &[Vec<BoundaryCurve>]) -> Option<Patch> {
-        opposite_poles(&quadric, origin).find_map(|pole| Patch::with_pole(face, quadric, pole, origin, boundary))
+    fn with_opposite_pole(
+        face: u32,
+        quadric: Quadric,
+        origin: Vec3,
+        boundary: &[Vec<BoundaryCurve>],
+    ) -> Option<RationalPatch> {
+        opposite_poles(&quadric, origin)
+            .find_map(|pole| RationalPatch::with_pole(face, quadric, pole, origin, boundary))
     }
 }
 
 impl Complex {
     /// The exact rational patches of a hub's faces, and the number of faces for which no pole was found.
-    pub fn patches(&self, hub: &Hub) -> (Vec<Patch>, usize) {
+    pub fn patches(&self, hub: &Hub) -> (Vec<RationalPatch>, usize) {
         let (mut out, mut left) = (Vec::new(), 0);
         for (i, face) in self.faces.iter().enumerate() {
             match self.face_patches(hub, i as u32, face) {
@@ -132,7 +138,7 @@ impl Complex {
         (out, left)
     }
 
-    fn face_patches(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<Patch>> {
+    fn face_patches(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<RationalPatch>> {
         let q = face.quadric;
         if let Some(half_beam) = face.end_circle {
             let half_beam = &hub.half_beams[half_beam as usize];
@@ -141,7 +147,7 @@ impl Complex {
             return attempts.map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k))).find_map(|(n, first)| {
                 sectors(self, face, half_beam, n, first)?
                     .into_iter()
-                    .map(|(origin, boundary)| Patch::with_opposite_pole(number, q, origin, &[boundary]))
+                    .map(|(origin, boundary)| RationalPatch::with_opposite_pole(number, q, origin, &[boundary]))
                     .collect()
             });
         }
@@ -155,12 +161,12 @@ impl Complex {
                     let (n, from) = ([0.0, 0.0, z], [r, 0.0, 0.0]);
                     let end_circle = Path::new(&q, n, from, section_tangent(&q, n, from))?.ended_at(None)?;
                     let boundary = end_circle.curves().into_iter().map(|c| (c, None)).collect();
-                    Patch::with_pole(number, q, [0.0, 0.0, -z * r], [0.0, 0.0, z * r], &[boundary])
+                    RationalPatch::with_pole(number, q, [0.0, 0.0, -z * r], [0.0, 0.0, z * r], &[boundary])
                 };
                 return [1.0, -1.0].into_iter().map(half).collect();
             };
             let pole = scale(s.axis, hub.radius);
-            let patch = Patch::with_pole(number, q, pole, scale(pole, -1.0), &boundary)?;
+            let patch = RationalPatch::with_pole(number, q, pole, scale(pole, -1.0), &boundary)?;
             return Some(vec![patch]);
         }
         let middle = boundary.iter().flatten().fold([0.0; 3], |sum, (b, _)| {
@@ -169,7 +175,7 @@ impl Complex {
         });
         let middle = unit(middle);
         let origin = scale(middle, q.ray_exit(middle));
-        Some(vec![Patch::with_opposite_pole(number, q, origin, &boundary)?])
+        Some(vec![RationalPatch::with_opposite_pole(number, q, origin, &boundary)?])
     }
 
     /// An arc in its direction of traversal, or the part between two of its angles.

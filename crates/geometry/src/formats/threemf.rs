@@ -17,7 +17,7 @@ mod package;
 mod placed_beams;
 mod read;
 
-pub use beam_lattice::{BeamLattice, Cap, Companions, Frustum, write_beam_lattice};
+pub use beam_lattice::{BeamLattice, Cap, CompanionMeshes, Frustum, write_beam_lattice};
 use package::Entry;
 pub use package::Piece;
 pub use placed_beams::read_beam_lattice;

@@ -3,7 +3,7 @@
 use super::marks::SeenMarks;
 use super::palette::{LINES, colour};
 use super::paper::{Colour, INK, Paper};
-use super::{Look, Tint, View};
+use super::{RenderOptions, Tint, View};
 
 /// A row of a legend.
 pub(super) enum Row<'a> {
@@ -21,17 +21,17 @@ pub(super) enum Row<'a> {
 const ROW: usize = 3;
 
 /// The rows for a picture, from the top; none where it is too small for them.
-pub(super) fn rows<'a>(look: &'a Look, view: &View, paper: &Paper) -> Vec<Row<'a>> {
+pub(super) fn rows<'a>(options: &'a RenderOptions, view: &View, paper: &Paper) -> Vec<Row<'a>> {
     let mut found = Vec::new();
     if paper.size[0] < 180 || paper.size[1] < 8 * paper.letter() {
         return found;
     }
     let wide = paper.size[0] as f64 / paper.letter() as f64;
-    found.extend(SeenMarks::new(look.marks, view, wide).map(Row::Marks));
-    if let Some(colours) = &look.colours {
+    found.extend(SeenMarks::new(options.marks, view, wide).map(Row::Marks));
+    if let Some(colours) = &options.colours {
         colours.legend(paper, &mut found);
     }
-    if let Some(lines) = &look.lines {
+    if let Some(lines) = &options.lines {
         found.extend(names(lines.names.iter().map(String::as_str), &LINES, paper));
         found.extend(words(&lines.caption));
     }

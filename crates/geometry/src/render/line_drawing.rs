@@ -11,7 +11,7 @@ use super::section::SeenSection;
 use super::space_lines::{LineKind, SpaceLine, space_lines};
 use super::svg_path::path;
 use super::visible_parts::{Point, Seen, simpler};
-use super::{BAND, Background, Camera, Look, Marks, OVER, View, legend, picture, png, svg_legend};
+use super::{BAND, Background, Camera, Marks, OVER, RenderOptions, View, legend, picture, png, svg_legend};
 use crate::surface_mesh::SurfaceMesh;
 use std::borrow::Cow;
 
@@ -37,10 +37,10 @@ pub struct Page<'a> {
 }
 
 /// The text of an SVG file with what is seen of a surface as lines: contours, where it turns away from the eye; edges, where its faces meet at
-/// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Colours and lines of a look are
+/// more than 35°, where it ends and between lattice and cuts; the outline of a section, hatched; and marks. Colours and lines of the options are
 /// seen in a picture behind that, as large as the view says in pixels, with their legend; the background is not drawn. Empty for views that
 /// are no picture (see `render`), of which the page has the aspect.
-pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, page: &Page) -> String {
+pub fn line_drawing(surface: &SurfaceMesh, view: &View, options: &RenderOptions, page: &Page) -> String {
     let size = page.size;
     let [w, h] = view.size.map(|n| n as f64);
     let bounds = surface.mesh.bounds();
@@ -53,19 +53,20 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, page: &Page
     let part = size[0] / samples[0] as f64;
     let mut groups: [Vec<Vec<Point>>; 3] = Default::default();
     let mut hatched = Vec::new();
-    let legend = legend::rows(look, view, &paper);
+    let legend = legend::rows(options, view, &paper);
     let foot = legend::height(&legend, &paper);
-    let coloured = look.colours.is_some() || look.lines.is_some();
+    let coloured = options.colours.is_some() || options.lines.is_some();
     let mut per_mm = None;
     if !bounds.is_empty() && bounds.is_finite() {
-        let section = look.section.map(|s| s.before_faces(&bounds));
+        let section = options.section.map(|s| s.before_faces(&bounds));
         let section = section.as_ref();
         let shown = section.map_or_else(|| Cow::from(&surface.mesh.vertices), |s| Cow::from(s.kept(&surface.mesh)));
         let camera = Camera::new(&bounds, &shown, view, [samples[0], samples[1].saturating_sub(foot).max(1)]);
         let rows = samples[1].div_ceil(BAND) * BAND;
         let raster = Projected::of(surface, &camera, [samples[0], rows], section).draw(surface, 0, rows);
         let scale = camera.samples_per_mm(1.0 / camera.distance);
-        let lines = space_lines(surface, look.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / scale);
+        let lines =
+            space_lines(surface, options.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / scale);
         let seen = Seen { camera: &camera, raster: &raster };
         let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
             lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();
@@ -81,7 +82,7 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, look: &Look, page: &Page
         groups.map(|lines| lines.into_iter().map(|line| line.iter().map(|p| p.map(|c| c * part)).collect()).collect());
     let hatched = hatched.iter().map(|line| line.map(|p| p.map(|c| c * part)).to_vec()).collect();
     let behind =
-        if coloured { behind(surface, view, look, foot as f64 / samples[1] as f64, size) } else { String::new() };
+        if coloured { behind(surface, view, options, foot as f64 / samples[1] as f64, size) } else { String::new() };
     text(&drawn, &hatched, &behind, &svg_legend::text(&legend, &paper, part, per_mm), page)
 }
 
@@ -93,13 +94,13 @@ fn sheet(view: &View) -> Paper {
 }
 
 /// A picture of the surface with its colours, as an element of a drawing; `foot` is the share of the height that is free below the part.
-fn behind(surface: &SurfaceMesh, view: &View, look: &Look, foot: f64, [w, h]: [f64; 2]) -> String {
+fn behind(surface: &SurfaceMesh, view: &View, options: &RenderOptions, foot: f64, [w, h]: [f64; 2]) -> String {
     let pixels = view.size.map(|n| n as f64);
     let less = (LARGEST_BEHIND / (pixels[0] * pixels[1])).sqrt().min(1.0);
     let view = View { size: pixels.map(|n| ((n * less) as usize).max(1)), ..*view };
-    let look = Look { background: Background::Transparent, ..look.clone() };
+    let options = RenderOptions { background: Background::Transparent, ..options.clone() };
     let foot = (foot * (view.size[1] * OVER) as f64).round() as usize;
-    let Some((rows, _)) = picture(surface, &view, &look, (foot, false), super::SAMPLES) else {
+    let Some((rows, _)) = picture(surface, &view, &options, (foot, false), super::SAMPLES) else {
         return String::new();
     };
     let bytes = png(&rows, view.size, Background::Transparent.channels(), None);
@@ -120,10 +121,10 @@ fn base64(bytes: &[u8]) -> String {
     out
 }
 
-/// Whether a line drawing has room for the legend and the marks of its look.
-pub fn line_drawing_fits(look: &Look, view: &View) -> bool {
-    let bare = look.colours.is_none() && look.lines.is_none() && look.marks == Marks::default();
-    bare || !legend::rows(look, view, &sheet(view)).is_empty()
+/// Whether a line drawing has room for its legend and its marks.
+pub fn line_drawing_fits(options: &RenderOptions, view: &View) -> bool {
+    let bare = options.colours.is_none() && options.lines.is_none() && options.marks == Marks::default();
+    bare || !legend::rows(options, view, &sheet(view)).is_empty()
 }
 
 /// The outlines of the section in the picture.
@@ -204,7 +205,7 @@ mod tests {
     fn a_cube_is_nine_edges() {
         let mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
-        let svg = line_drawing(&surface, &VIEW, &Look::default(), &page([85.0, 63.75], "mm"));
+        let svg = line_drawing(&surface, &VIEW, &RenderOptions::default(), &page([85.0, 63.75], "mm"));
         assert!(svg.contains("width=\"85mm\" height=\"63.75mm\" viewBox=\"0 0 85 63.75\""));
         let found = lines(&svg, "edges");
         let bounds = surface.mesh.bounds();
@@ -230,7 +231,7 @@ mod tests {
     #[test]
     fn a_ball_is_one_circle() {
         let surface = sphere(40);
-        let svg = line_drawing(&surface, &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
+        let svg = line_drawing(&surface, &VIEW, &RenderOptions::default(), &page([400.0, 300.0], "px"));
         let found = lines(&svg, "contours");
         assert_eq!(found.len(), 1, "{svg:.300}");
         let span = |k: usize| found[0].iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p[k]), h.max(p[k])));
@@ -268,7 +269,12 @@ mod tests {
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
         let view = View { azimuth: -90.0, elevation: 20.0, ..VIEW };
         let along = |normals: Option<Vec<[f32; 3]>>, name: &str| {
-            let svg = line_drawing(&surface, &view, &Look { normals, ..Look::default() }, &page([400.0, 300.0], "px"));
+            let svg = line_drawing(
+                &surface,
+                &view,
+                &RenderOptions { normals, ..RenderOptions::default() },
+                &page([400.0, 300.0], "px"),
+            );
             let long = |line: &Vec<Point>| (line[0][0] - line[line.len() - 1][0]).abs() > 200.0;
             lines(&svg, name).iter().filter(|line| long(line)).count()
         };
@@ -283,8 +289,8 @@ mod tests {
         let surface = sphere(40);
         let eye = View { azimuth: 0.0, elevation: 0.0, ..VIEW };
         let section = Some(Section { normal: [1.0, 0.0, 0.0], offset: 0.5 });
-        let look = Look { section, ..Look::default() };
-        let svg = line_drawing(&surface, &eye, &look, &page([400.0, 300.0], "px"));
+        let options = RenderOptions { section, ..RenderOptions::default() };
+        let svg = line_drawing(&surface, &eye, &options, &page([400.0, 300.0], "px"));
         let outline = lines(&svg, "section");
         assert_eq!(outline.len(), 1);
         let corners = &outline[0];
@@ -293,7 +299,7 @@ mod tests {
         let total: f64 = hatch.iter().map(|line| super::super::visible_parts::length(line)).sum();
         assert!((total * 400.0 * HATCH / area - 1.0).abs() < 0.02, "{total} {area}");
         // From behind, the section is not seen.
-        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, &look, &page([400.0, 300.0], "px"));
+        let behind = line_drawing(&surface, &View { azimuth: 180.0, ..eye }, &options, &page([400.0, 300.0], "px"));
         assert!(lines(&behind, "hatching").is_empty());
         assert_eq!(lines(&behind, "contours").len() + lines(&behind, "section").len(), 1);
     }
@@ -304,8 +310,8 @@ mod tests {
         let mesh = Mesh::cuboid([1.0, -2.0, 3.0], [13.0, 4.0, 11.0]);
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
         let view = View { azimuth: -90.0, elevation: 0.0, projection: Projection::Orthographic, size: [800, 600] };
-        let look = Look { marks: Marks { scale_bar: true, axes: true }, ..Look::default() };
-        let svg = line_drawing(&surface, &view, &look, &page([80.0, 60.0], "mm"));
+        let options = RenderOptions { marks: Marks { scale_bar: true, axes: true }, ..RenderOptions::default() };
+        let svg = line_drawing(&surface, &view, &options, &page([80.0, 60.0], "mm"));
         let span_in = |svg: &str, name: &str, k: usize| {
             let all = lines(svg, name).concat();
             all.iter().fold(0.0f64, |m, p| m.max(p[k])) - all.iter().fold(f64::INFINITY, |m, p| m.min(p[k]))
@@ -319,7 +325,7 @@ mod tests {
         let said: f64 = svg[svg[..at].rfind('>').expect("start") + 1..at].parse().expect("a number");
         assert!((span("scale_bar", 0) - said * scale).abs() < 2.0 * step, "{said}");
         assert_eq!(svg.matches("class=\"axis\"").count(), 3);
-        let plain = line_drawing(&surface, &view, &Look::default(), &page([80.0, 60.0], "mm"));
+        let plain = line_drawing(&surface, &view, &RenderOptions::default(), &page([80.0, 60.0], "mm"));
         assert!(!plain.contains("<text") && !plain.contains("scale_bar"));
         // With no marks below, it fills the width but for the margins.
         assert!((span_in(&plain, "edges", 0) - 0.92 * 80.0).abs() < 2.0 * step);
@@ -329,13 +335,14 @@ mod tests {
     #[test]
     fn the_same_for_any_number_of_threads_and_nothing_of_nothing() {
         let surface = contour(16, |p| (0..3).map(|k| (2.0 * core::f64::consts::TAU * p[k]).cos()).sum::<f64>());
-        let drawn = || line_drawing(&surface, &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
+        let drawn = || line_drawing(&surface, &VIEW, &RenderOptions::default(), &page([400.0, 300.0], "px"));
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool").install(drawn);
         assert_eq!(one, drawn());
-        let nothing = line_drawing(&SurfaceMesh::default(), &VIEW, &Look::default(), &page([400.0, 300.0], "px"));
+        let nothing =
+            line_drawing(&SurfaceMesh::default(), &VIEW, &RenderOptions::default(), &page([400.0, 300.0], "px"));
         assert!(!nothing.contains("<path"));
         assert!(
-            line_drawing(&surface, &View { size: [0, 3], ..VIEW }, &Look::default(), &page([1.0, 1.0], "px"))
+            line_drawing(&surface, &View { size: [0, 3], ..VIEW }, &RenderOptions::default(), &page([1.0, 1.0], "px"))
                 .is_empty()
         );
     }

@@ -71,11 +71,13 @@ const VIEW: View = View { size: [200, 150], azimuth: 35.0, elevation: 25.0, proj
 
 #[test]
 fn nothing_gives_the_background() {
-    let rgb = render(&SurfaceMesh::default(), &VIEW, &Look::default());
+    let rgb = render(&SurfaceMesh::default(), &VIEW, &RenderOptions::default());
     assert_eq!(rgb.len(), 200 * 150 * 3);
     assert!(rgb.iter().all(|v| *v > 200));
-    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, &Look::default()).is_empty());
-    assert!(render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, &Look::default()).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, &RenderOptions::default()).is_empty());
+    assert!(
+        render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, &RenderOptions::default()).is_empty()
+    );
 }
 
 #[test]
@@ -85,17 +87,19 @@ fn one_triangle_fills_what_it_should() {
     // Seen along −x it is half of a square that fills 92 % of the height.
     let s = SurfaceMesh { mesh, cut: vec![false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200], ..VIEW };
-    let (with, without) =
-        (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
+    let (with, without) = (
+        render(&s, &view, &RenderOptions::default()),
+        render(&SurfaceMesh::default(), &view, &RenderOptions::default()),
+    );
     let pixels = with.chunks(3).zip(without.chunks(3)).filter(|(a, b)| a != b).count() as f64;
     let want = 0.5 * (0.92f64 * 200.0).powi(2);
     assert!((pixels / want - 1.0).abs() < 0.02, "{pixels} {want}");
     // Every side sees something, even the back of an open mesh, a point, and a number that is none.
     for azimuth in [90.0, 180.0, f64::NAN] {
-        assert_eq!(render(&s, &View { azimuth, ..view }, &Look::default()).len(), 200 * 200 * 3);
+        assert_eq!(render(&s, &View { azimuth, ..view }, &RenderOptions::default()).len(), 200 * 200 * 3);
     }
     let point = SurfaceMesh { mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0, 0, 0]] }, cut: vec![] };
-    assert_eq!(render(&point, &view, &Look::default()), without);
+    assert_eq!(render(&point, &view, &RenderOptions::default()), without);
 }
 
 #[test]
@@ -108,8 +112,8 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
     let s = SurfaceMesh { mesh, cut: vec![true, true, false, false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60], ..VIEW };
     let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
-    let front = middle(render(&s, &view, &Look::default()));
-    let back = middle(render(&s, &View { azimuth: 180.0, ..view }, &Look::default()));
+    let front = middle(render(&s, &view, &RenderOptions::default()));
+    let back = middle(render(&s, &View { azimuth: 180.0, ..view }, &RenderOptions::default()));
     assert!(front[2] > front[0], "the cut is bluish: {front:?}");
     assert!(back[0] > back[2], "the lattice is warm: {back:?}");
 }
@@ -117,9 +121,9 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
 #[test]
 fn bands_do_not_show() {
     let s = contour(24, gyroid(2.0));
-    let one = render(&s, &VIEW, &Look::default());
-    assert_eq!(render_in_bands(&s, &VIEW, &Look::default(), 1), one);
-    assert_eq!(render_in_bands(&s, &VIEW, &Look::default(), 2 * BAND * VIEW.size[0] * OVER), one);
+    let one = render(&s, &VIEW, &RenderOptions::default());
+    assert_eq!(render_in_bands(&s, &VIEW, &RenderOptions::default(), 1), one);
+    assert_eq!(render_in_bands(&s, &VIEW, &RenderOptions::default(), 2 * BAND * VIEW.size[0] * OVER), one);
 }
 
 /// An inclined edge runs through pixels that have part of both sides, in large pictures as in small ones.
@@ -130,8 +134,10 @@ fn edges_are_smooth_at_any_size() {
     let s = SurfaceMesh { mesh, cut: vec![true] };
     for size in [[200, 150], [2400, 1800]] {
         let view = View { azimuth: 0.0, elevation: 0.0, size, ..VIEW };
-        let (with, without) =
-            (render(&s, &view, &Look::default()), render(&SurfaceMesh::default(), &view, &Look::default()));
+        let (with, without) = (
+            render(&s, &view, &RenderOptions::default()),
+            render(&SurfaceMesh::default(), &view, &RenderOptions::default()),
+        );
         let level = |y: usize, x: usize| i32::from(with[3 * (y * size[0] + x)]);
         // In each row, the pixels between the background and the first that is like its right neighbour.
         let blended = |y: usize| {
@@ -153,8 +159,8 @@ fn the_number_of_threads_does_not_show() {
         return;
     };
     assert_eq!(
-        one.install(|| render(&s, &VIEW, &Look::default())),
-        many.install(|| render(&s, &VIEW, &Look::default()))
+        one.install(|| render(&s, &VIEW, &RenderOptions::default())),
+        many.install(|| render(&s, &VIEW, &RenderOptions::default()))
     );
 }
 
@@ -178,17 +184,17 @@ fn lines_are_where_they_are_projected() {
     let s = block();
     let camera = Camera::new(&s.mesh.bounds(), &s.mesh.vertices, &VIEW, VIEW.size);
     let place = |p: Vec3| camera.project(p);
-    let look = |lines: Vec<(usize, Vec<Vec3>)>| Look {
+    let options = |lines: Vec<(usize, Vec<Vec3>)>| RenderOptions {
         lines: Some(Lines { lines, names: Vec::new(), caption: String::new(), radius: 0.06 }),
-        ..Look::default()
+        ..RenderOptions::default()
     };
-    let bare = render(&s, &VIEW, &look(Vec::new()));
+    let bare = render(&s, &VIEW, &options(Vec::new()));
     let inside = vec![[0.4, 0.5, 0.6], [1.6, 1.5, 0.7], [2.6, 0.6, 1.5]];
     // Towards the eye from the block.
     let before: Vec<Vec3> = inside.iter().map(|p| add(*p, scale(camera.axes[2], 4.0))).collect();
     let mut red = Vec::new();
     for line in [&inside, &before] {
-        let drawn = render(&s, &VIEW, &look(vec![(0, line.clone())]));
+        let drawn = render(&s, &VIEW, &options(vec![(0, line.clone())]));
         let along: Vec<[f64; 3]> = line
             .windows(2)
             .flat_map(|p| (0..=200).map(|i| add(p[0], scale(sub(p[1], p[0]), f64::from(i) / 200.0))))
@@ -216,9 +222,9 @@ fn shares_are_mixtures() {
         let values = s.mesh.vertices.iter().flat_map(|p| [1.0 - of(*p), of(*p)]).collect();
         let names = vec!["first".into(), "second".into()];
         let colours = Some(Colours::Shares(Shares { title: String::new(), names, values }));
-        render(&s, &VIEW, &Look { colours, ..Look::default() })
+        render(&s, &VIEW, &RenderOptions { colours, ..RenderOptions::default() })
     };
-    let empty = render(&SurfaceMesh::default(), &VIEW, &Look::default());
+    let empty = render(&SurfaceMesh::default(), &VIEW, &RenderOptions::default());
     let [first, second, half] = [0.0, 1.0, 0.5].map(|share| shares(&|_| share));
     let both = shares(&|p| f64::from(p[0] > 1.5));
     // Both names, one below the other.
@@ -241,15 +247,16 @@ fn shares_are_mixtures() {
 /// The part stays clear of the legend.
 #[test]
 fn legends_have_room() {
-    let look = |caption: &str| Look {
+    let options = |caption: &str| RenderOptions {
         lines: Some(Lines { names: vec!["One".into()], caption: caption.into(), ..Lines::default() }),
-        ..Look::default()
+        ..RenderOptions::default()
     };
-    let (with, without) = (render(&block(), &VIEW, &look("two")), render(&SurfaceMesh::default(), &VIEW, &look("two")));
+    let (with, without) =
+        (render(&block(), &VIEW, &options("two")), render(&SurfaceMesh::default(), &VIEW, &options("two")));
     // Two rows of 14 pixels, half as much between and about them.
     let foot = (VIEW.size[1] - 56) * VIEW.size[0] * 3;
     assert!(with[foot..] == without[foot..] && with[..foot] != without[..foot]);
-    assert_ne!(render(&block(), &VIEW, &look("three")), with);
+    assert_ne!(render(&block(), &VIEW, &options("three")), with);
 }
 
 /// A section seen from the side that is left out shows the solid cut, in the area that it has; from the other side it shows the
@@ -258,15 +265,15 @@ fn legends_have_room() {
 fn a_section_is_as_large_as_the_solid_there() {
     let ball = contour(24, |p| norm(sub(p, [0.5; 3])) - 0.4);
     let view = View { size: [200, 200], azimuth: 20.0, elevation: 90.0, projection: Projection::Perspective };
-    let look = |offset: f64, side: f64| Look {
+    let options = |offset: f64, side: f64| RenderOptions {
         section: Some(Section { normal: [0.0, 0.0, side], offset: side * offset }),
-        ..Look::default()
+        ..RenderOptions::default()
     };
     let red = |rgb: &[u8]| rgb.chunks(3).filter(|c| i32::from(c[0]) > i32::from(c[1]) + 60).count() as f64;
-    let whole = render(&ball, &view, &Look::default());
+    let whole = render(&ball, &view, &RenderOptions::default());
     for height in [0.3, 0.5, 0.75] {
-        let seen = render(&ball, &view, &look(height, 1.0));
-        let shown = look(height, 1.0).section.expect("a section").kept(&ball.mesh);
+        let seen = render(&ball, &view, &options(height, 1.0));
+        let shown = options(height, 1.0).section.expect("a section").kept(&ball.mesh);
         let camera = Camera::new(&ball.mesh.bounds(), &shown, &view, view.size);
         let near = camera.project([0.5, 0.5, height])[2];
         let radius = (0.16 - (height - 0.5) * (height - 0.5)).sqrt() * camera.focal * near;
@@ -275,15 +282,18 @@ fn a_section_is_as_large_as_the_solid_there() {
         let area = core::f64::consts::PI * radius * radius;
         assert!((red(&seen) - area).abs() < band, "{height}: {} of {area} within {band}", red(&seen));
         // Lighter than the whole ball, which is seen from the side that is kept.
-        assert_eq!(red(&render(&ball, &view, &look(height, -1.0))), 0.0);
+        assert_eq!(red(&render(&ball, &view, &options(height, -1.0))), 0.0);
     }
     assert_eq!(red(&whole), 0.0);
-    assert!(render(&ball, &view, &look(2.0, 1.0)) == whole);
-    assert!(render(&ball, &view, &look(-2.0, 1.0)) == render(&SurfaceMesh::default(), &view, &Look::default()));
+    assert!(render(&ball, &view, &options(2.0, 1.0)) == whole);
+    assert!(
+        render(&ball, &view, &options(-2.0, 1.0)) == render(&SurfaceMesh::default(), &view, &RenderOptions::default())
+    );
     // The same with any number of threads, and whatever is drawn at once.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool");
-    let slanted = look(0.5, 1.0);
-    let slanted = Look { section: slanted.section.map(|s| Section { normal: unit([1.0, 2.0, 2.0]), ..s }), ..slanted };
+    let slanted = options(0.5, 1.0);
+    let slanted =
+        RenderOptions { section: slanted.section.map(|s| Section { normal: unit([1.0, 2.0, 2.0]), ..s }), ..slanted };
     let one = alone.install(|| render(&ball, &VIEW, &slanted));
     assert!(one == render(&ball, &VIEW, &slanted) && one == render_in_bands(&ball, &VIEW, &slanted, 1));
 }
@@ -297,7 +307,7 @@ fn gallery() {
     {
         let view = View { size: [1200, 900], azimuth: 35.0, elevation: 28.0, projection: Projection::Perspective };
         let t = std::time::Instant::now();
-        let rgb = render(&s, &view, &Look::default());
+        let rgb = render(&s, &view, &RenderOptions::default());
         let drawn = t.elapsed();
         let file = png(&rgb, view.size, 3, None);
         println!(
@@ -316,7 +326,7 @@ fn gallery() {
 fn a_transparent_background_mixes_to_the_same_picture() {
     let s = sphere(24);
     let [white, clear] = [Background::White, Background::Transparent]
-        .map(|background| render(&s, &VIEW, &Look { background, ..Look::default() }));
+        .map(|background| render(&s, &VIEW, &RenderOptions { background, ..RenderOptions::default() }));
     assert_eq!((white.len(), clear.len()), (200 * 150 * 3, 200 * 150 * 4));
     let (mut partly, mut inside) = (0, 0);
     for (w, c) in white.chunks(3).zip(clear.chunks(4)) {
@@ -331,14 +341,14 @@ fn a_transparent_background_mixes_to_the_same_picture() {
     }
     assert!(partly > 100 && inside > 4000 && clear[3] == 0, "{partly} {inside}");
     // Writing covers what it is written on.
-    let legend = Look {
+    let legend = RenderOptions {
         colours: Some(Colours::Scale(Tint {
             title: "t".into(),
             amount: Amount::AtVertices(vec![0.0; s.mesh.vertices.len()]),
             span: [0.0, 1.0],
         })),
         background: Background::Transparent,
-        ..Look::default()
+        ..RenderOptions::default()
     };
     let drawn = render(&s, &VIEW, &legend);
     assert!(drawn.chunks(4).any(|p| p == [40, 40, 44, 255]) && drawn[3] == 0);
@@ -367,10 +377,10 @@ const PARALLEL: View = View { size: [400, 300], azimuth: -90.0, elevation: 0.0, 
 #[test]
 fn a_box_is_to_scale_by_parallel_rays() {
     let s = cuboid([1.0, -2.0, 3.0], [13.0, 4.0, 11.0]);
-    let look = Look { background: Background::Transparent, ..Look::default() };
+    let options = RenderOptions { background: Background::Transparent, ..RenderOptions::default() };
     for (azimuth, elevation, wide, high) in [(-90.0, 0.0, 12.0, 8.0), (0.0, 0.0, 6.0, 8.0), (-90.0, 90.0, 12.0, 6.0)] {
         let view = View { azimuth, elevation, ..PARALLEL };
-        let rgba = render(&s, &view, &look);
+        let rgba = render(&s, &view, &options);
         let [x, y] = spans(view.size, |i| rgba[4 * i + 3] >= 128).map(|[a, b]| (b - a) as f64);
         let scale = f64::min(0.92 * 400.0 / wide, 0.92 * 300.0 / high);
         // Each side to half a pixel.
@@ -393,7 +403,7 @@ fn a_box_is_to_scale_by_parallel_rays() {
 #[test]
 fn the_scale_bar_is_as_long_as_it_says() {
     let s = cuboid([0.0; 3], [12.0, 6.0, 2.0]);
-    let white = |marks| Look { background: Background::White, marks, ..Look::default() };
+    let white = |marks| RenderOptions { background: Background::White, marks, ..RenderOptions::default() };
     let bar = white(Marks { scale_bar: true, axes: false });
     for size in [[400, 300], [900, 700], [1600, 1200]] {
         let view = View { size, ..PARALLEL };
@@ -408,7 +418,7 @@ fn the_scale_bar_is_as_long_as_it_says() {
         assert!((longest - 2.0 * scale).abs() <= 1.0, "{longest} {scale}");
     }
     let small = View { size: [120, 90], ..PARALLEL };
-    assert!(!bar.fits(&small) && bar.fits(&PARALLEL) && Look::default().fits(&small));
+    assert!(!bar.fits(&small) && bar.fits(&PARALLEL) && RenderOptions::default().fits(&small));
     assert_eq!(render(&s, &small, &bar), render(&s, &small, &white(Marks::default())));
     let axes = render(&s, &PARALLEL, &white(Marks { scale_bar: false, axes: true }));
     let seen = |k: usize| (0..400 * 300).any(|i| axes[3 * i..3 * i + 3] == palette::LINES[k]);
@@ -424,7 +434,7 @@ fn a_face_in_the_plane_of_a_section_is_of_one_kind() {
             let view = View { size: [400, 300], azimuth, elevation, projection };
             let cut = |offset| {
                 let section = Some(Section { normal: [0.0, 0.0, 1.0], offset });
-                let rgb = render(&s, &view, &Look { section, ..Look::default() });
+                let rgb = render(&s, &view, &RenderOptions { section, ..RenderOptions::default() });
                 rgb.chunks(3).filter(|p| i32::from(p[0]) - i32::from(p[1]) > 60).count() as f64
             };
             let (at, below) = (cut(12.0), cut(11.99));
@@ -457,17 +467,17 @@ fn seen_ball(view: &View) -> (SurfaceMesh, Vec<[f32; 3]>, Vec<(usize, Vec3)>) {
 fn a_ball_has_the_colours_of_its_overhang() {
     let view = View { size: [160, 160], azimuth: 20.0, elevation: -30.0, projection: Projection::Orthographic };
     let (ball, normals, seen) = seen_ball(&view);
-    let look = |amount: Amount, end: f64| {
+    let options = |amount: Amount, end: f64| {
         let colours = Some(Colours::Scale(Tint { title: String::new(), amount, span: [0.0, end] }));
-        render(&ball, &view, &Look { colours, normals: Some(normals.clone()), ..Look::default() })
+        render(&ball, &view, &RenderOptions { colours, normals: Some(normals.clone()), ..RenderOptions::default() })
     };
     let [first, second] = [[0.0, 0.0, 1.0], unit([1.0, -2.0, 2.0])];
     for (up, end) in [(first, 90.0), (first, 45.0), (second, 60.0)] {
-        let drawn = look(Amount::Overhang(up), end);
+        let drawn = options(Amount::Overhang(up), end);
         let mut compared = 0;
         for angle in [20.0, 40.0, 50.0, 70.0, 110.0] {
             let number = if angle < end { angle } else { f64::NAN };
-            let alone = look(Amount::AtVertices(vec![number; ball.mesh.vertices.len()]), end);
+            let alone = options(Amount::AtVertices(vec![number; ball.mesh.vertices.len()]), end);
             for (i, n) in seen.iter().filter(|(_, n)| ((-dot(*n, up)).acos().to_degrees() - angle).abs() < 0.5) {
                 // Half a degree and the curvature of a facet; between two of six stops a colour changes by 131 at most.
                 let most = 131.0 * 5.0 * 0.6 / end + 2.0;
@@ -485,7 +495,7 @@ fn a_ball_has_the_colours_of_its_overhang() {
 fn a_section_has_the_colours_of_what_is_inside() {
     let view = View { size: [160, 160], azimuth: 0.0, elevation: 90.0, projection: Projection::Orthographic };
     let (ball, ..) = seen_ball(&view);
-    let look = |grid: &dyn Fn(usize) -> f64| {
+    let options = |grid: &dyn Fn(usize) -> f64| {
         let amount = Amount::AtVertices(vec![0.0; ball.mesh.vertices.len()]);
         let colours = Some(Colours::Scale(Tint { title: String::new(), amount, span: [0.0, 1.0] }));
         let steps = [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -494,13 +504,17 @@ fn a_section_has_the_colours_of_what_is_inside() {
             values: (0..6).map(grid).collect(),
         };
         let section = Some(Section { normal: [0.0, 0.0, 1.0], offset: 0.5 });
-        render(&ball, &view, &Look { colours, section, section_colours: Some(grid), ..Look::default() })
+        render(
+            &ball,
+            &view,
+            &RenderOptions { colours, section, section_colours: Some(grid), ..RenderOptions::default() },
+        )
     };
     // By the x of its point: x at a point of the grid is 0, 1/2 or 1.
-    let ramp = look(&|i| (i % 3) as f64 / 2.0);
+    let ramp = options(&|i| (i % 3) as f64 / 2.0);
     let mut compared = 0;
     for share in [0.2, 0.4, 0.5, 0.65, 0.8] {
-        let alone = look(&|_| share);
+        let alone = options(&|_| share);
         // Seen from above with y to the right, x runs down.
         for i in 0..160 * 160 {
             let [x, y] = [i % 160, i / 160].map(|c| (c as f64 + 0.5 - 80.0) / (0.46 * 160.0) * 0.4);

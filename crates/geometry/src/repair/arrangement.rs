@@ -24,7 +24,7 @@ use crate::progress::{Cancellation, checkpoint};
 use crate::union_find::{find, singles, unite};
 
 /// How two triangles meet.
-enum Meeting {
+enum TriangleIntersection {
     /// Along a segment.
     Across(u32, u32, [Vec3; 2]),
     /// They cover a common part, in one plane to within the tolerance.
@@ -62,17 +62,17 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
     let eta = tolerance(mesh);
     let n = mesh.triangles.len();
     let faces: Vec<Triangle> = (0..n).map(|i| Triangle::new(mesh.corners(i))).collect();
-    let meetings = near_pairs(mesh, eta, |i, j| meeting(mesh, &faces, eta, i, j));
+    let intersections = near_pairs(mesh, eta, |i, j| intersection(mesh, &faces, eta, i, j));
     let mut segments: Vec<Vec<[Vec3; 2]>> = vec![Vec::new(); n];
     let mut covers: Vec<Vec<u32>> = vec![Vec::new(); n];
-    let pairs = meetings.len();
-    for m in meetings {
+    let pairs = intersections.len();
+    for m in intersections {
         match m {
-            Meeting::Across(i, j, s) => {
+            TriangleIntersection::Across(i, j, s) => {
                 segments[i as usize].push(s);
                 segments[j as usize].push(s);
             }
-            Meeting::Flat(i, j) => {
+            TriangleIntersection::Flat(i, j) => {
                 for (i, j) in [(i, j), (j, i)] {
                     covers[i as usize].push(j);
                     let c = faces[j as usize].corners;
@@ -140,7 +140,7 @@ fn steepest(n: Vec3) -> usize {
     (1..3).fold(0, |m, k| if n[k].abs() > n[m].abs() { k } else { m })
 }
 
-fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Option<Meeting> {
+fn intersection(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Option<TriangleIntersection> {
     let (s, t) = (&faces[i], &faces[j]);
     let (p, q) = (s.corners, t.corners);
     let off =
@@ -150,7 +150,7 @@ fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Opt
         let axis = steepest(s.normal);
         let (p, q) = (p.map(|v| drop_axis(v, axis)), q.map(|v| drop_axis(v, axis)));
         let separate = apart(p, q, eta) || apart(q, p, eta);
-        return (!separate).then_some(Meeting::Flat(numbers.0, numbers.1));
+        return (!separate).then_some(TriangleIntersection::Flat(numbers.0, numbers.1));
     }
     let common = mesh.triangles[i].iter().filter(|v| mesh.triangles[j].contains(v));
     if common.count() >= 2 {
@@ -175,7 +175,7 @@ fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Opt
     let (a, b) = (sorted(a), sorted(b));
     let low = if a[0].0 > b[0].0 { a[0] } else { b[0] };
     let high = if a[1].0 < b[1].0 { a[1] } else { b[1] };
-    (low.0 < high.0).then_some(Meeting::Across(numbers.0, numbers.1, [low.1, high.1]))
+    (low.0 < high.0).then_some(TriangleIntersection::Across(numbers.0, numbers.1, [low.1, high.1]))
 }
 
 /// Whether an edge of triangle `a` separates `b` from it, to within `eta`.

@@ -20,9 +20,9 @@ const FINE: usize = 60;
 /// A bent cap of more than this multiple of its area before has gone wrong.
 const BLOWN: f64 = 2.0;
 
-/// The mesh about the corners of the holes.
+/// The neighbours of the corners of the holes.
 #[derive(Debug, Default)]
-pub struct About {
+pub struct VertexNeighbours {
     /// Corners joined to each corner by edges.
     pub joined: HashMap<u32, Vec<u32>>,
 }
@@ -34,7 +34,7 @@ pub fn smoothed(
     boundary: &[u32],
     patch: Vec<[u32; 3]>,
     slopes: &[Option<Vec3>],
-    about: &About,
+    neighbours: &VertexNeighbours,
 ) -> Vec<[u32; 3]> {
     if boundary.len() < SMALL {
         return patch;
@@ -58,7 +58,7 @@ pub fn smoothed(
     }
     let first = vertices.len();
     let fine = refined(vertices, boundary, &patch);
-    bend(vertices, first, boundary, &fine, about);
+    bend(vertices, first, boundary, &fine, neighbours);
     let area = |v: &[Vec3], patch: &[[u32; 3]]| {
         let twice = patch.iter().map(|t| {
             let [a, b, c] = t.map(|i| v[i as usize]);
@@ -161,7 +161,7 @@ fn relax(vertices: &[Vec3], fine: &mut [[u32; 3]]) -> usize {
 
 /// Moves the corners from `first` on so that Σ|v − mean of neighbours|² over the cap and its boundary is least, by conjugate
 /// gradients on the normal equations.
-fn bend(vertices: &mut [Vec3], first: usize, boundary: &[u32], fine: &[[u32; 3]], about: &About) {
+fn bend(vertices: &mut [Vec3], first: usize, boundary: &[u32], fine: &[[u32; 3]], neighbours: &VertexNeighbours) {
     let free = vertices.len() - first;
     if free == 0 {
         return;
@@ -178,7 +178,7 @@ fn bend(vertices: &mut [Vec3], first: usize, boundary: &[u32], fine: &[[u32; 3]]
     rows.sort_unstable_by_key(|r| r.0);
     for (v, near) in &mut rows {
         if boundary.contains(v) {
-            near.extend(about.joined.get(v).into_iter().flatten());
+            near.extend(neighbours.joined.get(v).into_iter().flatten());
         }
         near.sort_unstable();
         near.dedup();

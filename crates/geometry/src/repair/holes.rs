@@ -51,7 +51,7 @@ pub fn close(mesh: &mut Mesh) -> Caps {
             boundary,
             patch,
             &surroundings.slopes(boundary),
-            &surroundings.about,
+            &surroundings.neighbours,
         ));
         caps.area += (first..mesh.triangles.len())
             .map(|i| {
@@ -116,19 +116,22 @@ struct Surroundings {
     /// For open edges, as the cap runs along them, the normal of the triangle beyond.
     beyond: HashMap<(u32, u32), Vec3>,
     /// The neighbours of their vertices.
-    about: fairing::About,
+    neighbours: fairing::VertexNeighbours,
 }
 
 impl Surroundings {
     fn of(mesh: &Mesh, loops: &[Vec<u32>]) -> Surroundings {
         let corners: HashSet<u32> = loops.iter().flatten().copied().collect();
-        let mut surroundings =
-            Surroundings { edges: HashSet::new(), beyond: HashMap::new(), about: fairing::About::default() };
+        let mut surroundings = Surroundings {
+            edges: HashSet::new(),
+            beyond: HashMap::new(),
+            neighbours: fairing::VertexNeighbours::default(),
+        };
         for (i, t) in mesh.triangles.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (t[k], t[(k + 1) % 3]);
                 if corners.contains(&a) {
-                    let joined = surroundings.about.joined.entry(a).or_default();
+                    let joined = surroundings.neighbours.joined.entry(a).or_default();
                     joined.extend([b, t[(k + 2) % 3]]);
                 }
                 if corners.contains(&a) && corners.contains(&b) {

@@ -27,11 +27,11 @@ pub(super) fn operations(symbol: &str) -> Result<Vec<Operation>, String> {
     if inverse {
         generators.push(Operation { rotation: INVERSE, translation: [0; 3] });
     }
-    let mut before = Before::default();
+    let mut previous = PreviousRotation::default();
     for word in words {
-        generators.push(generator(word, &mut before)?);
+        generators.push(generator(word, &mut previous)?);
     }
-    if before.count == 0 {
+    if previous.count == 0 {
         return Err("no rotation follows the lattice's letter".into());
     }
     for g in &mut generators {
@@ -75,16 +75,16 @@ fn centring(letter: &str) -> Result<&'static [[i32; 3]], String> {
     })
 }
 
-/// The rotation before, which decides the axis of the next if none is written.
+/// The rotation read before, which decides the axis of the next if none is written.
 #[derive(Default)]
-struct Before {
+struct PreviousRotation {
     count: usize,
     order: u32,
     axis: usize,
 }
 
 /// Reads one word: a rotation's order, its axis, its screw and its translations.
-fn generator(word: &str, before: &mut Before) -> Result<Operation, String> {
+fn generator(word: &str, previous: &mut PreviousRotation) -> Result<Operation, String> {
     let wrong = |why: &str| Err(format!("\"{word}\": {why}"));
     let (negative, rest) = match word.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -95,7 +95,7 @@ fn generator(word: &str, before: &mut Before) -> Result<Operation, String> {
         return wrong("a rotation begins with its order, 1, 2, 3, 4 or 6");
     };
     let written = letters.next_if(|c| "xyz'\"*".contains(*c));
-    let axis = written.unwrap_or(match (before.count, order, before.order) {
+    let axis = written.unwrap_or(match (previous.count, order, previous.order) {
         (1, 2, 2 | 4) => 'x',
         (1, 2, 3 | 6) => '\'',
         (1 | 2, 3, _) => '*',
@@ -103,7 +103,7 @@ fn generator(word: &str, before: &mut Before) -> Result<Operation, String> {
     });
     let (rotation, along) = match axis {
         '*' if order == 3 => ([[0, 0, 1], [1, 0, 0], [0, 1, 0]], 2),
-        '\'' | '"' if order == 2 => (diagonal(before.axis, axis == '"'), before.axis),
+        '\'' | '"' if order == 2 => (diagonal(previous.axis, axis == '"'), previous.axis),
         '*' | '\'' | '"' => return wrong("no rotation of this order has such an axis"),
         _ => {
             let along = ['x', 'y', 'z'].iter().position(|a| *a == axis);
@@ -136,7 +136,7 @@ fn generator(word: &str, before: &mut Before) -> Result<Operation, String> {
         };
         translation = [0, 1, 2].map(|i| translation[i] + add[i]);
     }
-    *before = Before { count: before.count + 1, order, axis: along };
+    *previous = PreviousRotation { count: previous.count + 1, order, axis: along };
     Ok(Operation { rotation: if negative { rotation.map(|r| r.map(|v| -v)) } else { rotation }, translation })
 }
 

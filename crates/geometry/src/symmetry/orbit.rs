@@ -8,7 +8,7 @@ use crate::math::sin_cos_turns;
 
 /// Which part of a complex sum is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum ComplexPart {
     /// The real part.
     Re,
     /// The imaginary part.
@@ -39,7 +39,7 @@ impl Group {
     ///
     /// # Errors
     /// The whole sum vanishes, as the group's centring, screws and glides demand; indices too large to turn.
-    pub fn orbit(&self, hkl: [i32; 3], side: Side) -> Result<Vec<Wave>, Fault> {
+    pub fn orbit(&self, hkl: [i32; 3], part: ComplexPart) -> Result<Vec<Wave>, Fault> {
         if hkl.iter().any(|h| h.abs() > 1000) {
             let message = format!("{hkl:?}: indices are at most 1000 either way");
             return Err(Fault::new("hkl", message));
@@ -70,9 +70,9 @@ impl Group {
         for (k, roots) in &sums {
             let sign = k.iter().find(|v| **v != 0).map_or(1, |v| v.signum());
             let (re, im) = value(roots);
-            let (cosine, sine) = match side {
-                Side::Re => (re, -im),
-                Side::Im => (im, re),
+            let (cosine, sine) = match part {
+                ComplexPart::Re => (re, -im),
+                ComplexPart::Im => (im, re),
             };
             let wave = waves.entry(k.map(|v| v * sign)).or_default();
             *wave = (wave.0 + cosine, wave.1 + f64::from(sign) * sine);
@@ -105,8 +105,11 @@ mod tests {
     /// Which parts of a sum there are: R, I, both or none.
     fn parts(group: &str, hkl: [i32; 3]) -> String {
         let group = Group::named(group).expect(group);
-        let is = |side| group.orbit(hkl, side).is_ok_and(|w| !w.is_empty());
-        [(Side::Re, "R"), (Side::Im, "I")].iter().map(|(side, word)| if is(*side) { *word } else { "" }).collect()
+        let is = |part| group.orbit(hkl, part).is_ok_and(|w| !w.is_empty());
+        [(ComplexPart::Re, "R"), (ComplexPart::Im, "I")]
+            .iter()
+            .map(|(part, word)| if is(*part) { *word } else { "" })
+            .collect()
     }
 
     #[test]
@@ -132,7 +135,7 @@ mod tests {
         }
         assert_eq!(parts("227:1", [1, 1, 1]), "RI");
         assert_eq!(parts("227:1", [2, 2, 2]), "I");
-        let refused = Group::named("229").expect("group").orbit([1, 0, 0], Side::Re);
+        let refused = Group::named("229").expect("group").orbit([1, 0, 0], ComplexPart::Re);
         assert!(refused.expect_err("absent").message.contains("absent in Im-3m"));
     }
 
@@ -141,12 +144,12 @@ mod tests {
         let u = [0.137, 0.291, 0.843];
         let cosines = |v: Vec3| v.map(|x| sin_cos_turns(x).1);
         let [x, y, z] = cosines(u);
-        let p = Group::named("221").expect("group").orbit([1, 0, 0], Side::Re);
+        let p = Group::named("221").expect("group").orbit([1, 0, 0], ComplexPart::Re);
         assert!((at(&p.expect("present"), u) - (x + y + z)).abs() < 1e-14);
-        let fcc = Group::named("225").expect("group").orbit([1, 1, 1], Side::Re);
+        let fcc = Group::named("225").expect("group").orbit([1, 1, 1], ComplexPart::Re);
         assert!((at(&fcc.expect("present"), u) - 4.0 * x * y * z).abs() < 1e-14);
         let s = u.map(|v| sin_cos_turns(v).0);
-        let sines = Group::named("215").expect("group").orbit([1, 1, 1], Side::Im);
+        let sines = Group::named("215").expect("group").orbit([1, 1, 1], ComplexPart::Im);
         // sin a sin b sin c is minus a quarter of the four sines of the sums; the sign is the sum's own.
         let found = at(&sines.expect("present"), u);
         assert!((found.abs() - (4.0 * s[0] * s[1] * s[2]).abs()).abs() < 1e-14);
@@ -162,8 +165,8 @@ mod tests {
         ) {
             let (_, name, hall) = Group::all().nth(row).expect("in range");
             let group = Group::named(&format!("hall:{hall}")).expect("a group");
-            for side in [Side::Re, Side::Im] {
-                let Ok(waves) = group.orbit(hkl, side) else { continue };
+            for part in [ComplexPart::Re, ComplexPart::Im] {
+                let Ok(waves) = group.orbit(hkl, part) else { continue };
                 let here = at(&waves, u);
                 let top: f64 = waves.iter().map(|w| w.1.hypot(w.2)).sum();
                 for o in &group.operations {

@@ -13,7 +13,7 @@ use crate::truss::{Beams, beams_in};
 use beams::{Fillet, Frusta, Graph, Profile, Quadors};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{
-    BeamGraph, ByteSpool, Companions, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph,
+    BeamGraph, ByteSpool, CompanionMeshes, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph,
 };
 use geometry::progress::{Stopped, checkpoint};
 
@@ -167,7 +167,7 @@ impl Built {
     pub fn write_beam_lattice(
         &self,
         tolerance: Option<f64>,
-        meshes: Companions,
+        meshes: CompanionMeshes,
         meta: &Metadata,
         aside: &mut dyn ByteSpool,
         out: &mut dyn io::Write,

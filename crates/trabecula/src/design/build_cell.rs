@@ -9,7 +9,7 @@ use crate::cell::{Cell, Series, Term, named};
 use crate::kind::DesignError;
 use geometry::fault::Fault;
 use geometry::math::sin_cos_turns;
-use geometry::symmetry::{Group, Side};
+use geometry::symmetry::{ComplexPart, Group};
 
 mod cell_file;
 
@@ -67,8 +67,8 @@ fn plain_term(t: &TermSpec) -> Term {
 pub(super) fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
     let (s, c) = sin_cos_turns(t.phase);
     let (parts, word, other) = match t.component {
-        Component::Re => ([(Side::Re, c), (Side::Im, -s)], "real", "im"),
-        Component::Im => ([(Side::Re, s), (Side::Im, c)], "imaginary", "re"),
+        Component::Re => ([(ComplexPart::Re, c), (ComplexPart::Im, -s)], "real", "im"),
+        Component::Im => ([(ComplexPart::Re, s), (ComplexPart::Im, c)], "imaginary", "re"),
     };
     let mut terms = Vec::new();
     for (side, factor) in parts.into_iter().filter(|p| p.1 != 0.0) {

@@ -1,7 +1,7 @@
 //! Beams as implicit functions for surface extraction.
 
 use beams::pattern::PatternField;
-use beams::quador::{Quadors, Wanted};
+use beams::quador::{FillRequest, Quadors};
 use geometry::feature_edges::Creases;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -43,15 +43,15 @@ macro_rules! field_of {
 field_of!(
     Quadors {
         fn fill(&self, block: &Block, out: &mut [f32]) {
-            Quadors::fill(self, block.axes, Wanted { nodes: None, near: false }, out);
+            Quadors::fill(self, block.axes, FillRequest { nodes: None, near: false }, out);
         }
 
         fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
-            Quadors::fill(self, block.axes, Wanted { nodes: Some(wanted), near: false }, out);
+            Quadors::fill(self, block.axes, FillRequest { nodes: Some(wanted), near: false }, out);
         }
 
         fn fill_near(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
-            Quadors::fill(self, block.axes, Wanted { nodes: Some(wanted), near: true }, out);
+            Quadors::fill(self, block.axes, FillRequest { nodes: Some(wanted), near: true }, out);
         }
 
         fn is_large(&self) -> bool {

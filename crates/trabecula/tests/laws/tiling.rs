@@ -10,7 +10,7 @@ use geometry::measure::size;
 use geometry::progress::{Silent, Stopped};
 use geometry::repair::Repair;
 use geometry::surface_mesh::SurfaceMesh;
-use geometry::symmetry::{Group, Side};
+use geometry::symmetry::{ComplexPart, Group};
 use geometry::tetmesh::TetMesh;
 use trabecula::cell::tet::{TetCell, named_tet_cell, tet_catalogue};
 use trabecula::cell::{Part, Series, Term};
@@ -82,7 +82,7 @@ pub fn cell(name: &str) -> (Arc<TetCell>, Part, f64) {
 
 /// The cell of one real wave of a group.
 fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<TetCell> {
-    let waves = Group::named(group).expect(group).orbit(hkl, Side::Re).expect(group);
+    let waves = Group::named(group).expect(group).orbit(hkl, ComplexPart::Re).expect(group);
     let terms = waves.into_iter().map(|(hkl, c, s)| Term { hkl, amplitude: c.hypot(s), phase: (-s).atan2(c) / TAU });
     let series = Series::new(terms.collect()).expect(group);
     let cell = TetCell::new(series, [site; 3], edge * 2f64.sqrt(), dual);

@@ -4,7 +4,7 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::hub_quadric::Quadric;
-use super::{Brep, Face, Use};
+use super::{Brep, EdgeUse, Face};
 
 /// A plane in a hub's frame: normal · x + value = 0, with a unit normal.
 #[derive(Clone, Copy, Debug)]
@@ -121,7 +121,7 @@ impl Brep<'_> {
             }
         }
         let loops = self.loops(&self.faces[face as usize]);
-        let side = |of: &Use| plane.is_face_above(&quadric, &self.curve(*of, &frame));
+        let side = |of: &EdgeUse| plane.is_face_above(&quadric, &self.curve(*of, &frame));
         let sides: Vec<Vec<bool>> = loops.iter().map(|l| l.iter().map(side).collect()).collect();
         let mut crossings: Vec<Crossing> = Vec::new();
         for (boundary, l) in sides.iter().enumerate() {
@@ -165,10 +165,10 @@ impl Brep<'_> {
     fn place_parts(
         &mut self,
         face: u32,
-        made: Vec<(Vec<Use>, bool)>,
-        (loops, sides): (&[Vec<Use>], &[Vec<bool>]),
+        made: Vec<(Vec<EdgeUse>, bool)>,
+        (loops, sides): (&[Vec<EdgeUse>], &[Vec<bool>]),
     ) -> Option<Vec<u32>> {
-        let mut faces: Vec<(Vec<Vec<Use>>, bool)> = made.into_iter().map(|(l, above)| (vec![l], above)).collect();
+        let mut faces: Vec<(Vec<Vec<EdgeUse>>, bool)> = made.into_iter().map(|(l, above)| (vec![l], above)).collect();
         for (l, side) in loops.iter().zip(sides) {
             let above = side[0];
             if side.iter().all(|s| *s == above) {
@@ -199,10 +199,10 @@ impl Brep<'_> {
 /// The loops of the parts of a face, each with its side: pieces of the old loops between crossings, joined by sections, which
 /// have the positive side on their left.
 fn parts(
-    loops: &[Vec<Use>],
+    loops: &[Vec<EdgeUse>],
     crossings: &[Crossing],
     sections: &[Option<(usize, Vec<u32>)>],
-) -> Option<Vec<(Vec<Use>, bool)>> {
+) -> Option<Vec<(Vec<EdgeUse>, bool)>> {
     let mut out = Vec::new();
     let mut used = vec![false; crossings.len()];
     for first in 0..crossings.len() {

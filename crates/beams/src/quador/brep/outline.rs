@@ -16,7 +16,7 @@ use super::super::hub_quadric::Quadric;
 use super::super::integral::unresolved_face;
 use super::super::perpendicular::perpendicular;
 use super::cuts::Plane;
-use super::{Brep, Face, Frame, Kind, NONE, Surface, Use};
+use super::{Brep, EdgeUse, Face, Frame, Kind, NONE, Surface};
 
 /// Number of planes along a beam from which the one to cut it is chosen.
 const PLANES: usize = 16;
@@ -31,7 +31,7 @@ const CORNER_WORTH: f64 = 1.0;
 pub(super) struct Outline {
     corners: Vec<Vec3>,
     edges: Vec<([u32; 2], Bezier<3>)>,
-    faces: Vec<(Quadric, Kind, Vec<Vec<Use>>)>,
+    faces: Vec<(Quadric, Kind, Vec<Vec<EdgeUse>>)>,
 }
 
 impl Outline {
@@ -69,12 +69,12 @@ impl Outline {
             if coincident.iter().flatten().any(|c| c.face == index) {
                 continue;
             }
-            let edges = |&(arc, forward): &Use| {
+            let edges = |&(arc, forward): &EdgeUse| {
                 let (mut arc, mut forward) = (arc, forward);
                 while let Some(later) = &coincident[arc as usize] {
                     (arc, forward) = (later.of, forward == later.same);
                 }
-                let mut uses: Vec<Use> = chains[arc as usize].iter().map(|e| (*e, forward)).collect();
+                let mut uses: Vec<EdgeUse> = chains[arc as usize].iter().map(|e| (*e, forward)).collect();
                 if !forward {
                     uses.reverse();
                 }
@@ -193,8 +193,8 @@ impl Brep<'_> {
         outline.edges.iter().for_each(|(ends, curve)| {
             self.push_edge(hub, ends.map(|v| v + corner), *curve);
         });
-        let numbered = |l: &Vec<Use>| l.iter().map(|(e, forward)| (e + edge, *forward)).collect();
-        let face = |(index, (quadric, kind, loops)): (usize, &(Quadric, Kind, Vec<Vec<Use>>))| Face {
+        let numbered = |l: &Vec<EdgeUse>| l.iter().map(|(e, forward)| (e + edge, *forward)).collect();
+        let face = |(index, (quadric, kind, loops)): (usize, &(Quadric, Kind, Vec<Vec<EdgeUse>>))| Face {
             frame: Frame { hub, other: hub, by: [0.0; 3] },
             quadric: *quadric,
             loops: loops.iter().map(numbered).collect(),

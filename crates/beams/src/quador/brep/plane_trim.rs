@@ -14,7 +14,7 @@ use super::super::hub_quadric::Quadric;
 use super::super::perpendicular::perpendicular;
 use super::super::slice::{DISPLACEMENTS, Plane};
 use super::cuts::Plane as Cut;
-use super::{Brep, Corner, Edge, Face, Frame, Kind, NONE, Surface, Use};
+use super::{Brep, Corner, Edge, EdgeUse, Face, Frame, Kind, NONE, Surface};
 
 /// Distance from a plane within which corners are on it, in typical radii: above the perturbation of seams and the length of
 /// arcs that are collapsed, and far below what files resolve.
@@ -171,7 +171,7 @@ impl Brep<'_> {
         let origin = scale(plane.normal, dot(point, plane.normal));
         let frame = Frame { hub, other: hub, by: [0.0; 3] };
         let surface = Surface::Plane { origin, axes: plane.axes };
-        let mut from: HashMap<u32, Use> = HashMap::new();
+        let mut from: HashMap<u32, EdgeUse> = HashMap::new();
         for (&edge, &forward) in open {
             let of = (edge, !forward);
             let curve = self.curve(of, &frame);
@@ -180,7 +180,7 @@ impl Brep<'_> {
                 return None;
             }
         }
-        let mut loops: Vec<Vec<Use>> = Vec::new();
+        let mut loops: Vec<Vec<EdgeUse>> = Vec::new();
         for (&edge, &forward) in open {
             let mut next = self.start((edge, !forward));
             let mut traced = Vec::new();
@@ -202,9 +202,9 @@ impl Brep<'_> {
     }
 
     /// Sorts loops in a plane: those around faces, each followed by those of its holes; `None` for a hole outside all.
-    fn nested(&self, loops: Vec<Vec<Use>>, frame: &Frame, plane: &Surface) -> Option<Vec<Vec<Vec<Use>>>> {
+    fn nested(&self, loops: Vec<Vec<EdgeUse>>, frame: &Frame, plane: &Surface) -> Option<Vec<Vec<Vec<EdgeUse>>>> {
         let mut outer: Vec<Outer> = Vec::new();
-        let mut holes: Vec<([f64; 2], Vec<Use>)> = Vec::new();
+        let mut holes: Vec<([f64; 2], Vec<EdgeUse>)> = Vec::new();
         for l in loops {
             let mut polygon: Vec<[f64; 2]> = Vec::new();
             let mut twice = 0.0;
@@ -233,7 +233,7 @@ struct Outer {
     twice: f64,
     /// It, in chords.
     polygon: Vec<[f64; 2]>,
-    loops: Vec<Vec<Use>>,
+    loops: Vec<Vec<EdgeUse>>,
 }
 
 /// Whether a point is in a polygon.

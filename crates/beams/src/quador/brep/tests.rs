@@ -96,7 +96,7 @@ fn check_brep(brep: &Brep) -> (Checked, i64) {
 }
 
 /// An edge begins and ends in its corners, and lies on the face, in space and by its curve in the parameter plane.
-fn check_edge(brep: &Brep, face: &Face, of: Use, curve: &Bezier<3>, counts: &mut [usize; 2]) {
+fn check_edge(brep: &Brep, face: &Face, of: EdgeUse, curve: &Bezier<3>, counts: &mut [usize; 2]) {
     let radius = brep.quadors.hub(face.frame.hub as usize).radius;
     for (end, corner) in [(0, of), (2, (of.0, !of.1))] {
         let at = brep.corner(brep.start(corner), &face.frame);
@@ -119,7 +119,7 @@ fn check_edge(brep: &Brep, face: &Face, of: Use, curve: &Bezier<3>, counts: &mut
 }
 
 /// Twice the area that the use of an edge sweeps about the origin of the parameter plane, by chords.
-fn swept(brep: &Brep, face: &Face, (edge, forward): Use) -> f64 {
+fn swept(brep: &Brep, face: &Face, (edge, forward): EdgeUse) -> f64 {
     let flat = brep.parameter_curve(face, edge);
     let points: Vec<[f64; 2]> = (0..=16).map(|k| flat.at(f64::from(k) / 16.0)).collect();
     let turn: f64 = points.windows(2).map(|w| w[0][0] * w[1][1] - w[0][1] * w[1][0]).sum();
@@ -285,13 +285,13 @@ fn halves_of_cells_are_closed_and_make_the_whole() {
 }
 
 /// The hubs of a lattice, each closed, have together the volume of the whole, also of what is behind some planes.
-fn check_pieces(q: &Quadors, planes: &[Plane], name: &str) {
+fn check_groups(q: &Quadors, planes: &[Plane], name: &str) {
     let mut sum = 0.0;
-    for piece in q.pieces(planes) {
-        let brep = q.piece(&piece).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
+    for group in q.hub_groups(planes) {
+        let brep = q.group_brep(&group).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
         if !brep.faces.is_empty() {
             check_brep(&brep);
-            sum += volume(&brep) * piece.hubs.len() as f64;
+            sum += volume(&brep) * group.hubs.len() as f64;
         }
     }
     let want = volume(&q.brep(planes).expect("a boundary"));
@@ -299,33 +299,33 @@ fn check_pieces(q: &Quadors, planes: &[Plane], name: &str) {
 }
 
 #[test]
-fn pieces_are_closed_and_make_the_whole() {
+fn groups_are_closed_and_make_the_whole() {
     let plane = |point, normal| Plane::new(point, normal).expect("a plane");
     for cell in catalogue() {
         for fillet in [Fillet::Auto, Fillet::None] {
             let graph = block(cell.name, 1, |_| 0.4, |_| Profile::Cylinder);
             let q = Quadors::new(&graph, fillet).expect("a cell");
             let name = format!("{} {fillet:?}", cell.name);
-            check_pieces(&q, &[], &name);
+            check_groups(&q, &[], &name);
             // Through nodes, through the middles of beams, and slanted.
-            check_pieces(&q, &[plane([5.0; 3], [1.0, 0.0, 0.0]), plane([3.0; 3], [0.0, -1.0, 0.0])], &name);
-            check_pieces(&q, &[plane([2.5; 3], [0.0, 0.0, 1.0])], &name);
-            check_pieces(&q, &[plane([4.1, 5.3, 4.7], [0.3, -0.5, 0.8])], &name);
+            check_groups(&q, &[plane([5.0; 3], [1.0, 0.0, 0.0]), plane([3.0; 3], [0.0, -1.0, 0.0])], &name);
+            check_groups(&q, &[plane([2.5; 3], [0.0, 0.0, 1.0])], &name);
+            check_groups(&q, &[plane([4.1, 5.3, 4.7], [0.3, -0.5, 0.8])], &name);
         }
     }
     let mut random = Random(29);
     for fillet in [Fillet::Auto, Fillet::Tau(0.8), Fillet::None] {
         let q = random_frame(&mut random, fillet, 1.2);
-        check_pieces(&q, &[], &format!("{fillet:?}"));
+        check_groups(&q, &[], &format!("{fillet:?}"));
     }
 }
 
 #[test]
-fn equal_hubs_are_one_piece() {
+fn equal_hubs_are_one_group() {
     let q = Quadors::new(&block("sc", 4, |_| 1.0, |_| Profile::Cylinder), Fillet::Auto).expect("a block");
-    let pieces = q.pieces(&[]);
+    let groups = q.hub_groups(&[]);
     // Beams begin at 4³ hubs, of which 8 kinds lack those from below; 3 kinds are ends.
-    assert_eq!((pieces.len(), pieces.iter().map(|p| p.hubs.len()).sum::<usize>()), (8 + 3, 64 + 3 * 16));
+    assert_eq!((groups.len(), groups.iter().map(|g| g.hubs.len()).sum::<usize>()), (8 + 3, 64 + 3 * 16));
 }
 
 #[test]

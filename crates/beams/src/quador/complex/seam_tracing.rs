@@ -12,7 +12,7 @@ use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, un
 use super::super::affine_function::AffineFunction;
 use super::super::conic::Conic;
 use super::super::hub::{HalfBeam, Hub};
-use super::super::hub_quadric::{Piece, Quadric, piece};
+use super::super::hub_quadric::{Quadric, QuadricPiece, piece};
 use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
 
 /// Size of the perturbation, in hub radii.
@@ -36,7 +36,7 @@ pub(super) struct SeamTracer<'a> {
     arcs: Vec<Arc>,
     /// Arcs incident to each vertex.
     at: Vec<[u32; 4]>,
-    pieces: Vec<(u64, Rc<Piece>)>,
+    pieces: Vec<(u64, Rc<QuadricPiece>)>,
 }
 
 impl<'a> SeamTracer<'a> {
@@ -54,7 +54,7 @@ impl<'a> SeamTracer<'a> {
     }
 
     /// The piece of a label, with the planes of the perturbed G.
-    fn piece(&mut self, label: u64) -> Rc<Piece> {
+    fn piece(&mut self, label: u64) -> Rc<QuadricPiece> {
         if let Some((_, known)) = self.pieces.iter().find(|p| p.0 == label) {
             return known.clone();
         }

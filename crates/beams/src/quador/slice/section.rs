@@ -12,7 +12,7 @@ use super::super::affine_function::AffineFunction;
 use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::complex::perturbation;
 use super::super::hub::{HalfBeam, Hub};
-use super::super::hub_quadric::{Piece, Quadric, piece};
+use super::super::hub_quadric::{Quadric, QuadricPiece, piece};
 use super::{Arc, Plane};
 
 /// Intersection of the plane with the disc in the split plane of a half-beam.
@@ -172,7 +172,7 @@ impl<'a> Section<'a> {
         if let Some(i) = self.regions.iter().position(|c| c.label == label) {
             return i;
         }
-        let Piece { quadric, toggles } = piece(self.hub, label, &|i| self.g[i]);
+        let QuadricPiece { quadric, toggles } = piece(self.hub, label, &|i| self.g[i]);
         let none = AffineFunction::default();
         let mut guards = Vec::with_capacity(self.g.len() + 1);
         if self.hub.sharp() {

@@ -70,7 +70,7 @@ pub struct BeamLattice {
 
 /// Meshes that go with a lattice.
 #[derive(Clone, Copy, Default)]
-pub struct Companions<'a> {
+pub struct CompanionMeshes<'a> {
     /// What is left of the lattice lies in this.
     pub clip: Option<&'a dyn Indexed>,
     /// What programs show that do not know the extension, and others while they load.
@@ -83,7 +83,7 @@ pub struct Companions<'a> {
 /// **Errors**: whatever `out` and `aside` report; `InvalidInput` for more than 2³¹ − 1 nodes or beams.
 pub fn write_beam_lattice(
     lattice: &BeamLattice,
-    meshes: Companions,
+    meshes: CompanionMeshes,
     meta: &Metadata,
     aside: &mut dyn ByteSpool,
     out: &mut dyn Write,
@@ -123,19 +123,19 @@ pub fn write_beam_lattice(
 }
 
 /// What most beams have in common: it is not repeated.
-struct Usual {
+struct BeamDefaults {
     radius: f32,
     cap: Cap,
 }
 
-impl Usual {
-    fn of(lattice: &BeamLattice) -> Usual {
+impl BeamDefaults {
+    fn of(lattice: &BeamLattice) -> BeamDefaults {
         let mut radii: Vec<f32> = lattice.beams.iter().map(|b| b.radii[0] as f32).collect();
         let middle = radii.len() / 2;
         let radius = if radii.is_empty() { 1.0 } else { *radii.select_nth_unstable_by(middle, f32::total_cmp).1 };
         let count = |cap: Cap| lattice.beams.iter().flat_map(|b| b.caps).filter(|c| *c == cap).count();
         let cap = Cap::ALL.into_iter().rev().max_by_key(|c| count(*c)).unwrap_or_default();
-        Usual { radius, cap }
+        BeamDefaults { radius, cap }
     }
 
     /// Appends the row of a beam.
@@ -166,7 +166,7 @@ impl Usual {
 
 /// Adds beams, balls and sets, after the nodes.
 fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> io::Result<()> {
-    let usual = Usual::of(lattice);
+    let defaults = BeamDefaults::of(lattice);
     let length = |b: &Frustum| {
         let [p, q] = b.ends.map(|n| lattice.nodes[n as usize]);
         crate::math::norm(crate::math::sub(p, q))
@@ -177,15 +177,15 @@ fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> i
         Some((_, radius)) => format!(" b2:ballmode=\"mixed\" b2:ballradius=\"{}\"", *radius as f32),
         None => String::new(),
     };
-    let mut text = format!("</vertices>\n<b:beamlattice radius=\"{}\" minlength=\"", usual.radius).into_bytes();
+    let mut text = format!("</vertices>\n<b:beamlattice radius=\"{}\" minlength=\"", defaults.radius).into_bytes();
     push_f32(&mut text, least);
-    let cap = usual.cap.word();
+    let cap = defaults.cap.word();
     text.extend_from_slice(format!("\" cap=\"{cap}\"{references}{balls}>\n<b:beams>\n").as_bytes());
     let mut put = |piece| model.push(piece);
     put(Piece::of(&text))?;
     let rows = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
-        lattice.beams[r].iter().for_each(|b| usual.push(b, &mut text));
+        lattice.beams[r].iter().for_each(|b| defaults.push(b, &mut text));
         Ok(Piece::of(&text))
     };
     in_order(lattice.beams.len(), CHUNK, rows, &mut put)?;

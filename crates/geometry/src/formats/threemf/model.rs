@@ -31,7 +31,7 @@ impl Placement {
 }
 
 /// A use of an object: which file it is in (empty: the same), its number, and where it goes.
-pub(super) struct Use {
+pub(super) struct ObjectReference {
     pub path: String,
     pub id: u32,
     pub placement: Placement,
@@ -42,7 +42,7 @@ pub(super) struct Use {
 pub(super) struct Object {
     pub vertices: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
-    pub components: Vec<Use>,
+    pub components: Vec<ObjectReference>,
     pub lattice: Option<Lattice>,
     /// The type: model, support and so on.
     pub kind: String,
@@ -70,7 +70,7 @@ impl Object {
 pub(super) struct Model {
     pub unit: f64,
     pub objects: HashMap<u32, Object>,
-    pub items: Vec<Use>,
+    pub items: Vec<ObjectReference>,
 }
 
 impl Model {

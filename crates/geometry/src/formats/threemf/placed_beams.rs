@@ -2,7 +2,7 @@
 
 use super::beam_lattice::Cap;
 use super::model::PlacedObject;
-use super::read::{Which, place_all};
+use super::read::{ObjectFilter, place_all};
 use crate::fault::{Fault, counted};
 use crate::formats::graphs::BeamGraph;
 use crate::math::{Mat3, determinant, dot, norm, sub};
@@ -12,11 +12,11 @@ const SIMILAR: f64 = 1e-4;
 
 /// Reads the beams that the build places, in mm; if it places none, all where they are defined. Meshes are left out.
 pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
-    let placed = lattices(bytes, Which::Placed)?;
+    let placed = lattices(bytes, ObjectFilter::Placed)?;
     if !placed.beams.is_empty() {
         return Ok(placed);
     }
-    let mut defined = lattices(bytes, Which::Lattices)?;
+    let mut defined = lattices(bytes, ObjectFilter::Lattices)?;
     if defined.beams.is_empty() {
         return Err(Fault::new("", "the file has no beam lattice; a mesh is read as a region ([region.mesh])"));
     }
@@ -25,7 +25,7 @@ pub fn read_beam_lattice(bytes: &[u8]) -> Result<BeamGraph, Fault> {
 }
 
 /// The beams of some of the objects.
-fn lattices(bytes: &[u8], which: Which) -> Result<BeamGraph, Fault> {
+fn lattices(bytes: &[u8], which: ObjectFilter) -> Result<BeamGraph, Fault> {
     let mut graph = BeamGraph { in_mm: true, ..BeamGraph::default() };
     let (mut short, mut clipped, mut triangles) = (0, 0, 0);
     place_all(bytes, which, &mut |placed: &PlacedObject| {

@@ -10,7 +10,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::MODEL;
-use super::model::{Lattice, Model, Object, PlacedObject, Placement, Source, Use};
+use super::model::{Lattice, Model, Object, ObjectReference, PlacedObject, Placement, Source};
 use crate::fault::{Fault, counted};
 use crate::formats::join::Joiner;
 use crate::formats::text::{parse, shown};
@@ -87,12 +87,12 @@ impl<'a> Package<'a> {
 
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    joined(bytes, Which::Placed)
+    joined(bytes, ObjectFilter::Placed)
 }
 
 /// Reads one of the objects that the build places, by its name, in mm.
 pub fn read_object(bytes: &[u8], name: &str) -> Result<Mesh, Fault> {
-    joined(bytes, Which::Named(name))
+    joined(bytes, ObjectFilter::Named(name))
 }
 
 /// The names of the objects that the build places, in its order; empty where they have none.
@@ -106,9 +106,9 @@ fn names(main: &Model) -> Vec<String> {
     main.items.iter().map(|i| main.objects.get(&i.id).map(|o| o.name.clone()).unwrap_or_default()).collect()
 }
 
-fn joined(bytes: &[u8], which: Which) -> Result<Mesh, Fault> {
+fn joined(bytes: &[u8], filter: ObjectFilter) -> Result<Mesh, Fault> {
     let mut joiner = Joiner::default();
-    let held = place_all(bytes, which, &mut |placed| {
+    let held = place_all(bytes, filter, &mut |placed| {
         if placed.object.slices {
             let message =
                 "the file holds slices, and triangles that only stand for them; read the design or a mesh of it";
@@ -134,7 +134,7 @@ fn joined(bytes: &[u8], which: Which) -> Result<Mesh, Fault> {
 
 /// Which objects of a file are given.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Which<'a> {
+pub(super) enum ObjectFilter<'a> {
     /// Those that the build places.
     Placed,
     /// Those of a name that it places.
@@ -156,13 +156,13 @@ pub(super) struct Contents {
 /// Gives objects (supports left out) where they are, and what there is.
 pub(super) fn place_all(
     bytes: &[u8],
-    which: Which,
+    filter: ObjectFilter,
     take: &mut dyn FnMut(&PlacedObject) -> Result<(), Fault>,
 ) -> Result<Contents, Fault> {
     let mut package = Package::open(bytes)?;
     let root = root_of(&mut package);
     let mut main = package.file(&root, model)?;
-    if let Which::Named(name) = which {
+    if let ObjectFilter::Named(name) = filter {
         let known = names(&main);
         let mut of = known.iter().map(|n| n == name);
         main.items.retain(|_| of.next().unwrap_or(false));
@@ -173,10 +173,11 @@ pub(super) fn place_all(
             return Err(Fault::new("", format!("no object is named {}; {there}", shown(name.as_bytes()))));
         }
     }
-    if which == Which::Lattices {
+    if filter == ObjectFilter::Lattices {
         let mut ids: Vec<u32> = main.objects.iter().filter(|o| o.1.lattice.is_some()).map(|o| *o.0).collect();
         ids.sort_unstable();
-        main.items = ids.into_iter().map(|id| Use { path: String::new(), id, placement: Placement::NONE }).collect();
+        main.items =
+            ids.into_iter().map(|id| ObjectReference { path: String::new(), id, placement: Placement::NONE }).collect();
     }
     let mut files = HashMap::new();
     let (unit, items, objects) = (main.unit, main.items.len(), main.objects.len());
@@ -237,7 +238,7 @@ struct BuildTraversal<'a> {
 }
 
 impl BuildTraversal<'_> {
-    fn place(&mut self, path: &str, of: &Use, outer: &Placement, depth: usize) -> Result<(), Fault> {
+    fn place(&mut self, path: &str, of: &ObjectReference, outer: &Placement, depth: usize) -> Result<(), Fault> {
         let path = if of.path.is_empty() { path } else { &of.path };
         let files = self.files;
         let Some(object) = files.get(path).and_then(|f| f.objects.get(&of.id)) else {
@@ -373,7 +374,7 @@ fn vertex(s: &Source, tag: &BytesStart) -> Result<Vec3, Fault> {
     Ok(p)
 }
 
-fn using(s: &Source, tag: &BytesStart) -> Result<Use, Fault> {
+fn using(s: &Source, tag: &BytesStart) -> Result<ObjectReference, Fault> {
     let mut placement = Placement::NONE;
     if let Some(text) = attribute(tag, "transform") {
         let v: Option<Vec<f64>> = text.split_ascii_whitespace().map(|w| parse(w.as_bytes())).collect();
@@ -387,7 +388,7 @@ fn using(s: &Source, tag: &BytesStart) -> Result<Use, Fault> {
     }
     // The production extension's path, under whatever prefix.
     let path = attribute_where(tag, |n| n.ends_with(":path")).map(Cow::into_owned).unwrap_or_default();
-    Ok(Use { path, id: s.required(tag, "objectid")?, placement })
+    Ok(ObjectReference { path, id: s.required(tag, "objectid")?, placement })
 }
 
 fn check(s: &Source, id: u32, o: &Object) -> Result<(), Fault> {

@@ -124,7 +124,7 @@ fn scalar(kind: &str) -> Result<Scalar, Fault> {
 
 /// Where the arrays of a section belong.
 #[derive(Clone, Copy, PartialEq)]
-enum Owner {
+enum ArrayAssociation {
     /// The data set as a whole: arrays before POINT_DATA and CELL_DATA, such as the time. They are not kept.
     Whole,
     Points,
@@ -144,7 +144,7 @@ struct File<'a> {
     /// Where each cell ends in `connectivity`.
     ends: Vec<f64>,
     types: Vec<f64>,
-    owner: Owner,
+    association: ArrayAssociation,
     /// Tuples of the arrays of the current section.
     tuples: usize,
     arrays: Vec<Array>,
@@ -183,7 +183,7 @@ impl<'a> File<'a> {
             connectivity: Vec::new(),
             ends: Vec::new(),
             types: Vec::new(),
-            owner: Owner::Whole,
+            association: ArrayAssociation::Whole,
             tuples: 0,
             arrays: Vec::new(),
         })
@@ -227,7 +227,7 @@ impl<'a> File<'a> {
                 self.types = r.numbers(n, "int")?;
             }
             "POINT_DATA" | "CELL_DATA" => {
-                self.owner = if word == "CELL_DATA" { Owner::Cells } else { Owner::Points };
+                self.association = if word == "CELL_DATA" { ArrayAssociation::Cells } else { ArrayAssociation::Points };
                 self.tuples = r.count("the number of values")?;
             }
             "SCALARS" => self.scalars()?,
@@ -311,8 +311,8 @@ impl<'a> File<'a> {
 
     /// Keeps an array of points or cells.
     fn keep(&mut self, name: String, components: usize, values: Vec<f64>) {
-        if self.owner != Owner::Whole {
-            self.arrays.push(Array { name, of_cells: self.owner == Owner::Cells, components, values });
+        if self.association != ArrayAssociation::Whole {
+            self.arrays.push(Array { name, of_cells: self.association == ArrayAssociation::Cells, components, values });
         }
     }
 

@@ -1,13 +1,13 @@
 use super::*;
-use geometry::symmetry::{Group, Side};
+use geometry::symmetry::{ComplexPart, Group};
 
+use ComplexPart::{Im, Re};
 use Part::{Lower, Sheet};
-use Side::{Im, Re};
 
 type Known = (
     &'static str,
     &'static str,
-    &'static [([i32; 3], Side, f64)],
+    &'static [([i32; 3], ComplexPart, f64)],
     (f64, f64, bool),
     Part,
     f64,

@@ -12,9 +12,9 @@ use super::super::{Part, Series, Term};
 use super::TetCell;
 use geometry::fault::Fault;
 use geometry::math::scale;
-use geometry::symmetry::{Group, Side};
+use geometry::symmetry::{ComplexPart, Group};
 
-use Side::{Im, Re};
+use ComplexPart::{Im, Re};
 
 /// A predefined tetrahedral cell.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ pub struct NamedTetCell {
     /// Space group, with the origin choice.
     pub group: &'static str,
     /// Waves: (h, k, l), part of the sum over the group, amplitude.
-    pub terms: &'static [([i32; 3], Side, f64)],
+    pub terms: &'static [([i32; 3], ComplexPart, f64)],
     /// The barycentre, turns, the same along all axes.
     pub site: f64,
     /// Edge of the tetrahedron over √2, in cells.
@@ -276,7 +276,7 @@ pub fn named_tet_cell(name: &str) -> Option<&'static NamedTetCell> {
 ///
 /// # Errors
 /// As [`Group::orbit`] and [`Series::new`].
-pub(crate) fn series(group: &Group, terms: &[([i32; 3], Side, f64)]) -> Result<Series, Fault> {
+pub(crate) fn series(group: &Group, terms: &[([i32; 3], ComplexPart, f64)]) -> Result<Series, Fault> {
     let mut all = Vec::new();
     for (hkl, side, amplitude) in terms {
         let waves = group.orbit(*hkl, *side)?;

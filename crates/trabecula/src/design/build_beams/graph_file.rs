@@ -4,7 +4,7 @@ use crate::design::data::*;
 use crate::environment::Environment;
 use crate::kind::{DesignError, Unit, Warning};
 use ::beams::graph::{GivenRadii, Wireframe};
-use ::beams::{Joined, join_chains};
+use ::beams::{JoinedChains, join_chains};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{BeamGraph, read_graph};
 
@@ -49,7 +49,7 @@ pub(super) fn read(
 /// The radii that hold; beams within the ball of one of their hubs are left out.
 fn radii(
     graph: &mut BeamGraph,
-    joined: &Joined,
+    joined: &JoinedChains,
     spec: &BeamsSpec,
     environment: &Environment,
     remarks: &mut Vec<String>,

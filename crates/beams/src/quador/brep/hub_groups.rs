@@ -12,7 +12,7 @@ use super::super::hub::HalfBeam;
 use super::super::integral::unresolved_face;
 use super::super::slice::Plane;
 use super::outline::Outline;
-use super::{Brep, Frame, Kind, Use};
+use super::{Brep, EdgeUse, Frame, Kind};
 
 /// Distance within which planes coincide, and by which one that coincides with the end of a half-beam is moved back, in typical radii:
 /// far below what is noticed and above the rounding of positions.
@@ -21,14 +21,14 @@ const COINCIDENT: f64 = 1e-6;
 const DIGITS: f64 = 1e9;
 
 /// Hubs that are equal up to translation, and equally cut.
-pub(crate) struct Piece {
+pub(crate) struct HubGroup {
     /// Its hubs; the first stands for all.
     pub hubs: Vec<u32>,
     /// The planes that may cut the first.
     planes: Vec<Plane>,
 }
 
-impl Piece {
+impl HubGroup {
     /// Whether planes may cut it.
     pub(crate) fn is_cut(&self) -> bool {
         !self.planes.is_empty()
@@ -42,10 +42,10 @@ impl Quadors {
     }
 
     /// The kinds of hubs with their half-beams that are behind all of some planes, or cut by them.
-    pub(crate) fn pieces(&self, planes: &[Plane]) -> Vec<Piece> {
+    pub(crate) fn hub_groups(&self, planes: &[Plane]) -> Vec<HubGroup> {
         let classes = self.classes();
         let mut known: HashMap<(u32, Vec<(usize, i64)>), usize> = HashMap::new();
-        let mut out: Vec<Piece> = Vec::new();
+        let mut out: Vec<HubGroup> = Vec::new();
         'hubs: for hub in 0..self.len() {
             let (bounds, center) = (self.balls[hub].part, self.center(hub));
             let mut cutting = Vec::new();
@@ -63,7 +63,7 @@ impl Quadors {
             }
             let of = cutting.iter().map(|(index, _)| planes[*index]).collect();
             let number = *known.entry((classes.of[hub], cutting)).or_insert_with(|| {
-                out.push(Piece { hubs: Vec::new(), planes: of });
+                out.push(HubGroup { hubs: Vec::new(), planes: of });
                 out.len() - 1
             });
             out[number].hubs.push(hub as u32);
@@ -75,8 +75,8 @@ impl Quadors {
     ///
     /// # Errors
     /// As for `brep`.
-    pub(crate) fn piece(&self, piece: &Piece) -> Result<Brep<'_>, Fault> {
-        let hub = piece.hubs[0];
+    pub(crate) fn group_brep(&self, group: &HubGroup) -> Result<Brep<'_>, Fault> {
+        let hub = group.hubs[0];
         let mut brep =
             Brep { quadors: self, origin: [0.0; 3], corners: Vec::new(), edges: Vec::new(), faces: Vec::new() };
         brep.hub(hub)?;
@@ -84,7 +84,7 @@ impl Quadors {
         brep.close(hub).ok_or_else(|| unresolved_face(hub as usize))?;
         let (near, center) = (COINCIDENT * self.scale, self.center(hub as usize));
         let half_beams = self.hub(hub as usize).half_beams;
-        let moved: Vec<Plane> = (piece.planes.iter())
+        let moved: Vec<Plane> = (group.planes.iter())
             .map(|plane| {
                 let coincides = half_beams.iter().any(|s| {
                     let along = dot(s.axis, plane.normal);
@@ -123,7 +123,7 @@ impl Brep<'_> {
     }
 
     /// The circle in which a half-beam ends, in quarters from a direction, with the half-beam on its left seen from outside.
-    fn end_circle(&mut self, hub: u32, s: &HalfBeam, from: Vec3) -> Vec<Use> {
+    fn end_circle(&mut self, hub: u32, s: &HalfBeam, from: Vec3) -> Vec<EdgeUse> {
         let (center, radius) = (scale(s.axis, s.split), s.radius_squared(s.split).sqrt());
         let next = cross(from, s.axis);
         let around = [from, next, scale(from, -1.0), scale(next, -1.0)].map(|d| scale(d, radius));
