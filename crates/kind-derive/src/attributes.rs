@@ -6,7 +6,7 @@ use syn::{Attribute, DeriveInput, Expr, ExprLit, Lit, LitInt, LitStr, Meta, Path
 
 /// Attributes of the type.
 #[derive(Default)]
-pub struct Outer {
+pub struct TypeAttributes {
     pub name: String,
     pub noun: Option<String>,
     pub doc: String,
@@ -19,9 +19,10 @@ pub struct Outer {
     pub keyed: bool,
 }
 
-impl Outer {
-    pub fn of(input: &DeriveInput) -> syn::Result<Outer> {
-        let mut out = Outer { name: input.ident.to_string(), doc: doc(&input.attrs), ..Outer::default() };
+impl TypeAttributes {
+    pub fn of(input: &DeriveInput) -> syn::Result<TypeAttributes> {
+        let mut out =
+            TypeAttributes { name: input.ident.to_string(), doc: doc(&input.attrs), ..TypeAttributes::default() };
         each(&input.attrs, |meta| {
             if meta.path.is_ident("name") {
                 out.name = meta.value()?.parse::<LitStr>()?.value();
@@ -62,7 +63,7 @@ pub enum Absent {
 }
 
 /// Attributes of a field or a variant.
-pub struct Inner {
+pub struct FieldAttributes {
     pub key: Option<String>,
     pub doc: String,
     pub unit: String,
@@ -77,9 +78,9 @@ pub struct Inner {
     pub hints: Vec<String>,
 }
 
-impl Inner {
-    pub fn of(attrs: &[Attribute]) -> syn::Result<Inner> {
-        let mut out = Inner {
+impl FieldAttributes {
+    pub fn of(attrs: &[Attribute]) -> syn::Result<FieldAttributes> {
+        let mut out = FieldAttributes {
             key: None,
             doc: doc(attrs),
             unit: String::new(),
@@ -133,7 +134,7 @@ impl Inner {
 
     /// The `Key` of this field or variant.
     pub fn describe(&self, name: &str, required: bool) -> TokenStream {
-        let Inner { doc, unit, hints, keyword, .. } = self;
+        let FieldAttributes { doc, unit, hints, keyword, .. } = self;
         let limits = self.limits.iter().map(|(limit, v)| {
             let limit = quote::format_ident!("{limit}");
             quote! { #limit: #v, }

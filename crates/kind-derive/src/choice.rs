@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 use syn::{DataEnum, Error, Fields, Ident, Type, Variant};
 
-use crate::attributes::{Inner, Outer};
+use crate::attributes::{FieldAttributes, TypeAttributes};
 use crate::table::kind_of_table;
 
 /// The one field of a variant.
@@ -20,12 +20,12 @@ fn boxed(ty: &Type) -> bool {
 }
 
 /// A table named by its kind, or a word.
-pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+pub fn tagged(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> syn::Result<TokenStream> {
     let (mut choices, mut reads, mut writes, mut checks) = (vec![], vec![], vec![], vec![]);
     let (mut parts, mut keys) = (vec![], vec![]);
     let (mut members, mut from) = (vec![], vec![]);
     for variant in &data.variants {
-        let (v, inner) = (&variant.ident, Inner::of(&variant.attrs)?);
+        let (v, inner) = (&variant.ident, FieldAttributes::of(&variant.attrs)?);
         let name = inner.key.clone().unwrap_or_else(|| v.to_string().to_lowercase());
         let key = inner.describe(&name, true);
         if matches!(variant.fields, Fields::Unit) {
@@ -113,7 +113,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
             fn fits(node: &Node) -> u8 {
                 fits_choice(node, CHOICES)
             }
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 #(#before(at)?;)*
                 let (key, at) = at.choice(#noun, CHOICES)?;
                 match key { #(#reads,)* _ => Err(at.unknown_kind(#noun, CHOICES)) }
@@ -134,10 +134,10 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
 }
 
 /// The variant follows from the type of the value.
-pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+pub fn untagged(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> syn::Result<TokenStream> {
     let names: Vec<&Ident> = data.variants.iter().map(|v| &v.ident).collect();
     let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
-    let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
+    let docs = data.variants.iter().map(|v| Ok(FieldAttributes::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
     let doc = &outer.doc;
     let (check, before) = (outer.check.iter(), outer.before.iter());
     let expected = match &outer.noun {
@@ -153,7 +153,7 @@ pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<To
             fn fits(node: &Node) -> u8 {
                 0 #(.max(<#types as Kind>::fits(node)))*
             }
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 #(#before(at)?;)*
                 let best = Self::fits(at.node);
                 if let (Value::List(items), 1) = (&at.node.value, best) {
@@ -182,10 +182,10 @@ pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<To
 }
 
 /// The variant follows from the keys that are given.
-pub fn alternatives(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+pub fn alternatives(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> syn::Result<TokenStream> {
     let names: Vec<&Ident> = data.variants.iter().map(|v| &v.ident).collect();
     let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
-    let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
+    let docs = data.variants.iter().map(|v| Ok(FieldAttributes::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
     let places = (0..names.len()).collect::<Vec<_>>();
     let checks = quote! { match self { #(#ident::#names(of) => Kind::check(of, key)),* }?; };
     let kind = kind_of_table(ident, outer, &checks);

@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | type | `name = "…"` | name in the schema; that of the type unless given |
 //! | type | `noun = "…"` | noun in messages; the first sentence of the doc comment unless given, of an enum its name; of an untagged enum all that is expected |
-//! | type | `before = function` | `fn(&At) -> Result<(), DesignError>`: refuses a value before it is read, to explain common mistakes |
+//! | type | `before = function` | `fn(&NodeCursor) -> Result<(), DesignError>`: refuses a value before it is read, to explain common mistakes |
 //! | type | `check = function` | `fn(&Self, &Key) -> Result<(), Fault>`: what fields must keep together, checked after each |
 //! | enum | `untagged`, `alternatives` | see above |
 //! | enum | `inherit` | limits of the place where it stands hold for its numbers, instead of the variant's |
@@ -44,7 +44,7 @@ pub fn kind(input: TokenStream) -> TokenStream {
 }
 
 fn expand(input: &DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
-    let outer = attributes::Outer::of(input)?;
+    let outer = attributes::TypeAttributes::of(input)?;
     let made = match &input.data {
         Data::Struct(s) => match &s.fields {
             Fields::Named(fields) => table::named(&input.ident, &outer, &fields.named)?,

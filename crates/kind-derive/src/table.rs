@@ -5,7 +5,7 @@ use quote::quote;
 use syn::punctuated::Punctuated;
 use syn::{Error, Field, Ident, PathArguments, Token, Type};
 
-use crate::attributes::{Absent, Inner, Outer};
+use crate::attributes::{Absent, FieldAttributes, TypeAttributes};
 
 /// The `T` of an `Option<T>`.
 fn optional(ty: &Type) -> Option<&Type> {
@@ -31,7 +31,7 @@ struct Parts {
 impl Parts {
     fn field(&mut self, field: &Field) -> syn::Result<()> {
         let Some(ident) = &field.ident else { return Err(Error::new_spanned(field, "a field without a name")) };
-        let (ty, inner) = (&field.ty, Inner::of(&field.attrs)?);
+        let (ty, inner) = (&field.ty, FieldAttributes::of(&field.attrs)?);
         if inner.skip {
             self.reads.push(quote! { #ident: Default::default() });
             return Ok(());
@@ -89,7 +89,7 @@ impl Parts {
 }
 
 /// `Kind` for a table: all but its keys and `checks`, which check the ranges of its values.
-pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> TokenStream {
+pub fn kind_of_table(ident: &Ident, outer: &TypeAttributes, checks: &TokenStream) -> TokenStream {
     let (name, doc, noun) = (&outer.name, &outer.doc, outer.phrase());
     let (check, before) = (outer.check.iter(), outer.before.iter());
     quote! {
@@ -101,7 +101,7 @@ pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> Toke
             fn fits(node: &Node) -> u8 {
                 fits_table(node, Self::keys().iter().map(|k| k.name))
             }
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 #(#before(at)?;)*
                 Self::from_fields(&at.table(&Self::expected(), Self::keys())?)
             }
@@ -123,7 +123,7 @@ pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> Toke
 }
 
 /// A struct with named fields.
-pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>) -> syn::Result<TokenStream> {
+pub fn named(ident: &Ident, outer: &TypeAttributes, fields: &Punctuated<Field, Token![,]>) -> syn::Result<TokenStream> {
     let mut parts = Parts::default();
     for field in fields {
         parts.field(field)?;
@@ -152,8 +152,8 @@ pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>
 }
 
 /// A struct with one unnamed field.
-pub fn transparent(ident: &Ident, outer: &Outer, field: &Field) -> syn::Result<TokenStream> {
-    let (ty, inner) = (&field.ty, Inner::of(&field.attrs)?);
+pub fn transparent(ident: &Ident, outer: &TypeAttributes, field: &Field) -> syn::Result<TokenStream> {
+    let (ty, inner) = (&field.ty, FieldAttributes::of(&field.attrs)?);
     let least = inner.least.iter().collect::<Vec<_>>();
     let (name, doc) = (&outer.name, &outer.doc);
     let (check, before) = (outer.check.iter(), outer.before.iter());
@@ -166,7 +166,7 @@ pub fn transparent(ident: &Ident, outer: &Outer, field: &Field) -> syn::Result<T
             fn fits(node: &Node) -> u8 {
                 <#ty as Kind>::fits(node)
             }
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 #(#before(at)?;)*
                 let of = <#ty as Kind>::read(at)?;
                 #(at.at_least(of.len(), #least)?;)*

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use geometry::formats::{BEAM_FORMATS, FeText};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use trabecula::beam_mesh::{Made, Options};
+use trabecula::beam_mesh::{MeshedBeams, Options};
 use trabecula::report::BeamMeshReport;
 
 use crate::arrays::table;
@@ -18,7 +18,7 @@ use crate::solid::Solid;
 /// Beams as finite elements.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct BeamElements {
-    made: Made,
+    made: MeshedBeams,
 }
 
 #[pymethods]

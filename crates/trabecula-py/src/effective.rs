@@ -7,7 +7,7 @@ use homogenise::Material;
 use pyo3::prelude::*;
 use serde::Serialize;
 use trabecula::design::Design;
-use trabecula::effective::{Resolution, Side, UnitCell};
+use trabecula::effective::{Resolution, SheetSide, UnitCell};
 
 use crate::error;
 use crate::folder::Folder;
@@ -109,7 +109,7 @@ impl Cell {
         upper: Option<bool>,
         work: Work,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let side = upper.map(|up| if up { Side::Upper } else { Side::Lower });
+        let side = upper.map(|up| if up { SheetSide::Upper } else { SheetSide::Lower });
         self.report(py, "PermeabilityReport", work, move |cell, p| cell.permeability(n, side, p))
     }
 }

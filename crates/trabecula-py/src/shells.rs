@@ -6,7 +6,7 @@ use geometry::formats::{FeText, SHELL_FORMATS};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use trabecula::report::ShellReport;
-use trabecula::shell_mesh::{Made, Options};
+use trabecula::shell_mesh::{MeshedShell, Options};
 
 use crate::arrays::table;
 use crate::error;
@@ -18,7 +18,7 @@ use crate::solid::Solid;
 /// Shells on the mid-surface of a sheet.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Shells {
-    made: Made,
+    made: MeshedShell,
     edge: f64,
 }
 

@@ -11,7 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::design::CarrierMaterial;
 use trabecula::report::VolumeReport;
-use trabecula::volume_mesh::{Made, Of, Options};
+use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
 
 use crate::arrays::table;
 use crate::error;
@@ -25,7 +25,7 @@ use crate::solid::Solid;
 /// A volume mesh.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct VolumeMesh {
-    made: Made,
+    made: MeshedVolume,
 }
 
 impl VolumeMesh {
@@ -52,7 +52,7 @@ impl VolumeMesh {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<VolumeMesh> {
-        let Some((_, of)) = Of::NAMES.into_iter().find(|(name, _)| *name == of) else {
+        let Some((_, of)) = VolumeTarget::NAMES.into_iter().find(|(name, _)| *name == of) else {
             return Err(PyValueError::new_err(format!("of is \"{of}\"; it must be solid, pore, lower, upper or all")));
         };
         let options = Options { edge, of, order, periodic, largest };

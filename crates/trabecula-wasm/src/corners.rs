@@ -28,14 +28,14 @@ pub fn arrays(surface: &SurfaceMesh) -> Arrays {
         })
         .collect();
     let lengths: Vec<f64> = normals.iter().map(|n| norm(*n).max(1e-300)).collect();
-    let around = Around::of(&mesh.triangles, mesh.vertices.len());
-    let mut found = Found::new(mesh.vertices.len());
+    let adjacent = VertexTriangles::of(&mesh.triangles, mesh.vertices.len());
+    let mut drawn = CornerVertices::new(mesh.vertices.len());
     let mut index = Vec::with_capacity(12 * mesh.triangles.len());
     for (t, corners) in mesh.triangles.iter().enumerate() {
         let cut = if surface.cut[t] { ONE } else { 0.0 };
         for v in corners {
             let mut sum = [0.0; 3];
-            for s in around.of_vertex(*v) {
+            for s in adjacent.of_vertex(*v) {
                 let s = *s as usize;
                 if dot(normals[t], normals[s]) >= CREASE * lengths[t] * lengths[s] {
                     sum = [0, 1, 2].map(|i| sum[i] + normals[s][i]);
@@ -43,30 +43,30 @@ pub fn arrays(surface: &SurfaceMesh) -> Arrays {
             }
             let length = norm(sum).max(1e-300);
             let [x, y, z] = sum.map(|c| c / length * ONE);
-            index.extend(found.number(*v, [x, y, z, cut].map(|c| c.round() as i16)).to_le_bytes());
+            index.extend(drawn.number(*v, [x, y, z, cut].map(|c| c.round() as i16)).to_le_bytes());
         }
     }
-    let positions = found.vertices.iter().flat_map(|v| mesh.vertices[*v as usize]);
+    let positions = drawn.vertices.iter().flat_map(|v| mesh.vertices[*v as usize]);
     let mut bytes: Vec<u8> = positions.flat_map(|x| (x as f32).to_le_bytes()).collect();
-    bytes.extend(found.normals.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
+    bytes.extend(drawn.normals.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
     bytes.extend(index);
-    Arrays { vertices: found.vertices, bytes }
+    Arrays { vertices: drawn.vertices, bytes }
 }
 
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
 /// Vertices with one normal each: those of a vertex of the mesh are a chain.
-struct Found {
+struct CornerVertices {
     first: Vec<u32>,
     next: Vec<u32>,
     vertices: Vec<u32>,
     normals: Vec<[i16; 4]>,
 }
 
-impl Found {
-    fn new(vertices: usize) -> Found {
-        Found { first: vec![NONE; vertices], next: Vec::new(), vertices: Vec::new(), normals: Vec::new() }
+impl CornerVertices {
+    fn new(vertices: usize) -> CornerVertices {
+        CornerVertices { first: vec![NONE; vertices], next: Vec::new(), vertices: Vec::new(), normals: Vec::new() }
     }
 
     /// The number of a vertex of the mesh with this normal.
@@ -87,13 +87,13 @@ impl Found {
 }
 
 /// The triangles around each vertex.
-struct Around {
+struct VertexTriangles {
     first: Vec<u32>,
     triangles: Vec<u32>,
 }
 
-impl Around {
-    fn of(triangles: &[[u32; 3]], vertices: usize) -> Around {
+impl VertexTriangles {
+    fn of(triangles: &[[u32; 3]], vertices: usize) -> VertexTriangles {
         let mut first = vec![0u32; vertices + 1];
         for v in triangles.as_flattened() {
             first[*v as usize + 1] += 1;
@@ -109,7 +109,7 @@ impl Around {
                 next[*v as usize] += 1;
             }
         }
-        Around { first, triangles: found }
+        VertexTriangles { first, triangles: found }
     }
 
     fn of_vertex(&self, v: u32) -> &[u32] {

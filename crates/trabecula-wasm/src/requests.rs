@@ -14,7 +14,7 @@ use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::extract;
 use trabecula::region::{Cuboid, Intersection, Region, Shape};
 use trabecula::report::{IslandsReport, MeshReport};
-use trabecula::surface_maker::{Figures, Made, Options};
+use trabecula::surface_maker::{Figures, MeshedSurface, Options};
 
 use crate::corners::arrays;
 use crate::edit::{Change, edit};
@@ -111,7 +111,7 @@ type Answer = Result<(Json, Vec<u8>), Refused>;
 /// What is kept from one request to the next.
 #[derive(Default)]
 pub struct Session {
-    files: Dropped,
+    files: DroppedFiles,
     built: Option<Built>,
     /// The design as the command would write it.
     text: String,
@@ -122,9 +122,9 @@ pub struct Session {
 
 /// Files that were given to the page, by name.
 #[derive(Default)]
-struct Dropped(BTreeMap<String, Vec<u8>>);
+struct DroppedFiles(BTreeMap<String, Vec<u8>>);
 
-impl Loader for Dropped {
+impl Loader for DroppedFiles {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
         let found = self.0.get(path).or_else(|| self.0.get(path.rsplit(['/', '\\']).next().unwrap_or(path)));
         found.cloned().ok_or_else(|| "the page does not have this file; drop it here".to_string())
@@ -265,7 +265,7 @@ impl Session {
     }
 }
 
-fn surface(built: &Built, resolution: Resolution, progress: &dyn Progress) -> Result<Made, Refused> {
+fn surface(built: &Built, resolution: Resolution, progress: &dyn Progress) -> Result<MeshedSurface, Refused> {
     Ok(match resolution {
         Resolution::Grid(edge) => built.surface().mesh(&Options::new(edge), progress)?,
         Resolution::Chord(chord) => {
@@ -284,7 +284,9 @@ fn picture(built: &Built, cells: f64, part: bool) -> Answer {
     let share = match edge {
         Some(_) if part && whole > FAR * cells => cells / whole,
         // Triangles grow as cells do, where the lattice is about as dense.
-        Some(_) if whole > MANY => resolution::need(built, resolution).map_or(1.0, |n| LARGEST / n.triangles),
+        Some(_) if whole > MANY => {
+            resolution::resource_estimate(built, resolution).map_or(1.0, |n| LARGEST / n.triangles)
+        }
         _ => 1.0,
     };
     let middle = match edge {

@@ -40,19 +40,19 @@ pub fn of_mesh(built: &Built, edge: Option<f64>, per_cell: Option<f64>) -> Resul
             "grid spacing {spacing} mm is more than half the smallest wavelength, {wavelength} mm: the lattice is not resolved"
         ));
     }
-    let need = need(built, resolution).map_err(|f| f.to_string())?;
-    if need.memory > MEMORY {
+    let estimate = resource_estimate(built, resolution).map_err(|f| f.to_string())?;
+    if estimate.memory > MEMORY {
         return Err(format!(
             "about {:.0} million triangles do not fit into the memory of a page; use a larger spacing, or the command: \
              trabecula mesh design.toml -o part.stl",
-            need.triangles / 1e6
+            estimate.triangles / 1e6
         ));
     }
     Ok(resolution)
 }
 
 /// About what a surface takes.
-pub struct Need {
+pub struct ResourceEstimate {
     /// Number of triangles.
     pub triangles: f64,
     /// Memory, bytes.
@@ -60,7 +60,7 @@ pub struct Need {
 }
 
 /// About what a surface takes; counted on a coarser grid, if need be, and scaled from there.
-pub fn need(built: &Built, resolution: Resolution) -> Result<Need, Fault> {
+pub fn resource_estimate(built: &Built, resolution: Resolution) -> Result<ResourceEstimate, Fault> {
     let (found, times) = match resolution {
         Resolution::Grid(spacing) => {
             let counted = spacing.max(built.solid.wavelength / COUNTED);
@@ -68,7 +68,7 @@ pub fn need(built: &Built, resolution: Resolution) -> Result<Need, Fault> {
         }
         Resolution::Chord(chord) => (built.beam_surface()?.estimate(chord)?, 1.0),
     };
-    Ok(Need { triangles: found.triangles * times, memory: found.memory * times })
+    Ok(ResourceEstimate { triangles: found.triangles * times, memory: found.memory * times })
 }
 
 /// The grid spacing of a mesh for which none is asked, mm.
@@ -79,7 +79,7 @@ pub fn usual(built: &Built) -> f64 {
 /// The resolution of a picture of about this number of grid cells, or of beams with at most this number of triangles.
 pub fn of_picture(built: &Built, cells: f64, triangles: f64) -> Resolution {
     let patches = built.default_chord().map(|chord| Resolution::Chord(8.0 * chord));
-    if let Some(found) = patches.filter(|p| need(built, *p).is_ok_and(|n| n.triangles <= triangles)) {
+    if let Some(found) = patches.filter(|p| resource_estimate(built, *p).is_ok_and(|n| n.triangles <= triangles)) {
         return found;
     }
     let wavelength = built.solid.wavelength;

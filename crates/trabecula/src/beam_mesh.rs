@@ -22,8 +22,8 @@ pub struct Options {
     pub largest: bool,
 }
 
-/// A mesh of beams that was made.
-pub struct Made {
+/// The mesh of beams in a region, and what it leaves out.
+pub struct MeshedBeams {
     /// The mesh.
     pub mesh: BeamMesh,
     /// The beams of which some length is in the region, and those of them that the region cuts.
@@ -57,7 +57,7 @@ pub fn beam_mesh(
     region: &Region,
     sets: &[(String, Region)],
     options: &Options,
-) -> Result<Made, Fault> {
+) -> Result<MeshedBeams, Fault> {
     let near = NEAR * norm(region.bounds().size());
     let runs: Vec<Vec<[f64; 2]>> =
         (0..quadors.beams()).into_par_iter().map(|b| within(quadors, b, region, near)).collect();
@@ -84,7 +84,7 @@ pub fn beam_mesh(
         }
     }
     let warning = add_sets(&mut mesh, sets);
-    Ok(Made { mesh, beams, pieces, loose, warning })
+    Ok(MeshedBeams { mesh, beams, pieces, loose, warning })
 }
 
 fn lerp(a: Vec3, b: Vec3, t: f64) -> Vec3 {

@@ -9,7 +9,7 @@ use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 
 use crate::surface_maker::{
-    Components, Estimate, Islands, Made, Options, Pieces, Resolved, Store, Summary, SurfaceMaker, Totals,
+    Components, Estimate, Islands, MeshedSurface, Options, Pieces, Resolved, Store, Summary, SurfaceMaker, Totals,
 };
 
 /// Triangulates uncut beams; the resolution is the chord error. Hubs that are equal but for their position are triangulated
@@ -46,7 +46,7 @@ impl SurfaceMaker for BeamSurface {
         Ok(Resolved { parts, first: vec![0], walls: Vec::new(), totals, components, error: made.error })
     }
 
-    fn mesh(&self, options: &Options, _: &dyn Progress) -> Result<Made, Stopped> {
+    fn mesh(&self, options: &Options, _: &dyn Progress) -> Result<MeshedSurface, Stopped> {
         Self::check(options)?;
         let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;
         let mesh = tessellation.mesh().map_err(Stopped::Refused)?;
@@ -54,7 +54,7 @@ impl SurfaceMaker for BeamSurface {
         let components =
             Components { count: measures.components as u64, euler: measures.euler, ..Components::default() };
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
-        Ok(Made { surface, components, error: Some(tessellation.error()) })
+        Ok(MeshedSurface { surface, components, error: Some(tessellation.error()) })
     }
 
     /// Only distinct hubs are held in memory.

@@ -50,7 +50,7 @@ pub use sum::{Blend, By};
 pub use weights::Weights;
 pub use windows::Phases;
 
-use sum::Side;
+use sum::BlendBound;
 use summand::Summand;
 
 impl Field for Blend {
@@ -66,8 +66,8 @@ impl Field for Blend {
         let mut w = vec![Interval::new(0.0, 0.0); self.summands.len()];
         self.weights.bound(b, &mut w);
         let join = |f: Interval, lo: Interval, hi: Interval| match self.side {
-            Some(Side::High) => f - hi,
-            Some(Side::Low) => lo - f,
+            Some(BlendBound::High) => f - hi,
+            Some(BlendBound::Low) => lo - f,
             None if self.two_sided => (f - hi).max(lo - f),
             None => f - hi,
         };
@@ -81,7 +81,7 @@ impl Field for Blend {
         };
         let mut here = (0..w.len()).filter(|i| w[*i].hi > 0.0);
         if let (Some(i), None) = (here.next(), here.next()) {
-            if self.side == Some(Side::Low) && !self.summands[i].is_sheet() {
+            if self.side == Some(BlendBound::Low) && !self.summands[i].is_sheet() {
                 // The lower end of a network is below all its values.
                 return Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE);
             }
@@ -142,7 +142,7 @@ impl Implicit for Blend {
 }
 
 /// The sides in the order of the parts.
-const SIDES: [Option<Side>; 2] = [Some(Side::High), Some(Side::Low)];
+const SIDES: [Option<BlendBound>; 2] = [Some(BlendBound::High), Some(BlendBound::Low)];
 
 impl Pair for Blend {
     fn fill_both(&self, block: &Block, wanted: &[u64], out: [&mut [f32]; 2]) {

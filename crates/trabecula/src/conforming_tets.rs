@@ -7,12 +7,12 @@
 //!
 //! The first cut of a background is that of isosurface stuffing: F. Labelle, J. R. Shewchuk, ACM Transactions on Graphics 26(3), 2007.
 
+mod boundary_node_hash;
 mod boundary_repair;
 mod chord_balance;
 mod crease_nodes;
 mod flips;
 mod mending;
-mod near_sheets;
 mod node_surfaces;
 mod partition;
 mod patch_cuts;

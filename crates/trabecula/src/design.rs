@@ -55,7 +55,7 @@ use crate::effective::UnitCell;
 use crate::environment;
 use crate::extract::GridSurface;
 use crate::implicit::Implicit;
-use crate::kind::{At, Kind};
+use crate::kind::{Kind, NodeCursor};
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::report::{DesignReport, StepReport, TransitionReport};
@@ -134,7 +134,7 @@ pub enum Units {
     Mm,
 }
 
-fn in_mm(at: &At) -> Result<(), DesignError> {
+fn in_mm(at: &NodeCursor) -> Result<(), DesignError> {
     match &at.node.value {
         Value::Text(word) if word != "mm" => {
             Err(at.error(format!("lengths in a design are mm, found \"{word}\"; a mesh file may have its own unit")))
@@ -235,7 +235,7 @@ impl Design {
     /// Reads a design from a tree.
     pub fn from_node(node: &Node) -> Result<Design, DesignError> {
         let lines = node.lines();
-        let design = Design { lines, ..Design::read(&At::root(node))? };
+        let design = Design { lines, ..Design::read(&NodeCursor::root(node))? };
         design.check_names().map_err(|e| design.located(e))?;
         if let Some(sweep) = &design.sweep {
             Design::check_sweep(sweep, node).map_err(|e| design.located(e))?;
@@ -267,7 +267,7 @@ impl Design {
                 let mut varied = base.clone();
                 let at = format!("sweep.{path}");
                 varied.put(path, value).map_err(|f| DesignError::fault(&at, f))?;
-                Design::read(&At::root(&varied)).map_err(|e| {
+                Design::read(&NodeCursor::root(&varied)).map_err(|e| {
                     let message = if e.path == path { e.message } else { format!("{}: {}", e.path, e.message) };
                     DesignError { found: e.found, nearest: e.nearest, ..DesignError::new(&at, message) }
                 })?;
@@ -344,11 +344,11 @@ struct RegionFile {
 /// The region of a design, or of a tree with the key `region` alone. The region of a lattice over tetrahedra is what these fill.
 pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
-    let entries = At::root(node).entries("a design or a region")?;
+    let entries = NodeCursor::root(node).entries("a design or a region")?;
     let found = if entries.iter().any(|(key, _)| ["lattice", "beams"].contains(key)) {
         build::region_of(&Design::from_node(node)?, loader)
     } else {
-        let alone = RegionFile::read(&At::root(node))?;
+        let alone = RegionFile::read(&NodeCursor::root(node))?;
         environment::region(&alone.region, "region", loader, None, &RefCell::default())
     };
     found.map_err(|mut e| {
@@ -359,7 +359,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 
 /// The cell that a tree describes, as under the key `cell` of a lattice.
 pub fn cell(node: &Node) -> Result<Arc<Cell>, DesignError> {
-    let spec = CellSpec::read(&At::alone(node, "cell"))?;
+    let spec = CellSpec::read(&NodeCursor::alone(node, "cell"))?;
     spec.valid().map_err(|f| DesignError::fault("cell", f))?;
     Ok(build_cell::cell(&spec, "cell", &NoFiles)?.1)
 }
@@ -466,7 +466,7 @@ impl Built {
         &self,
         options: &volume_mesh::Options,
         progress: &dyn Progress,
-    ) -> Result<volume_mesh::Made, Stopped> {
+    ) -> Result<volume_mesh::MeshedVolume, Stopped> {
         let named = volume_mesh::Named { bodies: &self.bodies, sets: &self.sets };
         volume_mesh::volume_mesh(&self.solid, &named, options, progress)
     }
@@ -475,7 +475,7 @@ impl Built {
     ///
     /// # Errors
     /// A design without one such lattice; an empty set.
-    pub fn carrier(&self, order: u8) -> Result<volume_mesh::Made, Fault> {
+    pub fn carrier(&self, order: u8) -> Result<volume_mesh::MeshedVolume, Fault> {
         build_carrier::carrier(self, order).map(|made| made.0)
     }
 
@@ -502,7 +502,7 @@ impl Built {
         &self,
         options: &shell_mesh::Options,
         progress: &dyn Progress,
-    ) -> Result<shell_mesh::Made, Stopped> {
+    ) -> Result<shell_mesh::MeshedShell, Stopped> {
         shell_mesh::shell_mesh(&self.solid, &self.sets, options, progress)
     }
 
@@ -510,7 +510,7 @@ impl Built {
     ///
     /// # Errors
     /// What else the design has; as `beam_mesh::beam_mesh`.
-    pub fn beam_mesh(&self, options: &beam_mesh::Options) -> Result<beam_mesh::Made, Fault> {
+    pub fn beam_mesh(&self, options: &beam_mesh::Options) -> Result<beam_mesh::MeshedBeams, Fault> {
         let quadors = beam_files::written(self)?.quadors;
         beam_mesh::beam_mesh(&quadors, &self.solid.region, &self.sets, options)
     }

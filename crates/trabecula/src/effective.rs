@@ -17,7 +17,7 @@ use crate::kind::Warning;
 use crate::report::{CellGrid, ConductivityReport, StiffnessReport};
 use fractions::{fractions, interfaces};
 use limit::{Limit, modal_limit};
-pub use permeability::Side;
+pub use permeability::SheetSide;
 
 /// A periodic cell.
 pub struct UnitCell {
@@ -41,7 +41,7 @@ pub struct UnitCell {
 }
 
 /// The diameter (mm) of a ball that passes through the pore on a side, or on any.
-pub type Passing = dyn Fn(Option<Side>) -> f64 + Send + Sync;
+pub type Passing = dyn Fn(Option<SheetSide>) -> f64 + Send + Sync;
 
 /// How the voxels of a cell are made.
 #[derive(Clone, Copy, Debug, PartialEq)]

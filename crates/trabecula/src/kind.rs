@@ -4,19 +4,19 @@
 //! declaration: from them come the reader, which names path and line, the writer, the checks of ranges, and the JSON Schema,
 //! from which the Python builders and the reference page are made. CONTRIBUTING.md says how to add one.
 
-mod at;
 mod error;
 mod json;
 mod node;
+mod node_cursor;
 mod schema;
 mod schema_defs;
 mod schema_types;
 mod values;
 
-pub(crate) use at::{At, Fields};
 pub use error::{DesignError, Warning};
 pub use kind_derive::Kind;
 pub use node::{Lines, Node, Value};
+pub(crate) use node_cursor::{Fields, NodeCursor};
 pub(crate) use schema::{Open, any_schema, choice_schema};
 pub(crate) use schema_defs::Defs;
 pub use values::{OneOrThree, OneOrTwo, Unit};
@@ -36,7 +36,7 @@ pub(crate) trait Kind: Sized {
     fn fits(node: &Node) -> u8;
 
     /// Reads it. Keys, words and types are checked; ranges by `check`.
-    fn read(at: &At) -> Result<Self, DesignError>;
+    fn read(at: &NodeCursor) -> Result<Self, DesignError>;
 
     /// Writes it; keys that have their defaults are left out.
     fn write(&self) -> Node;

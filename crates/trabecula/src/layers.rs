@@ -27,12 +27,12 @@ use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
 use crate::solid::Solid;
 pub use adaptive::Adaptive;
-use arcs::{Arc, meeting};
+use arcs::{Arc, intersection_guess};
 use leaf_cells::LeafCells;
 use outline::Outline;
 use plane_grid::PlaneGrid;
 use rings::{Limits, Rings};
-use roots::{Plane, meet, solve};
+use roots::{Plane, solve, solve_intersections};
 
 /// Most layers of a part, and most cells of a layer.
 const MOST_LAYERS: f64 = 1e7;
@@ -185,19 +185,19 @@ impl Slicer {
         let position = |r: u32| roots[r as usize].position(&self.grid);
         let chords = outline.chords(cells);
         let mut next = vec![None; roots.len()];
-        let mut meetings = Vec::new();
+        let mut intersections = Vec::new();
         for chord in &chords {
             let ends = chord.ends.map(|r| &roots[r as usize]);
             let surfaces = ends.map(|r| r.surface);
             let corner = (surfaces[0] != surfaces[1]).then(|| {
                 let points = chord.ends.map(position);
-                meetings.push(meeting(points, surfaces, ends.map(|r| r.gradient), chord.bounds));
-                meetings.len() - 1
+                intersections.push(intersection_guess(points, surfaces, ends.map(|r| r.gradient), chord.bounds));
+                intersections.len() - 1
             });
             next[chord.ends[0] as usize] = Some((chord.ends[1], corner));
         }
-        meet(&mut meetings, plane, accuracy);
-        let mut rings = Rings { arcs: Vec::with_capacity(chords.len() + meetings.len()), ends: Vec::new() };
+        solve_intersections(&mut intersections, plane, accuracy);
+        let mut rings = Rings { arcs: Vec::with_capacity(chords.len() + intersections.len()), ends: Vec::new() };
         for first in 0..roots.len() as u32 {
             let mut at = first;
             while let Some((to, corner)) = next[at as usize].take() {
@@ -209,7 +209,7 @@ impl Slicer {
                     gradients: [a.gradient, b.gradient],
                     corners: [false, false],
                 };
-                match corner.map(|c| &meetings[c]) {
+                match corner.map(|c| &intersections[c]) {
                     None => rings.arcs.push(whole),
                     Some(m) if m.found => {
                         let [g, h] = m.gradients;

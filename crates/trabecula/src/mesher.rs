@@ -13,9 +13,10 @@ use geometry::progress::checkpoint;
 use geometry::tetmesh::TetMesh;
 use geometry::tetmesh::tet_locator::TetLocator;
 use rayon::prelude::*;
+use refinement_criterion::RefinementCriterion;
 
 mod bcc_grid;
-mod needs;
+mod refinement_criterion;
 mod region_fit;
 
 pub use crate::conforming_tets::{ANGLES, MadeLayers, PrismLayers};
@@ -109,7 +110,7 @@ pub fn background(
 /// Whether tetrahedra of these sizes, at points that are uniformly spread in a volume, are more than `MOST`, curvature left out.
 fn surely_more(mut sizes: Vec<f64>, volume: f64) -> bool {
     sizes.sort_by(f64::total_cmp);
-    let count = |size: &f64| 72f64.sqrt() / (needs::SPREAD * size).powi(3);
+    let count = |size: &f64| 72f64.sqrt() / (refinement_criterion::SPREAD * size).powi(3);
     let share = volume / sizes.len().max(1) as f64;
     share * sizes.iter().skip(RARE).map(count).sum::<f64>() > MOST as f64
 }
@@ -153,8 +154,9 @@ impl Cuts {
         layers: Option<&PrismLayers>,
     ) -> Result<Background, Fault> {
         let Cuts { surfaces, patched, trees, .. } = self;
-        let needs = needs::Needs { region, surfaces: if self.finer { surfaces } else { &[] }, patched, size };
-        grid.refine(MOST, |p| needs.coarse(p))?;
+        let criterion =
+            RefinementCriterion { region, surfaces: if self.finer { surfaces } else { &[] }, patched, size };
+        grid.refine(MOST, |p| criterion.coarse(p))?;
         let tets = grid.tets.iter().map(|t| Tet { nodes: *t, negative: 0, positive: 0 }).collect();
         let nodes = grid.positions();
         let (on, next) = (vec![0; nodes.len()], (0..nodes.len() as u32).collect());

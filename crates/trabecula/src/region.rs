@@ -149,16 +149,16 @@ impl<'a> Context<'a> {
 
 /// A part of a region's surface that is left open.
 #[derive(Clone, Debug)]
-pub enum Cut {
+pub enum OpenSurface {
     /// Flat faces on the plane of a half-space that face as its normal does.
     Plane(HalfSpace),
     /// Faces of a CAD system.
     Faces(FaceSet),
 }
 
-impl From<HalfSpace> for Cut {
-    fn from(plane: HalfSpace) -> Cut {
-        Cut::Plane(plane)
+impl From<HalfSpace> for OpenSurface {
+    fn from(plane: HalfSpace) -> OpenSurface {
+        OpenSurface::Plane(plane)
     }
 }
 
@@ -222,7 +222,7 @@ pub trait Shape: Field {
     /// The same region without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;
     /// `None` if at none. (Faces that are planes by themselves stay: a caller of `surfaces` can drop them.)
-    fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
+    fn opened(self: Arc<Self>, cuts: &[OpenSurface], found: &mut [bool]) -> Option<Region> {
         let _ = (cuts, found);
         None
     }

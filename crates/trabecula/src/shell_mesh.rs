@@ -42,8 +42,8 @@ pub struct Options {
     pub quadratic: bool,
 }
 
-/// A mesh of shells that was made.
-pub struct Made {
+/// The mesh of a shell, and what should be known about it.
+pub struct MeshedShell {
     /// The mesh.
     pub mesh: ShellMesh,
     /// Edges of quadratic triangles that stayed straight, on the border where it is no plane normal to an axis.
@@ -62,7 +62,7 @@ pub fn shell_mesh(
     sets: &[(String, Region)],
     options: &Options,
     progress: &dyn Progress,
-) -> Result<Made, Stopped> {
+) -> Result<MeshedShell, Stopped> {
     let refuse = |message: &str| Err(Stopped::Refused(Fault::new("of", message)));
     let Some(faces) = solid.field.as_ref().and_then(|f| f.faces()) else {
         return refuse(
@@ -106,7 +106,7 @@ pub fn shell_mesh(
         return refuse(&format!("the wall has no thickness at ({at}) mm; keep its level above 0 in the whole region"));
     }
     let warning = add_sets(&mut mesh, &border, &bounds, sets).or_else(|| thick(&mesh, options.edge));
-    Ok(Made { mesh, straight, warning })
+    Ok(MeshedShell { mesh, straight, warning })
 }
 
 /// The edges of one triangle only.

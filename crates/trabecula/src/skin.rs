@@ -11,7 +11,7 @@ use crate::csg_tree::{CsgSolid, CsgTree, Sign};
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::implicit::Surface;
-use crate::region::{Cut, HalfSpace, Region};
+use crate::region::{HalfSpace, OpenSurface, Region};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, norm, scale, sub, unit};
 
@@ -28,7 +28,7 @@ const ON: f64 = 1e-9;
 ///
 /// # Errors
 /// An opening on which the region has no face; openings that leave no surface. `Fault::at` is `open[i]` or `open`.
-pub fn skin(region: &Region, thickness: &Grade, open: &[Cut]) -> Result<CsgSolid, Fault> {
+pub fn skin(region: &Region, thickness: &Grade, open: &[OpenSurface]) -> Result<CsgSolid, Fault> {
     let bounds = region.bounds();
     let least = thickness.bound(&bounds).lo.max(LEAST);
     let mut found = vec![false; open.len()];
@@ -42,7 +42,7 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[Cut]) -> Result<CsgSolid
         .map(|surface| {
             let mut gone = false;
             for (cut, found) in open.iter().zip(&mut found) {
-                let here = matches!(cut, Cut::Plane(cut) if lies_on(&*surface.field, cut, least, &bounds));
+                let here = matches!(cut, OpenSurface::Plane(cut) if lies_on(&*surface.field, cut, least, &bounds));
                 *found |= here;
                 gone |= here;
             }
@@ -103,10 +103,10 @@ fn lies_on(surface: &dyn Field, cut: &HalfSpace, depth: f64, bounds: &Aabb) -> b
     level && gradients.iter().all(|g| norm(sub(*g, n)) <= ON)
 }
 
-fn no_face(i: usize, cut: &Cut) -> Fault {
+fn no_face(i: usize, cut: &OpenSurface) -> Fault {
     let cut = match cut {
-        Cut::Plane(cut) => cut,
-        Cut::Faces(set) => {
+        OpenSurface::Plane(cut) => cut,
+        OpenSurface::Faces(set) => {
             let message = format!("no part of the region's surface is left of the faces {}", set.names().join(", "));
             return Fault::new(format!("open[{i}]"), message);
         }

@@ -54,10 +54,10 @@ pub trait SurfaceMaker {
     ///
     /// # Errors
     /// As `make`.
-    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<MeshedSurface, Stopped> {
         let mut surface = SurfaceMesh::default();
         let found = self.make(options, &mut surface, progress)?;
-        Ok(Made { surface: kept(surface, &found), components: found.components, error: found.error })
+        Ok(MeshedSurface { surface: kept(surface, &found), components: found.components, error: found.error })
     }
 
     /// The surface, streamed as binary STL without holding the mesh. The 84-byte header is rewritten at the end. Same bytes
@@ -106,9 +106,9 @@ impl Options {
     }
 }
 
-/// A surface that was made.
+/// The meshed surface of a solid.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Made {
+pub struct MeshedSurface {
     /// The surface.
     pub surface: SurfaceMesh,
     /// Connected components of the solid.

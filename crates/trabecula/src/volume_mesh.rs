@@ -26,10 +26,10 @@ mod mid_nodes;
 mod named_sets;
 
 use body_centred::Cubes;
-pub use carrier::{Carried, carrier};
+pub use carrier::{CarrierContext, carrier};
 pub(crate) use cyclic_nodes::PLANES;
 use domains::Domains;
-pub use domains::Of;
+pub use domains::VolumeTarget;
 pub use named_sets::is_own_name;
 
 /// Most cubes of the background.
@@ -45,7 +45,7 @@ pub struct Options {
     /// Edge of the background's cubes (mm): the longest edges of tetrahedra; twelve tetrahedra fill a cube.
     pub edge: f64,
     /// What is meshed.
-    pub of: Of,
+    pub of: VolumeTarget,
     /// 1 for linear tetrahedra, 2 for quadratic ones.
     pub order: u8,
     /// Whether nodes and faces on opposite bounding planes match.
@@ -56,7 +56,7 @@ pub struct Options {
 
 /// A volume mesh and how good it is.
 #[derive(Clone, Debug)]
-pub struct Made {
+pub struct MeshedVolume {
     /// The mesh.
     pub mesh: FeMesh,
     /// Greatest distance of its boundary from the surface (mm), at corners, edges and centroids of faces.
@@ -90,7 +90,12 @@ pub struct Named<'a> {
 /// # Errors
 /// An edge too fine; a side of what is no sheet; periodic where the solid is not; nothing to mesh; an empty set of the solid's surface;
 /// an interruption.
-pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+pub fn volume_mesh(
+    solid: &Solid,
+    named: &Named,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<MeshedVolume, Stopped> {
     let by_patches = (!options.periodic).then_some(options.edge);
     let domains = Domains::new(solid, options.of, by_patches).map_err(Stopped::Refused)?;
     let bounds = solid.region.bounds();
@@ -118,7 +123,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
     }
     let step = cubes.step().into_iter().fold(0.0, f64::max);
     // Of a periodic cell components hold together by images.
-    let one = options.of != Of::All && !options.periodic;
+    let one = options.of != VolumeTarget::All && !options.periodic;
     let (mut shaping, mut dropped) = prepared(partition, one);
     if shaping.tets.is_empty() {
         let m = format!(
@@ -135,7 +140,7 @@ pub fn volume_mesh(solid: &Solid, named: &Named, options: &Options, progress: &d
         return Err(Stopped::Interrupted);
     }
     shaping.mend();
-    if options.of != Of::All {
+    if options.of != VolumeTarget::All {
         dropped += shaping.shell(false);
         if shaping.mend() {
             dropped += shaping.shell(false);
@@ -243,7 +248,7 @@ fn assembled(
     (planes, bounds, cubes): (&Planes, &Aabb, &Cubes),
     named: &Named,
     options: &Options,
-) -> Result<Made, Fault> {
+) -> Result<MeshedVolume, Fault> {
     let Shaping { surfaces, mut nodes, mut on, next, tets, domain, .. } = shaping;
     let mut order: Vec<u32> = (0..tets.len() as u32).filter(|t| tets[*t as usize] != GONE).collect();
     order.sort_by_key(|t| domain[*t as usize]);
@@ -291,12 +296,12 @@ fn assembled(
     named_sets::add_sets(&mut mesh, domains, &faces, (planes, bounds), named.bodies);
     let empty = named_sets::add_regions(&mut mesh, &faces, named.sets);
     // A region of the solid's surface may hold none of a fluid's.
-    if let (Some(fault), Of::Solid | Of::All) = (empty, options.of) {
+    if let (Some(fault), VolumeTarget::Solid | VolumeTarget::All) = (empty, options.of) {
         return Err(fault);
     }
     let deviation = deviation::deviation(&mesh, &faces, domains);
     let pieces = components(&mesh.tets, mesh.nodes.len());
-    Ok(Made { mesh, deviation, straight, pieces, dropped: 0.0, loose: 0.0, step: [0.0; 3] })
+    Ok(MeshedVolume { mesh, deviation, straight, pieces, dropped: 0.0, loose: 0.0, step: [0.0; 3] })
 }
 
 /// Removes nodes that no tetrahedron has; gives the cycles of images among the others.

@@ -80,12 +80,12 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
     let corners: Vec<[i64; 3]> = (0..counts[2])
         .flat_map(|z| (0..counts[1]).flat_map(move |y| (0..counts[0]).map(move |x| [x, y, z].map(|n| n * CORE))))
         .collect();
-    let look = Look { solid, thin, step, margin, from: bounds.min };
+    let search = BlockSearch { solid, thin, step, margin, from: bounds.min };
     let done = std::sync::atomic::AtomicU64::new(0);
     let found: Option<Vec<Vec<(f64, Vec3)>>> = corners
         .par_iter()
         .map(|corner| {
-            let bits = look.block(*corner);
+            let bits = search.block(*corner);
             let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             progress.step(n, corners.len() as u64).then_some(bits)
         })
@@ -101,7 +101,7 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
 }
 
 /// What is the same for all blocks.
-struct Look<'a> {
+struct BlockSearch<'a> {
     solid: &'a Solid,
     thin: f64,
     step: f64,
@@ -109,7 +109,7 @@ struct Look<'a> {
     from: Vec3,
 }
 
-impl Look<'_> {
+impl BlockSearch<'_> {
     /// The bits whose first point is in the block at this corner.
     fn block(&self, corner: [i64; 3]) -> Vec<(f64, Vec3)> {
         let side = (CORE + 2 * self.margin) as usize;

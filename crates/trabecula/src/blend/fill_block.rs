@@ -6,7 +6,7 @@
 
 use super::grid_row::GridRow;
 use super::mixed_rows::MixedRows;
-use super::sum::{Blend, Side};
+use super::sum::{Blend, BlendBound};
 use crate::field::Block;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -53,7 +53,7 @@ impl Blend {
     /// Fills the values on `sides` at the nodes of a block; where `wanted` is given at those with a bit alone.
     pub(super) fn fill_block<const S: usize>(
         &self,
-        sides: [Option<Side>; S],
+        sides: [Option<BlendBound>; S],
         block: &Block,
         wanted: Option<&[u64]>,
         mut out: [&mut [f32]; S],
@@ -65,7 +65,7 @@ impl Blend {
             self.summands.iter().enumerate().map(|(i, s)| (all >> i & 1 == 1).then(|| s.rows(block, wanted))).collect();
         let mut cores = vec![vec![0f32; xs.len()]; self.summands.len()];
         let mut nodes = Vec::new();
-        let mut alone = Alone::default();
+        let mut single = SingleSummandRow::default();
         let mut mixed = several(all).then(|| MixedRows::new(self, xs));
         for k in 0..zs.len() {
             rows.iter_mut().flatten().for_each(|r| r.enter_layer(k));
@@ -93,7 +93,7 @@ impl Blend {
                     nodes.extend((from..to.min(xs.len())).filter(here));
                     match &mut mixed {
                         Some(mixed) if several(run[0]) => mixed.fill((self, sides), &nodes, &line, &mut on),
-                        _ => alone.fill((self, sides), run[0].trailing_zeros() as usize, &nodes, &line, &mut on),
+                        _ => single.fill((self, sides), run[0].trailing_zeros() as usize, &nodes, &line, &mut on),
                     }
                     from = to;
                 }
@@ -109,15 +109,15 @@ fn several(lattices: u64) -> bool {
 
 /// Buffers for the nodes of a row where one summand is alone.
 #[derive(Default)]
-struct Alone {
+struct SingleSummandRow {
     points: Vec<Vec3>,
     high: Vec<f64>,
 }
 
-impl Alone {
+impl SingleSummandRow {
     fn fill<const S: usize>(
         &mut self,
-        (blend, sides): (&Blend, [Option<Side>; S]),
+        (blend, sides): (&Blend, [Option<BlendBound>; S]),
         s: usize,
         nodes: &[usize],
         line: &GridRow,

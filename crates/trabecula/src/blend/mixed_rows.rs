@@ -7,7 +7,7 @@ use super::ends::HIGH;
 use super::grid_row::GridRow;
 use super::row_cache::RowCache;
 use super::share_grid::Simplex;
-use super::sum::{Blend, Side};
+use super::sum::{Blend, BlendBound};
 use super::summand::Summand;
 use geometry::math::Vec3;
 
@@ -48,7 +48,7 @@ impl MixedRows {
     /// Fills the values on sides at some nodes of a row.
     pub fn fill<const S: usize>(
         &mut self,
-        of: (&Blend, [Option<Side>; S]),
+        of: (&Blend, [Option<BlendBound>; S]),
         nodes: &[usize],
         line: &GridRow,
         on: &mut [&mut [f32]; S],
@@ -64,7 +64,7 @@ impl MixedRows {
     /// The same for N lattices, or for any number if N is 0.
     fn fill_of<const N: usize, const S: usize>(
         &mut self,
-        (blend, sides): (&Blend, [Option<Side>; S]),
+        (blend, sides): (&Blend, [Option<BlendBound>; S]),
         nodes: &[usize],
         line: &GridRow,
         on: &mut [&mut [f32]; S],

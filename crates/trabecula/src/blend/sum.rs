@@ -28,7 +28,7 @@ pub enum By {
 
 /// One of the two inequalities of a blend with sheets in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
+pub(super) enum BlendBound {
     /// F ≤ HI.
     High,
     /// F ≥ LO.
@@ -45,7 +45,7 @@ pub struct Blend {
     /// Whether any summand is a sheet, so that there is a lower end.
     pub(super) two_sided: bool,
     /// Set for one side alone.
-    pub(super) side: Option<Side>,
+    pub(super) side: Option<BlendBound>,
     /// A Lipschitz bound, per mm.
     pub(super) lipschitz: f64,
     /// The covariance of each pair of summands, where one distribution serves everywhere.
@@ -187,10 +187,10 @@ impl Blend {
     }
 
     /// The same of a side.
-    pub(super) fn ends_on(&self, side: Option<Side>) -> &'static [usize] {
+    pub(super) fn ends_on(&self, side: Option<BlendBound>) -> &'static [usize] {
         match side {
-            Some(Side::High) => &[HIGH],
-            Some(Side::Low) => &[LOW],
+            Some(BlendBound::High) => &[HIGH],
+            Some(BlendBound::Low) => &[LOW],
             None if self.two_sided => &[HIGH, LOW],
             None => &[HIGH],
         }
@@ -221,10 +221,10 @@ impl Blend {
 
     /// The same on a side.
     #[inline]
-    fn value_on(&self, side: Option<Side>, [f, lo, hi]: [f64; 3]) -> f64 {
+    fn value_on(&self, side: Option<BlendBound>, [f, lo, hi]: [f64; 3]) -> f64 {
         match side {
-            Some(Side::High) => f - hi,
-            Some(Side::Low) => lo - f,
+            Some(BlendBound::High) => f - hi,
+            Some(BlendBound::Low) => lo - f,
             None if self.two_sided => (f - hi).max(lo - f),
             None => f - hi,
         }
@@ -232,7 +232,7 @@ impl Blend {
 
     /// The value on a side where summand `s` is alone, with value `g` and upper end `high`.
     #[inline]
-    pub(super) fn alone(&self, side: Option<Side>, s: usize, g: f64, high: f64) -> f64 {
+    pub(super) fn alone(&self, side: Option<BlendBound>, s: usize, g: f64, high: f64) -> f64 {
         self.value_on(side, [g, self.summands[s].lower_end_alone(high), high])
     }
 }

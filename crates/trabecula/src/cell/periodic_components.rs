@@ -23,7 +23,7 @@ mod sublattice;
 mod torus_grid;
 
 pub(super) use critical::{Critical, Function, critical, sample};
-pub(super) use offset_forest::{Forest, Joined};
+pub(super) use offset_forest::{Forest, UnionOutcome};
 pub(super) use sublattice::Int3;
 use sublattice::Sublattice;
 pub(super) use torus_grid::AROUND;
@@ -209,10 +209,10 @@ impl Sweep<'_> {
             }
             for &(element, towards, wrap) in &nears {
                 let (components, shift) = match forest.join(node, element, wrap) {
-                    Joined::Same => continue,
-                    Joined::Merged { components: [_, young], .. } if young == node => continue,
-                    Joined::Merged { components, shift } => (components, shift),
-                    Joined::Loop { component, shift } => ([component; 2], shift),
+                    UnionOutcome::Same => continue,
+                    UnionOutcome::Merged { components: [_, young], .. } if young == node => continue,
+                    UnionOutcome::Merged { components, shift } => (components, shift),
+                    UnionOutcome::Loop { component, shift } => ([component; 2], shift),
                 };
                 let found = self.refine(node, &[towards], 1);
                 let (level, place) = found.unwrap_or_else(|| self.sampled(node));
@@ -388,7 +388,7 @@ fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, ran
         let (Some(a), Some(b)) = (index(e.components[0]), index(e.components[1])) else {
             continue;
         };
-        if let Joined::Merged { components: [_, young], .. } = forest.join(a as u32, b as u32, e.shift) {
+        if let UnionOutcome::Merged { components: [_, young], .. } = forest.join(a as u32, b as u32, e.shift) {
             let born = &births[young as usize];
             let noise = if born.exact && e.exact { 1e-6 * range } else { error };
             if e.level - born.level > noise {

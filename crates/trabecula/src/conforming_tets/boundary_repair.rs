@@ -51,7 +51,7 @@ fn fragments(mesh: &TetMesh) -> HashSet<u32> {
 
 /// The tetrahedra to be removed at nodes with more than one boundary sheet.
 fn non_manifold(mesh: &TetMesh) -> HashSet<u32> {
-    let around = Around::new(mesh);
+    let node_tets = NodeTets::new(mesh);
     let mut sheets: Vec<Vec<[u32; 2]>> = vec![Vec::new(); mesh.nodes.len()];
     for [a, b, c] in mesh.boundary_faces() {
         for (n, edge) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
@@ -63,7 +63,7 @@ fn non_manifold(mesh: &TetMesh) -> HashSet<u32> {
         if link.is_empty() || cycles(link) == 1 {
             continue;
         }
-        let groups = groups(mesh, n as u32, around.of(n));
+        let groups = groups(mesh, n as u32, node_tets.of(n));
         let size = |of: &Vec<u32>| of.iter().map(|i| volume(mesh.corners(*i as usize))).sum::<f64>();
         if let [_] = groups.as_slice() {
             // The tetrahedra at the node enclose a hole: only removing all of them is certain to repair it.
@@ -128,17 +128,17 @@ fn groups(mesh: &TetMesh, n: u32, tets: &[u32]) -> Vec<Vec<u32>> {
 }
 
 /// The tetrahedra at each node.
-struct Around(Vec<Vec<u32>>);
+struct NodeTets(Vec<Vec<u32>>);
 
-impl Around {
-    fn new(mesh: &TetMesh) -> Around {
+impl NodeTets {
+    fn new(mesh: &TetMesh) -> NodeTets {
         let mut count = vec![0; mesh.nodes.len()];
         mesh.tets.iter().flatten().for_each(|n| count[*n as usize] += 1);
         let mut at: Vec<Vec<u32>> = count.into_iter().map(Vec::with_capacity).collect();
         for (i, t) in (0..).zip(&mesh.tets) {
             t.iter().for_each(|n| at[*n as usize].push(i));
         }
-        Around(at)
+        NodeTets(at)
     }
 
     /// The tetrahedra at node `n`.

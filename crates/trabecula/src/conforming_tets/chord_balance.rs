@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::near_sheets::NearSheets;
+use super::boundary_node_hash::BoundaryNodeHash;
 use super::node_surfaces::{HELD, SurfaceSet, balanced, members, only, tangent};
 use super::partition::images;
 use super::prism_columns::FilledLayers;
@@ -287,12 +287,12 @@ impl Shaping<'_> {
         if most == 0.0 {
             return;
         }
-        let sheets = NearSheets::new(self);
+        let node_hash = BoundaryNodeHash::new(self);
         let mut moved: Vec<u32> =
-            (0..before.len() as u32).filter(|n| shift(*n as usize) > NEAR * sheets.edge).collect();
+            (0..before.len() as u32).filter(|n| shift(*n as usize) > NEAR * node_hash.edge).collect();
         while !moved.is_empty() {
             checkpoint();
-            let crossing = self.crossing_nodes(&sheets.near_to(&moved, self));
+            let crossing = self.crossing_nodes(&node_hash.near_to(&moved, self));
             moved = self.put_back(crossing, before, columns);
         }
     }

@@ -4,7 +4,7 @@
 //! is improved step by step. All is taken back unless everything touched is better than the tetrahedron was, so that the worst shapes never
 //! get worse. Nodes are inserted in this way by B. M. Klingner and J. R. Shewchuk (Aggressive tetrahedral mesh improvement, 2007).
 
-use super::near_sheets::NearSheets;
+use super::boundary_node_hash::BoundaryNodeHash;
 use super::node_surfaces::{HELD, SurfaceSet};
 use super::shaping::{GONE, Shaping};
 use super::tet_change::Change;
@@ -42,7 +42,7 @@ impl Shaping<'_> {
     /// few; whether any was.
     pub fn mend(&mut self) -> bool {
         let mut mended = false;
-        let mut sheets = None;
+        let mut node_hash = None;
         for _ in 0..ROUNDS {
             let mut bad = self.bad();
             let below = |bad: &[u32], bar: f64| bad.partition_point(|t| self.shapes[*t as usize] < bar);
@@ -52,12 +52,12 @@ impl Shaping<'_> {
             if bad.is_empty() {
                 break;
             }
-            let sheets = sheets.get_or_insert_with(|| NearSheets::new(self));
+            let node_hash = node_hash.get_or_insert_with(|| BoundaryNodeHash::new(self));
             let mut any = false;
             for t in bad {
                 checkpoint();
                 if self.tets[t as usize] != GONE && self.shapes[t as usize] < bar {
-                    any |= self.mend_at(t, sheets) || self.mend_free(t, sheets);
+                    any |= self.mend_at(t, node_hash) || self.mend_free(t, node_hash);
                 }
             }
             if !any {
@@ -69,7 +69,7 @@ impl Shaping<'_> {
     }
 
     /// Mends the neighbourhood of a tetrahedron with its nodes on creases set free; whether it is better. If not, they stay.
-    fn mend_free(&mut self, t: u32, sheets: &NearSheets) -> bool {
+    fn mend_free(&mut self, t: u32, node_hash: &BoundaryNodeHash) -> bool {
         let held = |on: SurfaceSet| on & HELD != 0 && on != HELD;
         let nodes = self.tets[t as usize];
         let freed: Vec<Change> = nodes.into_iter().map(|n| Change::Freed(n, self.on[n as usize])).collect();
@@ -79,7 +79,7 @@ impl Shaping<'_> {
                 self.on[n] &= !HELD;
             }
         }
-        if any && self.mend_at(t, sheets) {
+        if any && self.mend_at(t, node_hash) {
             return true;
         }
         self.take_back(freed);
@@ -87,7 +87,7 @@ impl Shaping<'_> {
     }
 
     /// Mends the neighbourhood of a tetrahedron; whether it is better.
-    fn mend_at(&mut self, t: u32, sheets: &NearSheets) -> bool {
+    fn mend_at(&mut self, t: u32, node_hash: &BoundaryNodeHash) -> bool {
         let (nodes, before) = (self.tets[t as usize], self.shapes[t as usize]);
         let bar = (before * GAIN).max(LEAST);
         let edges = EDGES.map(|e| e.map(|k| nodes[k]));
@@ -96,14 +96,14 @@ impl Shaping<'_> {
         let face_removals = FACES.into_iter().map(|f| First::RemoveFace(f.map(|k| nodes[k])));
         let collapses = edges.into_iter().flat_map(|[a, b]| [First::Collapse([a, b]), First::Collapse([b, a])]);
         let mut firsts = bisections.chain(edge_removals).chain(face_removals).chain(collapses);
-        firsts.any(|first| self.mend_by(first, t, bar, sheets))
+        firsts.any(|first| self.mend_by(first, t, bar, node_hash))
     }
 
     /// Mends the neighbourhood of a tetrahedron by this first change; whether it is better. Where sheets of the boundary nearly touch,
     /// they could come to cross: if more of it crosses than before, it is taken back.
-    fn mend_by(&mut self, first: First, t: u32, bar: f64, sheets: &NearSheets) -> bool {
+    fn mend_by(&mut self, first: First, t: u32, bar: f64, node_hash: &BoundaryNodeHash) -> bool {
         let Some(changes) = self.changed_by(first, t, bar) else { return false };
-        let near = self.near(&changes, sheets);
+        let near = self.near(&changes, node_hash);
         let after = self.crossings(&near);
         if after == 0 {
             return true;
@@ -139,7 +139,7 @@ impl Shaping<'_> {
     }
 
     /// Nodes of the boundary near to where it was changed.
-    fn near(&self, changes: &[Change], sheets: &NearSheets) -> Vec<u32> {
+    fn near(&self, changes: &[Change], node_hash: &BoundaryNodeHash) -> Vec<u32> {
         let on = |n: &u32| self.on[*n as usize] != 0;
         let outer = |t: &[u32; 4]| t.iter().filter(|n| on(n)).count() > 2;
         let mut nodes: Vec<u32> = Vec::new();
@@ -162,7 +162,7 @@ impl Shaping<'_> {
             return nodes;
         }
         nodes.iter().for_each(|n| within = within.with(self.nodes[*n as usize]));
-        nodes.extend(sheets.near(&within));
+        nodes.extend(node_hash.near(&within));
         nodes.sort_unstable();
         nodes.dedup();
         nodes

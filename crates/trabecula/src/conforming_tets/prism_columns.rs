@@ -58,7 +58,7 @@ const NEARLY: f64 = 0.9;
 const LEANING: f64 = 8.0;
 
 /// A node of the boundary that is pushed inwards.
-pub(super) struct Pushed {
+pub(super) struct PushedNode {
     pub node: u32,
     /// Where it was, and where it is to go.
     pub from: Vec3,
@@ -71,7 +71,7 @@ pub(super) struct Pushed {
     pub reach: f64,
 }
 
-impl Pushed {
+impl PushedNode {
     /// The position at a level of its column, 0 at the boundary and 1 at its end; `None` if that is on none of its surfaces.
     pub fn at(&self, shaping: &Shaping, way: Vec3, level: f64) -> Option<Vec3> {
         let p = add(self.from, scale(way, level));
@@ -104,7 +104,7 @@ pub(super) fn has_twice<T: PartialEq>(corners: &[T; 4]) -> bool {
 pub(super) struct Columns {
     /// In the order by which quadrilaterals between prisms are cut: those that lean towards their faces most, as at sharp edges, come last,
     /// so that the obtuse angle there is the one that is cut.
-    pub pushed: Vec<Pushed>,
+    pub pushed: Vec<PushedNode>,
     /// The faces by the numbers of their columns, counter-clockwise seen from outside.
     pub faces: Vec<[usize; 3]>,
     /// Levels of the ends of layers, from 0 to 1.
@@ -118,11 +118,11 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    pub fn new(mut pushed: Vec<Pushed>, chosen: &[[u32; 3]], ends: &[f64], shaping: &Shaping) -> Columns {
+    pub fn new(mut pushed: Vec<PushedNode>, chosen: &[[u32; 3]], ends: &[f64], shaping: &Shaping) -> Columns {
         let depth = ends.last().copied().unwrap_or(1.0);
         let levels: Vec<f64> = core::iter::once(0.0).chain(ends.iter().map(|e| e / depth)).collect();
         let mut number = vec![usize::MAX; shaping.nodes.len()];
-        let mut numbered = |pushed: &[Pushed]| {
+        let mut numbered = |pushed: &[PushedNode]| {
             pushed.iter().enumerate().for_each(|(i, p)| number[p.node as usize] = i);
             chosen.iter().map(|f| f.map(|n| number[n as usize])).collect::<Vec<_>>()
         };
@@ -148,7 +148,7 @@ impl Columns {
         }
         let corners = |f: &[usize; 3]| f.map(|i| pushed[i].from);
         let wanted = faces.iter().map(|f| wanted(corners(f), ends)).collect();
-        let across = |(p, around): (&Pushed, &Vec<u32>)| {
+        let across = |(p, around): (&PushedNode, &Vec<u32>)| {
             let normals = around.iter().map(|f| inwards(corners(&faces[*f as usize])));
             let along = normals.map(|n| (n, dot(n, p.by))).filter(|(_, along)| *along > LEAST * norm(p.by));
             along.map(|(n, along)| scale(n, 1.0 / along)).collect()

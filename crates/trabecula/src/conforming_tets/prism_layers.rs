@@ -10,7 +10,7 @@
 
 use super::chord_balance::interfaces;
 use super::node_surfaces::{HELD, SurfaceSet};
-use super::prism_columns::{Columns, FilledLayers, MadeLayers, Pushed, ascending, has_twice, staircase};
+use super::prism_columns::{Columns, FilledLayers, MadeLayers, PushedNode, ascending, has_twice, staircase};
 use super::shaping::Shaping;
 use super::tet_shape::shape;
 use crate::region::Region;
@@ -106,7 +106,7 @@ impl Shaping<'_> {
     }
 
     /// The nodes of the chosen faces with their ways: to `depth` (mm) below all chosen faces about them, along the others.
-    fn pushed(&self, chosen: &[[u32; 3]], others: &[[u32; 3]], depth: f64) -> Vec<Pushed> {
+    fn pushed(&self, chosen: &[[u32; 3]], others: &[[u32; 3]], depth: f64) -> Vec<PushedNode> {
         let set = |f: &[u32; 3]| f.iter().fold(SurfaceSet::MAX, |s, n| s & self.on[*n as usize]);
         let area = |f: &[u32; 3]| {
             let [a, b, c] = f.map(|n| self.nodes[n as usize]);
@@ -145,7 +145,7 @@ impl Shaping<'_> {
             let (matrix, right) = sums[node as usize];
             let by = if ends_here { [0.0; 3] } else { shortest(&matrix, right) };
             let reach = (LONGEST * depth / norm(by).max(f64::MIN_POSITIVE)).min(1.0);
-            Pushed { node, from, by: scale(by, reach), along: along & !HELD, way: [0.0; 3], reach }
+            PushedNode { node, from, by: scale(by, reach), along: along & !HELD, way: [0.0; 3], reach }
         };
         nodes.map(way).collect()
     }

@@ -188,7 +188,7 @@ impl Partition<'_> {
             })
             .collect();
         moves.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let around = self.around(moves.iter().flat_map(|m| self.images(m.1)));
+        let node_tets = self.node_tets(moves.iter().flat_map(|m| self.images(m.1)));
         let sections = PlaneSections::new(self);
         for (distance, n, by) in moves {
             checkpoint();
@@ -199,7 +199,7 @@ impl Partition<'_> {
                 continue;
             }
             let old: Vec<Vec3> = images.iter().map(|n| self.nodes[*n as usize]).collect();
-            let of = |n: &u32| around.of(*n).iter();
+            let of = |n: &u32| node_tets.of(*n).iter();
             let worst = |p: &Self| {
                 let shapes = images.iter().flat_map(of).map(|t| shape(p.corners(&p.tets[*t as usize])));
                 shapes.fold(f64::INFINITY, f64::min)
@@ -217,7 +217,7 @@ impl Partition<'_> {
     }
 
     /// The tetrahedra at some nodes.
-    fn around(&self, nodes: impl Iterator<Item = u32>) -> Around {
+    fn node_tets(&self, nodes: impl Iterator<Item = u32>) -> NodeTets {
         let mut start = vec![0u32; self.nodes.len() + 1];
         let mut wanted = vec![false; self.nodes.len()];
         nodes.for_each(|n| wanted[n as usize] = true);
@@ -234,7 +234,7 @@ impl Partition<'_> {
                 fill[n as usize] += 1;
             }
         }
-        Around { start, of }
+        NodeTets { start, of }
     }
 
     /// Makes the nodes in which edges that still cross are bisected; in the order of their ends.
@@ -373,12 +373,12 @@ impl Partition<'_> {
 }
 
 /// The tetrahedra at nodes.
-struct Around {
+struct NodeTets {
     start: Vec<u32>,
     of: Vec<u32>,
 }
 
-impl Around {
+impl NodeTets {
     fn of(&self, n: u32) -> &[u32] {
         &self.of[self.start[n as usize] as usize..self.start[n as usize + 1] as usize]
     }

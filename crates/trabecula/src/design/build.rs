@@ -170,7 +170,7 @@ fn tiled(
     warnings: &mut Vec<Warning>,
 ) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
     let opening = domain.opening();
-    let build_tiling::Made { done, alone, on_grid, aim, zones, joins } =
+    let build_tiling::BuiltTiling { done, alone, on_grid, aim, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
     let Finished { tiling, placed, field, net, radii, fraction: finished } = done;
     let coverage = net.as_ref().map(|rods| Coverage::new(&tiling, rods));

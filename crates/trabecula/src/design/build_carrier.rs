@@ -8,7 +8,7 @@ use super::tiled_cell::TiledCell;
 use super::{Built, CarrierMaterial, Tiled, unit_cell};
 use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::effective::Resolution;
-use crate::volume_mesh::{self, Carried, Made};
+use crate::volume_mesh::{self, CarrierContext, MeshedVolume};
 use geometry::fault::Fault;
 use geometry::monotone_cubic::monotone;
 use geometry::progress::{Progress, Stage, Stopped};
@@ -21,17 +21,24 @@ const NODES: usize = 6;
 const SOLID: f64 = 0.999;
 
 /// The carrier, and the zone of each of its domains.
-pub(super) fn carrier(built: &Built, order: u8) -> Result<(Made, Vec<usize>), Fault> {
+pub(super) fn carrier(built: &Built, order: u8) -> Result<(MeshedVolume, Vec<usize>), Fault> {
     let tiled = only(built)?;
     let zones = tiled.zones.iter().map(|z| (z.name.clone(), z.numbers.clone())).collect();
-    let of = Carried { zones, sets: &built.sets, bounds: built.solid.region.bounds(), order };
+    let of = CarrierContext { zones, sets: &built.sets, bounds: built.solid.region.bounds(), order };
     let (mesh, zone_of) = volume_mesh::carrier(&tiled.tiling, &of)?;
     let edge = tiled.tiling.map.mean_edge();
     let off = tiled.mesh.fit.as_ref().map_or(0.0, |fit| fit.to_part.max);
     let bent = tiled.tiling.map.off_region().filter(|_| order == 2).map(|off| off * edge);
     let pieces = tiled.mesh.quality.pieces;
-    let made =
-        Made { mesh, deviation: bent.unwrap_or(off), straight: 0, pieces, dropped: 0.0, loose: 0.0, step: [edge; 3] };
+    let made = MeshedVolume {
+        mesh,
+        deviation: bent.unwrap_or(off),
+        straight: 0,
+        pieces,
+        dropped: 0.0,
+        loose: 0.0,
+        step: [edge; 3],
+    };
     Ok((made, zone_of))
 }
 

@@ -11,7 +11,7 @@ use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
-use crate::region::{Cut, FaceSet, HalfSpace, Intersection, Notes, Region};
+use crate::region::{FaceSet, HalfSpace, Intersection, Notes, OpenSurface, Region};
 use crate::skin::{outside, skin};
 use geometry::fault::number;
 use geometry::math::Vec3;
@@ -75,10 +75,10 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
     let (mut faces, mut places, mut openings) = (Vec::new(), Vec::new(), Vec::new());
     for (i, open) in spec.open.iter().enumerate() {
         let path = format!("skin.open[{i}]");
-        let face: Cut = match open {
+        let face: OpenSurface = match open {
             OpenSpec::Place(OpenPlace::Faces(of)) => {
                 let named = FaceSet::new(Some(region), &of.faces);
-                Cut::Faces(named.map_err(|f| DesignError::fault(&format!("{path}.faces"), f))?)
+                OpenSurface::Faces(named.map_err(|f| DesignError::fault(&format!("{path}.faces"), f))?)
             }
             OpenSpec::Place(OpenPlace::Region(r)) => {
                 let path = format!("{path}.region");

@@ -8,7 +8,7 @@ use super::data::*;
 use super::{Design, Loader, Node, Warning, ZoneNames, sample};
 use crate::environment::{self, Environment};
 use crate::grade::{Quantity, key_of};
-use crate::kind::{At, DesignError, Key, Kind};
+use crate::kind::{DesignError, Key, Kind, NodeCursor};
 use crate::mesher::{self, Background, Fit, MadeLayers, PrismLayers, background};
 use crate::region::Notes;
 use crate::report::{FitReport, LayersMade, TetMeshReport};
@@ -145,7 +145,7 @@ impl Tets {
 
 /// The region in a design whose other keys are left alone.
 fn region_of(node: &Node) -> Result<RegionKind, DesignError> {
-    match entry(&At::root(node), "region")? {
+    match entry(&NodeCursor::root(node), "region")? {
         Some(at) => RegionKind::read(&at),
         None => {
             Err(DesignError::new("region", format!("\"region\" is missing: {}", key_of::<Design>("region").meaning())))
@@ -154,7 +154,7 @@ fn region_of(node: &Node) -> Result<RegionKind, DesignError> {
 }
 
 /// The entry of a table with other keys, which are left alone.
-fn entry<'a>(at: &At<'a>, key: &str) -> Result<Option<At<'a>>, DesignError> {
+fn entry<'a>(at: &NodeCursor<'a>, key: &str) -> Result<Option<NodeCursor<'a>>, DesignError> {
     let entries = at.entries(&format!("a table with {key}"))?;
     Ok(entries.into_iter().find(|(k, _)| *k == key).map(|e| e.1))
 }
@@ -162,7 +162,7 @@ fn entry<'a>(at: &At<'a>, key: &str) -> Result<Option<At<'a>>, DesignError> {
 /// The tetrahedral mesh in a design, whose other keys are left alone, and the path of its table; the name of its lattice if
 /// it is to be that of one.
 fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsKind), DesignError> {
-    let lattices = match entry(&At::root(node), "lattice")? {
+    let lattices = match entry(&NodeCursor::root(node), "lattice")? {
         Some(of) => of.entries("lattices by name, such as [lattice.core]")?,
         None => Vec::new(),
     };

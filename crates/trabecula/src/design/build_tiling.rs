@@ -249,7 +249,7 @@ fn series_cell(spec: &TetSeriesSpec, path: &str) -> Result<TetCell, DesignError>
 }
 
 /// A lattice over a mesh.
-pub(super) struct Made {
+pub(super) struct BuiltTiling {
     /// The lattice with its ends.
     pub done: Finished,
     /// Whether nothing else is in the part: no skin, no kept zone.
@@ -269,7 +269,7 @@ pub(super) fn lattice(
     domain: &Domain,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
-) -> Result<Made, DesignError> {
+) -> Result<BuiltTiling, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let at = below("cell.tet");
     let mut cell = match domain.cell {
@@ -344,7 +344,7 @@ fn made(
     domain: &Domain,
     environment: &Environment,
     path: &str,
-) -> Result<Made, DesignError> {
+) -> Result<BuiltTiling, DesignError> {
     let spec = &domain.spec.level;
     let fraction = matches!(spec.amount, AmountSpec::Fraction(_) | AmountSpec::Porosity(_));
     let whole = spec.of == Of::Part;
@@ -375,7 +375,7 @@ fn made(
     // Skins and keep zones are counted in a fraction of the whole part alone.
     let aim = asked.map(|share| [share, 0.0]).or(done.fraction.map(|share| [share, SAMPLED]));
     let aim = aim.filter(|_| environment.filled.is_empty() || asked.is_some() && whole);
-    Ok(Made { done, alone, on_grid, aim, zones: Vec::new(), joins: None })
+    Ok(BuiltTiling { done, alone, on_grid, aim, zones: Vec::new(), joins: None })
 }
 
 /// Why the surface of a lattice is made on a grid, with the place if there is one; `None` where each tetrahedron has its own.
@@ -416,7 +416,7 @@ fn zoned(
     names_of_cells: &BTreeMap<String, TetCellName>,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
-) -> Result<Made, DesignError> {
+) -> Result<BuiltTiling, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let at = below("cell.tet.zones");
     let map = &domain.map;
@@ -454,7 +454,7 @@ fn zoned(
     if let Some(joins) = &joins {
         joins.warn(&given, &at, warnings);
     }
-    Ok(Made { zones: given, joins, ..made })
+    Ok(BuiltTiling { zones: given, joins, ..made })
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.

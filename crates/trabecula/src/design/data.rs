@@ -6,7 +6,7 @@ use crate::cell::tet::tet_catalogue;
 use crate::cell::{catalogue, named};
 pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, OneOrThree, Table};
+use crate::kind::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor, OneOrThree, Table};
 pub use crate::map::{
     AffineKind, Ends, Joined, LayersSpec, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
 };
@@ -31,7 +31,7 @@ macro_rules! name_of {
                 String::fits(node)
             }
 
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 let names: Vec<&'static str> = $names.collect();
                 let refused: fn(&str) -> Option<String> = $refused;
                 if let crate::kind::Value::Text(word) = &at.node.value
@@ -82,7 +82,7 @@ pub struct LatticeSpec {
 }
 
 /// Explains that a key, or what others call it, stands one level deeper, where beginners do not look for it.
-fn deeper(at: &At) -> Result<(), DesignError> {
+fn deeper(at: &NodeCursor) -> Result<(), DesignError> {
     let own = LatticeSpec::keys();
     let tables = [("level", LevelSpec::keys()), ("map.affine", AffineKind::keys())];
     for (word, entry) in at.entries("a lattice").unwrap_or_default() {
@@ -217,7 +217,7 @@ impl Kind for GroupSpec {
         String::fits(node).max(f64::fits(node))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         if !at.is_number() {
             return Ok(GroupSpec(at.text(&Self::expected())?.to_string()));
         }
@@ -492,7 +492,7 @@ pub enum Fit {
 pub struct Keeps(pub BTreeMap<String, RegionKind>);
 
 /// Explains that a name comes before the kind of a region.
-fn named_first(at: &At) -> Result<(), DesignError> {
+fn named_first(at: &NodeCursor) -> Result<(), DesignError> {
     for (name, at) in at.entries("regions by name, such as [keep.boss.cylinder]")? {
         if RegionKind::keys().iter().any(|k| k.name == name) && RegionKind::read(&at).is_err() {
             let message = format!("a name comes first, such as [keep.boss.{name}]: {name} is a kind of region");
@@ -506,7 +506,7 @@ fn named_first(at: &At) -> Result<(), DesignError> {
 pub type Lattices = BTreeMap<String, LatticeSpec>;
 
 /// Explains that the format has another version.
-pub(super) fn version(at: &At) -> Result<(), DesignError> {
+pub(super) fn version(at: &NodeCursor) -> Result<(), DesignError> {
     let entries = at.entries("a design")?;
     match entries.iter().find(|e| e.0 == "schema") {
         Some((_, at)) if at.number()? != 1.0 => {

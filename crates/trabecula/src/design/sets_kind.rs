@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::{Design, Loader};
 use crate::environment;
-use crate::kind::{At, DesignError, Kind, Table};
+use crate::kind::{DesignError, Kind, NodeCursor, Table};
 use crate::region::{Notes, Region, RegionKind};
 use crate::volume_mesh::is_own_name;
 use geometry::fault::number;
@@ -16,7 +16,7 @@ use geometry::fault::number;
 pub struct SetSpecs(pub BTreeMap<String, RegionKind>);
 
 /// Checks names: programs that read sets take letters, digits and underscores, and many do not tell capitals from small letters.
-fn names(at: &At) -> Result<(), DesignError> {
+fn names(at: &NodeCursor) -> Result<(), DesignError> {
     let mut before: Vec<&str> = Vec::new();
     for (name, at) in at.entries("regions by name, such as [set.bolt.cylinder]")? {
         if RegionKind::keys().iter().any(|k| k.name == name) && RegionKind::read(&at).is_err() {

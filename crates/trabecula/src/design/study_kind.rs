@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Design;
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table, Value};
+use crate::kind::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor, Table, Value};
 use geometry::fault::nearest;
 
 /// What varies: keys of the design by their paths, such as "lattice.core.level.fraction" = [0.2, 0.3, 0.4].
@@ -99,7 +99,7 @@ impl Kind for AnyValue {
         1
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         Ok(AnyValue(at.node.clone()))
     }
 
@@ -127,13 +127,13 @@ impl Kind for SweepKind {
         u8::from(matches!(node.value, Value::Table(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         let known: Vec<&str> = SweepSettings::keys().iter().map(|k| k.name).collect();
         let entries = at.entries(&Self::expected())?;
         let (own, varied): (Vec<_>, Vec<_>) = entries.into_iter().partition(|(key, _)| known.contains(key));
         let own = own.into_iter().map(|(key, at)| (key.to_string(), at.node.line, at.node.clone())).collect();
         let own = Node { value: Value::Table(own), line: at.node.line };
-        let settings = SweepSettings::read(&At::alone(&own, &at.path))?;
+        let settings = SweepSettings::read(&NodeCursor::alone(&own, &at.path))?;
         let mut parameters = BTreeMap::new();
         for (path, at) in varied {
             top_level(path, &at, &known)?;
@@ -214,7 +214,7 @@ impl SweepKind {
 }
 
 /// Refuses what is neither a setting nor the path of a key of a design.
-fn top_level(path: &str, at: &At, settings: &[&str]) -> Result<(), DesignError> {
+fn top_level(path: &str, at: &NodeCursor, settings: &[&str]) -> Result<(), DesignError> {
     let first = path.split(['.', '[']).next().unwrap_or_default();
     let keys = Design::keys();
     let allowed: Vec<&str> = keys.iter().map(|k| k.name).filter(|n| *n != "sweep").collect();
@@ -227,7 +227,7 @@ fn top_level(path: &str, at: &At, settings: &[&str]) -> Result<(), DesignError> 
 }
 
 /// Adds the values of a path; tables without `from` are paths without quotes.
-fn collect(path: &str, at: &At, out: &mut BTreeMap<String, ParameterKind>) -> Result<(), DesignError> {
+fn collect(path: &str, at: &NodeCursor, out: &mut BTreeMap<String, ParameterKind>) -> Result<(), DesignError> {
     if matches!(at.node.value, Value::Table(_)) && at.node.get("from").is_none() && at.node.get("to").is_none() {
         let below = at.entries("values")?;
         return below.into_iter().try_for_each(|(key, at)| collect(&format!("{path}.{key}"), &at, out));

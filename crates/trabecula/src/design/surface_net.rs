@@ -31,7 +31,7 @@ const TAPER: f64 = 0.25;
 pub(super) struct Net {
     pub nodes: Vec<Vec3>,
     /// Where each node is on the mesh.
-    places: Vec<Place>,
+    places: Vec<NodePosition>,
     pub rods: Vec<[u32; 2]>,
     /// The nodes of the triangle or the edge of the mesh that each rod is on.
     pub owners: Vec<[u32; 3]>,
@@ -59,7 +59,7 @@ impl Rods {
 }
 
 /// Where a node of a net is.
-enum Place {
+enum NodePosition {
     /// On a triangle of these nodes of the mesh, by the coordinates of its corners.
     On([u32; 3], [f64; 3]),
     /// Between two nodes of the net, by the share of the second.
@@ -101,7 +101,7 @@ impl Net {
                     [_] => flat,
                     _ => feet(&**region, &[flat])[0],
                 };
-                out.node(foot, Place::On(*f, *l))
+                out.node(foot, NodePosition::On(*f, *l))
             })
         };
         for f in &faces {
@@ -120,7 +120,7 @@ impl Net {
     }
 
     /// Adds a node.
-    fn node(&mut self, at: Vec3, place: Place) -> u32 {
+    fn node(&mut self, at: Vec3, place: NodePosition) -> u32 {
         self.nodes.push(at);
         self.places.push(place);
         self.nodes.len() as u32 - 1
@@ -140,7 +140,7 @@ impl Net {
         let mut last = ends[0];
         if off > STRAIGHT * norm(sub(p, q)) {
             for (k, point) in through.into_iter().enumerate() {
-                let next = self.node(point, Place::Between(ends, (k + 1) as f64 / PIECES as f64));
+                let next = self.node(point, NodePosition::Between(ends, (k + 1) as f64 / PIECES as f64));
                 self.rods.push([last, next]);
                 last = next;
             }
@@ -154,8 +154,8 @@ impl Net {
         let mut radii: Vec<f64> = Vec::with_capacity(self.nodes.len());
         for place in &self.places {
             radii.push(match place {
-                Place::On(f, l) => f.iter().zip(l).map(|(n, l)| l * of[*n as usize]).sum(),
-                Place::Between([a, b], share) => {
+                NodePosition::On(f, l) => f.iter().zip(l).map(|(n, l)| l * of[*n as usize]).sum(),
+                NodePosition::Between([a, b], share) => {
                     let [r, s] = [a, b].map(|n| radii[*n as usize]);
                     r + share * (s - r)
                 }
@@ -244,7 +244,7 @@ mod tests {
         let (length, radii) = (3.0, [0.5, 0.3]);
         let net = Net {
             nodes: vec![[0.0; 3], [length, 0.0, 0.0]],
-            places: vec![Place::On([0; 3], [1.0, 0.0, 0.0]), Place::On([1; 3], [1.0, 0.0, 0.0])],
+            places: vec![NodePosition::On([0; 3], [1.0, 0.0, 0.0]), NodePosition::On([1; 3], [1.0, 0.0, 0.0])],
             rods: vec![[0, 1]],
             owners: vec![[0, 1, 1]],
             faces: Vec::new(),

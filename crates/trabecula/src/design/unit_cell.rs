@@ -7,7 +7,7 @@ use super::data::*;
 use super::tiled_cell::TiledCell;
 use super::{Built, Design, Loader};
 use crate::csg_tree::{CsgSolid, CsgTree};
-use crate::effective::{Side, UnitCell};
+use crate::effective::{SheetSide, UnitCell};
 use crate::environment::Environment;
 use crate::implicit::{Implicit, Surface};
 use crate::kind::DesignError;
@@ -71,10 +71,10 @@ pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell,
     cell.wall = wall;
     if lattice.distance().is_none() {
         let (lattice, to_phase) = (lattice.clone(), map.matrix);
-        let widest = move |side: Option<Side>| {
+        let widest = move |side: Option<SheetSide>| {
             let passages = lattice.cell.passages(lattice.part, level);
             let pores = lattice.cell.pores(lattice.part, level, &to_phase);
-            let sides = [Some(Side::Lower), Some(Side::Upper)];
+            let sides = [Some(SheetSide::Lower), Some(SheetSide::Upper)];
             let through = passages.into_iter().zip(pores).zip(sides);
             let through = through.filter(|((passes, _), of)| *passes && (side.is_none() || side == *of));
             through.map(|((_, pore), _)| pore).fold(0.0, f64::max)

@@ -15,7 +15,7 @@ use crate::report::{CellGrid, PermeabilityReport};
 
 /// A side of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum SheetSide {
     /// Where the function of the cell is low.
     Lower,
     /// Where it is high.
@@ -51,7 +51,7 @@ impl UnitCell {
     pub fn permeability(
         &self,
         n: usize,
-        side: Option<Side>,
+        side: Option<SheetSide>,
         progress: &dyn Progress,
     ) -> Result<PermeabilityReport, NoTensor> {
         self.check(n)?;
@@ -96,7 +96,7 @@ impl UnitCell {
             order,
             residual: flows.iter().map(|f| f.found.residual).fold(0.0, f64::max),
             iterations: finest.found.iterations,
-            side: side.map(|s| if s == Side::Lower { "lower".into() } else { "upper".into() }),
+            side: side.map(|s| if s == SheetSide::Lower { "lower".into() } else { "upper".into() }),
             porosity,
             area_per_volume: area / volume,
             hydraulic_diameter: diameter,
@@ -191,12 +191,12 @@ impl UnitCell {
     }
 
     /// The solids outside which the pores are.
-    fn opposite(&self, side: Option<Side>) -> Result<Vec<CsgSolid>, Fault> {
+    fn opposite(&self, side: Option<SheetSide>) -> Result<Vec<CsgSolid>, Fault> {
         let leaf = |i: usize| CsgSolid { surfaces: vec![self.solid.surfaces[i].clone()], tree: CsgTree::Leaf(0) };
         match (self.sheet, side) {
             (true, None) => Ok(vec![leaf(1), leaf(0)]),
-            (true, Some(Side::Lower)) => Ok(vec![leaf(1)]),
-            (true, Some(Side::Upper)) => Ok(vec![leaf(0)]),
+            (true, Some(SheetSide::Lower)) => Ok(vec![leaf(1)]),
+            (true, Some(SheetSide::Upper)) => Ok(vec![leaf(0)]),
             (false, None) => Ok(vec![self.solid.clone()]),
             (false, Some(_)) => {
                 let message = "only a sheet has a lower and an upper side; leave the side out";

@@ -15,14 +15,14 @@ use super::stitched::Stitched;
 use super::tile::View;
 use super::tile_queue::each_tile;
 use crate::solid::{Solid, Space};
-use crate::surface_maker::{Islands, Made, Options, Resolved, kept};
+use crate::surface_maker::{Islands, MeshedSurface, Options, Resolved, kept};
 
 /// One of the solids that a sheet makes of its region.
 pub struct SpaceMade {
     /// Which it is.
     pub space: Space,
     /// Its surface and its connected components, of which none is dropped.
-    pub made: Made,
+    pub made: MeshedSurface,
 }
 
 /// The surfaces of some of the solids into which a sheet divides its region, at grid spacing `edge` (mm), in the order of
@@ -61,7 +61,7 @@ pub fn spaces(
     });
     let found = finished.collect::<Result<Vec<Resolved>, Stopped>>()?;
     let made = wanted.iter().zip(surfaces).zip(found).map(|((space, surface), found)| {
-        let made = Made { surface: kept(surface, &found), components: found.components, error: None };
+        let made = MeshedSurface { surface: kept(surface, &found), components: found.components, error: None };
         SpaceMade { space: *space, made }
     });
     Ok(made.collect())

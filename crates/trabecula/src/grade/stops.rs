@@ -1,6 +1,6 @@
 //! Stops: a piecewise linear function of one number, given by pairs.
 
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node};
+use crate::kind::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor};
 use geometry::fault::number;
 use geometry::math::Interval;
 
@@ -20,7 +20,7 @@ impl Kind for Stops {
         Vec::<[f64; 2]>::fits(node)
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         let stops = at.list(&Self::expected())?;
         stops.iter().map(|s| s.numbers("[position, value]")).collect::<Result<Vec<_>, _>>().map(Stops)
     }

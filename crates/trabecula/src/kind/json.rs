@@ -21,7 +21,7 @@ fn read(text: &str) -> Result<Node, DesignError> {
     let counted = Counted { bytes: text.as_bytes(), line: &line };
     let refused = RefCell::new(None);
     let mut reader = serde_json::Deserializer::from_reader(counted);
-    let root = At { path: String::new(), line: &line, refused: &refused };
+    let root = NodeSeed { path: String::new(), line: &line, refused: &refused };
     let read = root.deserialize(&mut reader).and_then(|node| reader.end().map(|()| node));
     read.map_err(|e| {
         refused.take().unwrap_or_else(|| DesignError {
@@ -50,13 +50,13 @@ impl Read for Counted<'_> {
 }
 
 /// A value about to be read, and the path to it.
-struct At<'a> {
+struct NodeSeed<'a> {
     path: String,
     line: &'a Cell<usize>,
     refused: &'a RefCell<Option<DesignError>>,
 }
 
-impl<'de> DeserializeSeed<'de> for At<'_> {
+impl<'de> DeserializeSeed<'de> for NodeSeed<'_> {
     type Value = Node;
 
     fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<Node, D::Error> {
@@ -66,7 +66,7 @@ impl<'de> DeserializeSeed<'de> for At<'_> {
     }
 }
 
-impl<'de> Visitor<'de> for At<'_> {
+impl<'de> Visitor<'de> for NodeSeed<'_> {
     type Value = Value;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -99,7 +99,7 @@ impl<'de> Visitor<'de> for At<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<Value, A::Error> {
         let mut items = Vec::new();
-        let item = |i| At { path: format!("{}[{i}]", self.path), ..self };
+        let item = |i| NodeSeed { path: format!("{}[{i}]", self.path), ..self };
         while let Some(node) = from.next_element_seed(item(items.len()))? {
             items.push(node);
         }
@@ -117,7 +117,7 @@ impl<'de> Visitor<'de> for At<'_> {
                 *self.refused.borrow_mut() = Some(DesignError { line, ..DesignError::new(path, message).found(key) });
                 return Err(A::Error::custom("a key is given twice"));
             }
-            let value = from.next_value_seed(At { path, ..self })?;
+            let value = from.next_value_seed(NodeSeed { path, ..self })?;
             entries.push((key, line, value));
         }
         Ok(Value::Table(entries))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{At, Defs, DesignError, Fault, Key, Kind, Node, Value};
+use super::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor, Value};
 use geometry::fault::counted;
 
 impl Kind for f64 {
@@ -14,7 +14,7 @@ impl Kind for f64 {
         u8::from(matches!(node.value, Value::Number(_) | Value::Whole(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         at.number()
     }
 
@@ -52,7 +52,7 @@ macro_rules! whole {
                 f64::fits(node)
             }
 
-            fn read(at: &At) -> Result<Self, DesignError> {
+            fn read(at: &NodeCursor) -> Result<Self, DesignError> {
                 let v = at.number()?;
                 let inside = v >= f64::from(<$type>::MIN) && v <= f64::from(<$type>::MAX);
                 if v.fract() == 0.0 && inside { Ok(v as $type) } else { Err(at.expected(&Self::expected())) }
@@ -84,7 +84,7 @@ impl Kind for bool {
         u8::from(matches!(node.value, Value::Bool(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         at.truth()
     }
 
@@ -110,7 +110,7 @@ impl Kind for String {
         u8::from(matches!(node.value, Value::Text(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         at.text(&Self::expected()).map(str::to_string)
     }
 
@@ -138,7 +138,7 @@ impl<T: Kind> Kind for Box<T> {
         T::fits(node)
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         T::read(at).map(Box::new)
     }
 
@@ -173,7 +173,7 @@ impl<T: Kind> Kind for Vec<T> {
         2 * u8::from(matches!(node.value, Value::List(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         at.list(&Self::expected())?.iter().map(T::read).collect()
     }
 
@@ -215,7 +215,7 @@ impl<T: Kind, const N: usize> Kind for [T; N] {
         }
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         let items = at.list(&Self::expected())?;
         let wrong = || at.error(format!("expected {}, found {}", Self::expected(), counted(items.len(), "value")));
         if items.len() != N {
@@ -277,8 +277,8 @@ impl<N: Name, T: Kind> Kind for BTreeMap<N, T> {
         u8::from(matches!(node.value, Value::Table(_)))
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
-        let entry = |(name, at): (&str, At)| match N::of(name) {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
+        let entry = |(name, at): (&str, NodeCursor)| match N::of(name) {
             Some(name) => Ok((name, T::read(&at)?)),
             None => Err(at.error(format!("expected a whole number from 0, found \"{name}\""))),
         };
@@ -382,6 +382,6 @@ impl core::str::FromStr for Unit {
     type Err = DesignError;
 
     fn from_str(word: &str) -> Result<Unit, DesignError> {
-        Unit::read(&At::root(&word.into()))
+        Unit::read(&NodeCursor::root(&word.into()))
     }
 }

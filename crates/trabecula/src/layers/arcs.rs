@@ -5,7 +5,7 @@
 //! too far the section's point nearest to the middle is added. A surface with creases has corners inside arcs: where the tangents
 //! at both ends meet in a point of the surface, that is added.
 
-use super::roots::{Meeting, Plane};
+use super::roots::{IntersectionPoint, Plane};
 use geometry::layer::{Point, length};
 
 /// A part of a contour on one surface, solid on its left.
@@ -256,7 +256,12 @@ fn cubic_points(arc: &Arc, most: f64, out: &mut Vec<Point>) {
 }
 
 /// The corner between two chords, to be looked for between them.
-pub(super) fn meeting(ends: [Point; 2], surfaces: [u32; 2], gradients: [Point; 2], bounds: [Point; 2]) -> Meeting {
+pub(super) fn intersection_guess(
+    ends: [Point; 2],
+    surfaces: [u32; 2],
+    gradients: [Point; 2],
+    bounds: [Point; 2],
+) -> IntersectionPoint {
     let [t, u] = gradients.map(|g| tangent(unit(g)));
     let turn = t[0] * u[1] - t[1] * u[0];
     let d = [0, 1].map(|k| ends[1][k] - ends[0][k]);
@@ -265,7 +270,7 @@ pub(super) fn meeting(ends: [Point; 2], surfaces: [u32; 2], gradients: [Point; 2
     let tangents = [0, 1].map(|k| ends[0][k] + along * t[k]);
     let middle = [0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k]));
     let point = Some(tangents).filter(inside).unwrap_or(middle);
-    Meeting { surfaces, point, bounds, gradients, found: false }
+    IntersectionPoint { surfaces, point, bounds, gradients, found: false }
 }
 
 /// The direction along a contour, solid on its left, where the outward normal is this.

@@ -98,7 +98,7 @@ fn step(
 }
 
 /// A point where two surfaces meet, looked for from a guess within a box.
-pub(super) struct Meeting {
+pub(super) struct IntersectionPoint {
     pub surfaces: [u32; 2],
     pub point: Point,
     pub bounds: [Point; 2],
@@ -109,27 +109,27 @@ pub(super) struct Meeting {
 }
 
 /// Solves for points where two surfaces meet, to `accuracy` (mm), by Newton's method.
-pub(super) fn meet(meetings: &mut [Meeting], plane: Plane, accuracy: f64) {
-    let mut open: Vec<usize> = (0..meetings.len()).collect();
+pub(super) fn solve_intersections(points: &mut [IntersectionPoint], plane: Plane, accuracy: f64) {
+    let mut open: Vec<usize> = (0..points.len()).collect();
     for _ in 0..ROUNDS / 2 {
         let mut values = vec![[0.0; 2]; open.len()];
         for k in 0..2 {
             let mut order: Vec<usize> = (0..open.len()).collect();
-            let surfaces: Vec<u32> = open.iter().map(|m| meetings[*m].surfaces[k]).collect();
+            let surfaces: Vec<u32> = open.iter().map(|m| points[*m].surfaces[k]).collect();
             order.sort_by_key(|i| surfaces[*i]);
             for of in order.chunk_by(|a, b| surfaces[*a] == surfaces[*b]) {
                 let surface = surfaces[of[0]];
-                let found = plane.evaluate(surface, of.iter().map(|i| meetings[open[*i]].point));
+                let found = plane.evaluate(surface, of.iter().map(|i| points[open[*i]].point));
                 for (n, i) in of.iter().enumerate() {
                     let (value, gradient, _) = found.at(n);
                     values[*i][k] = value;
-                    meetings[open[*i]].gradients[k] = gradient;
+                    points[open[*i]].gradients[k] = gradient;
                 }
             }
         }
         let mut i = 0;
         open.retain(|m| {
-            let m = &mut meetings[*m];
+            let m = &mut points[*m];
             let [v, w] = values[i];
             i += 1;
             let [[a, b], [c, d]] = m.gradients;

@@ -3,7 +3,7 @@
 use super::{Affine, BuildMap, Map, NO_WAVELENGTH, given_twice, shared};
 use crate::environment::Environment;
 use crate::grade::Grade;
-use crate::kind::{At, DesignError, Kind, OneOrThree, Value};
+use crate::kind::{DesignError, Kind, NodeCursor, OneOrThree, Value};
 use geometry::math::Mat3;
 
 /// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
@@ -57,7 +57,7 @@ impl Cells {
 }
 
 /// Explains that numbers of this map are constant.
-fn uniform(at: &At) -> Result<(), DesignError> {
+fn uniform(at: &NodeCursor) -> Result<(), DesignError> {
     let message = "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary";
     for (key, at) in at.entries("a map").unwrap_or_default() {
         match key {
@@ -143,8 +143,8 @@ impl BuildMap for SpartanKind {
 }
 
 /// A value that is one number: what may not vary says so.
-fn constant(at: &At, message: &str) -> Result<(), DesignError> {
-    let varies = |at: &At| matches!(at.node.value, Value::Table(_));
+fn constant(at: &NodeCursor, message: &str) -> Result<(), DesignError> {
+    let varies = |at: &NodeCursor| matches!(at.node.value, Value::Table(_));
     match at.is_list() {
         true => at.list("")?.iter().find(|i| varies(i)).map_or(Ok(()), |i| Err(i.error(message))),
         false if varies(at) => Err(at.error(message)),

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use geometry::math::{Aabb, Vec3, add, scale, sub};
 
 use super::bezier::{Curve, Patch, basis, reversed, sector_area, sum};
-use super::quad_net::{Net, Place, Side};
+use super::quad_net::{Net, Side, VertexConstraint};
 
 /// An edge of the boundary.
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +100,7 @@ impl Boundary {
                 let last = first | 1 << axis;
                 let here = corner(&self.bounds, first);
                 let on = |v: &super::quad_net::Vertex| {
-                    v.place == Place::Edge(axis as u8) && others.iter().all(|o| v.at[*o] == here[*o])
+                    v.constraint == VertexConstraint::Edge(axis as u8) && others.iter().all(|o| v.at[*o] == here[*o])
                 };
                 let mut stops: Vec<u32> =
                     (0..net.vertices.len() as u32).filter(|v| on(&net.vertices[*v as usize])).collect();

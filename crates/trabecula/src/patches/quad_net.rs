@@ -16,7 +16,7 @@ use super::contour_polygons::{Grid, Polygons};
 
 /// Where a vertex may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum VertexConstraint {
     /// On its surface.
     Surface,
     /// On its surface in a plane of the box: 2 · axis + side.
@@ -31,7 +31,7 @@ pub struct Vertex {
     /// Position (mm).
     pub at: Vec3,
     /// Where it may move.
-    pub place: Place,
+    pub constraint: VertexConstraint,
     /// The number of its surface.
     pub surface: u8,
 }
@@ -92,7 +92,7 @@ impl Net {
         for polygon in &of.polygons {
             let corners = polygon.corners.iter().map(|c| points[c[0] as usize]);
             let at = scale(corners.fold([0.0; 3], add), 1.0 / polygon.corners.len() as f64);
-            let vertex = own.vertex(at, Place::Surface);
+            let vertex = own.vertex(at, VertexConstraint::Surface);
             own.polygons.push(vertex);
         }
         for (segment, found) in of.segments.iter().enumerate() {
@@ -101,7 +101,7 @@ impl Net {
             own.segments[segment] = match (found.plane, &found.polygons[..]) {
                 (None, &[p, q]) => (own.edge([p, q].map(|p| own.polygons[p as usize]), middle, None), None),
                 (Some(plane), &[p]) => {
-                    let on = own.vertex(middle, Place::Plane(plane));
+                    let on = own.vertex(middle, VertexConstraint::Plane(plane));
                     (
                         own.edge([on, own.polygons[p as usize]], own.between([on, own.polygons[p as usize]]), None),
                         Some(on),
@@ -163,9 +163,9 @@ impl Net {
         let mut halves: Vec<Option<(u32, u32)>> = vec![None; divided.len()];
         for e in (0..divided.len()).filter(|e| divided[*e]) {
             let edge = self.edges[e];
-            let place = edge.plane.map_or(Place::Surface, Place::Plane);
+            let constraint = edge.plane.map_or(VertexConstraint::Surface, VertexConstraint::Plane);
             let middle = self.vertices.len() as u32;
-            self.vertices.push(Vertex { at: edge.middle, place, surface: edge.surface });
+            self.vertices.push(Vertex { at: edge.middle, constraint, surface: edge.surface });
             let [a, b] = edge.ends;
             self.edges[e] = self.straight([a, middle], edge.plane, edge.surface);
             halves[e] = Some((middle, self.edges.len() as u32));
@@ -219,7 +219,7 @@ impl Net {
                 let corners = [c0, c1, c2, c3].map(|c| self.vertices[c as usize].at);
                 let at = scale(corners.into_iter().fold([0.0; 3], add), 0.25);
                 let center = self.vertices.len() as u32;
-                self.vertices.push(Vertex { at, place: Place::Surface, surface });
+                self.vertices.push(Vertex { at, constraint: VertexConstraint::Surface, surface });
                 let m = [m0, m1, m2, m3];
                 let spokes = m.map(|m| joined(self, [m, center]));
                 for k in 0..4 {
@@ -266,8 +266,8 @@ struct Dual<'a> {
 }
 
 impl Dual<'_> {
-    fn vertex(&mut self, at: Vec3, place: Place) -> u32 {
-        self.net.vertices.push(Vertex { at, place, surface: self.surface });
+    fn vertex(&mut self, at: Vec3, constraint: VertexConstraint) -> u32 {
+        self.net.vertices.push(Vertex { at, constraint, surface: self.surface });
         self.net.vertices.len() as u32 - 1
     }
 
@@ -304,7 +304,7 @@ impl Dual<'_> {
                 edges.extend([closing, self.segments[ends[0] as usize].0]);
             }
             (1, [_, _], [Some(first), Some(last)]) => {
-                let corner = self.vertex(crossing.0, Place::Edge(crossing.1));
+                let corner = self.vertex(crossing.0, VertexConstraint::Edge(crossing.1));
                 let plane = |s: u32| of.segments[s as usize].plane;
                 let [to, from] = [[last, corner], [corner, first]].map(|e| (e, self.between(e)));
                 let to = self.edge(to.0, to.1, plane(ends[1]));

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::quad_net::{Face, Net, Place, Vertex};
+use super::quad_net::{Face, Net, Vertex, VertexConstraint};
 use crate::field::Field;
 use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 
@@ -29,8 +29,8 @@ pub fn gradients(field: &dyn Field, points: &[Vec3]) -> (Vec<f64>, Vec<Vec3>) {
 /// and within the box.
 fn step(vertex: &Vertex, value: f64, gradient: Vec3, most: f64, bounds: &Aabb) -> Vec3 {
     let mut along = scale(gradient, -value.signum());
-    match vertex.place {
-        Place::Surface => {
+    match vertex.constraint {
+        VertexConstraint::Surface => {
             // Along a plane of the box that it would cross.
             for a in 0..3 {
                 if vertex.at[a] <= bounds.min[a] && along[a] < 0.0 || vertex.at[a] >= bounds.max[a] && along[a] > 0.0 {
@@ -38,8 +38,8 @@ fn step(vertex: &Vertex, value: f64, gradient: Vec3, most: f64, bounds: &Aabb) -
                 }
             }
         }
-        Place::Plane(plane) => along[usize::from(plane / 2)] = 0.0,
-        Place::Edge(axis) => (0..3).filter(|a| *a != usize::from(axis)).for_each(|a| along[a] = 0.0),
+        VertexConstraint::Plane(plane) => along[usize::from(plane / 2)] = 0.0,
+        VertexConstraint::Edge(axis) => (0..3).filter(|a| *a != usize::from(axis)).for_each(|a| along[a] = 0.0),
     }
     let square = dot(along, along);
     if square == 0.0 {
@@ -97,7 +97,7 @@ impl Net {
                 let vertex = &mut self.vertices[v];
                 let to = sub(to, vertex.at);
                 let mut along = sub(to, scale(normals[v], dot(to, normals[v])));
-                if let Place::Plane(plane) = vertex.place {
+                if let VertexConstraint::Plane(plane) = vertex.constraint {
                     along[usize::from(plane / 2)] = 0.0;
                 }
                 let to = add(vertex.at, scale(along, 0.5));
@@ -140,9 +140,9 @@ impl Net {
             });
             let weight = 1.0 + turns * norm(sub(n, m)) * spacing / length;
             for (v, other) in [(a, b), (b, a)] {
-                match self.vertices[v].place {
-                    Place::Plane(_) if edge.plane.is_none() => continue,
-                    Place::Edge(_) => continue,
+                match self.vertices[v].constraint {
+                    VertexConstraint::Plane(_) if edge.plane.is_none() => continue,
+                    VertexConstraint::Edge(_) => continue,
                     _ => {}
                 }
                 let (at, total) = &mut sum[v];
@@ -158,7 +158,7 @@ impl Net {
         let of = |face: &Face| {
             let sine = |k: usize| {
                 let at = [(k + 3) % 4, k, (k + 1) % 4].map(|k| face.corners[k] as usize);
-                if matches!(self.vertices[at[1]].place, Place::Edge(_)) {
+                if matches!(self.vertices[at[1]].constraint, VertexConstraint::Edge(_)) {
                     return 1.0;
                 }
                 let [a, b, c] = at.map(|v| self.vertices[v].at);

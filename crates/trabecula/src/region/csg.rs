@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::halfspace::polyhedron_bounds;
 use super::meshes::{List, Meshes};
-use super::{BuildRegion, CadMesh, Context, Cut, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
+use super::{BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -284,7 +284,7 @@ macro_rules! joined {
             }
 
             // What is taken away keeps its surface: grown, it has no flat faces of its own.
-            fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
+            fn opened(self: Arc<Self>, cuts: &[OpenSurface], found: &mut [bool]) -> Option<Region> {
                 let mut any = false;
                 let mut open = |(i, r): (usize, &Region)| {
                     let opened = if self.negated(i) { None } else { r.clone().opened(cuts, found) };

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{CadMesh, Cut, Offset, Region, Shape, one_surface};
+use super::{CadMesh, Offset, OpenSurface, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -172,7 +172,7 @@ impl Shape for MeshRegion {
         out.extend(self.cad.clone());
     }
 
-    fn opened(self: Arc<Self>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
+    fn opened(self: Arc<Self>, cuts: &[OpenSurface], found: &mut [bool]) -> Option<Region> {
         open::opened(self, cuts, found)
     }
 

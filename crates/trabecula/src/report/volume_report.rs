@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::beam_mesh;
 use crate::shell_mesh;
-use crate::volume_mesh::Made;
+use crate::volume_mesh::MeshedVolume;
 use geometry::fe_mesh::{FeSet, HexMesh};
 use geometry::measure::quality;
 use geometry::mesh::Mesh;
@@ -156,8 +156,8 @@ pub struct BeamMeshReport {
     pub sets: BTreeMap<String, SetReport>,
 }
 
-impl From<&beam_mesh::Made> for BeamMeshReport {
-    fn from(made: &beam_mesh::Made) -> BeamMeshReport {
+impl From<&beam_mesh::MeshedBeams> for BeamMeshReport {
+    fn from(made: &beam_mesh::MeshedBeams) -> BeamMeshReport {
         let mesh = &made.mesh;
         let (length, volume) = mesh.size();
         let range = |least: fn(f64, f64) -> f64| mesh.radii.iter().copied().reduce(least).unwrap_or(0.0);
@@ -181,7 +181,7 @@ impl From<&beam_mesh::Made> for BeamMeshReport {
 
 impl ShellReport {
     /// Of a mesh made at a grid spacing `edge` (mm).
-    pub fn new(made: &shell_mesh::Made, edge: f64) -> ShellReport {
+    pub fn new(made: &shell_mesh::MeshedShell, edge: f64) -> ShellReport {
         let mesh = &made.mesh;
         let (area, volume) = mesh.size();
         let range = |least: fn(f64, f64) -> f64| mesh.thickness.iter().copied().reduce(least).unwrap_or(0.0);
@@ -222,8 +222,8 @@ impl From<&FeSet> for SetReport {
     }
 }
 
-impl From<&Made> for VolumeReport {
-    fn from(made: &Made) -> VolumeReport {
+impl From<&MeshedVolume> for VolumeReport {
+    fn from(made: &MeshedVolume) -> VolumeReport {
         let mesh = &made.mesh;
         let angles = mesh.angles().unwrap_or_default();
         let domains = mesh.domains.iter().enumerate().map(|(d, name)| {

@@ -4,7 +4,7 @@ use geometry::math::{cross, norm, sub};
 use geometry::measure::{self, Cavity, Quality, Size};
 use geometry::surface_mesh::SurfaceMesh;
 
-use super::{Components, Made};
+use super::{Components, MeshedSurface};
 
 /// Size and topology of a surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl Figures {
 
 impl Measured {
     /// What is measured of a surface that is held.
-    pub fn of(made: &Made) -> Measured {
+    pub fn of(made: &MeshedSurface) -> Measured {
         let quality = measure::quality(&made.surface.mesh);
         Measured { figures: Figures::of(&made.surface), quality, components: made.components }
     }

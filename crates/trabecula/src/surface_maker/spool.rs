@@ -52,7 +52,7 @@ pub fn stream_mesh(
         reported: Mutex::new((0, total)),
         progress: Stage { whole: progress, from: 1.0 - WRITING, to: 1.0 },
     };
-    let written = write_indexed(&mesh, suffix, meta, &mut AsideFile(aside), out).and_then(|()| out.flush());
+    let written = write_indexed(&mesh, suffix, meta, &mut SpoolFile(aside), out).and_then(|()| out.flush());
     written.map_err(|e| if is_interrupt(&e) { Stopped::Interrupted } else { Stopped::Io(e) })?;
     Ok(found.summary())
 }
@@ -218,9 +218,9 @@ impl Indexed for Spooled<'_> {
 }
 
 /// A file for what a writer puts aside.
-struct AsideFile<'a>(&'a mut dyn Store);
+struct SpoolFile<'a>(&'a mut dyn Store);
 
-impl ByteSpool for AsideFile<'_> {
+impl ByteSpool for SpoolFile<'_> {
     fn put(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.0.write_all(&bytes)
     }

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 const ROUNDS: usize = 24;
 
 /// What is known of the zones and the region of a carrier.
-pub struct Carried<'a> {
+pub struct CarrierContext<'a> {
     /// Names of zones with their numbers; without any, the numbers are names.
     pub zones: Vec<(String, Vec<i64>)>,
     /// Regions whose surface is a set, by name.
@@ -33,7 +33,7 @@ pub struct Carried<'a> {
 ///
 /// # Errors
 /// An empty set; more than 256 domains.
-pub fn carrier(tiling: &Tiling, of: &Carried) -> Result<(FeMesh, Vec<usize>), Fault> {
+pub fn carrier(tiling: &Tiling, of: &CarrierContext) -> Result<(FeMesh, Vec<usize>), Fault> {
     let map = &*tiling.map;
     let shares = tiling.shares();
     let mut mesh = FeMesh { nodes: map.nodes().to_vec(), ..FeMesh::default() };

@@ -13,7 +13,7 @@ const PIECE: f64 = 0.125;
 
 /// What is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Of {
+pub enum VolumeTarget {
     /// The solid.
     Solid,
     /// What is left of the region.
@@ -26,10 +26,15 @@ pub enum Of {
     All,
 }
 
-impl Of {
+impl VolumeTarget {
     /// All, by their names.
-    pub const NAMES: [(&'static str, Of); 5] =
-        [("solid", Of::Solid), ("pore", Of::Pore), ("lower", Of::Lower), ("upper", Of::Upper), ("all", Of::All)];
+    pub const NAMES: [(&'static str, VolumeTarget); 5] = [
+        ("solid", VolumeTarget::Solid),
+        ("pore", VolumeTarget::Pore),
+        ("lower", VolumeTarget::Lower),
+        ("upper", VolumeTarget::Upper),
+        ("all", VolumeTarget::All),
+    ];
 }
 
 /// Domains over common surfaces; no two overlap.
@@ -55,14 +60,14 @@ impl Domains {
     ///
     /// # Errors
     /// A side of what is no sheet.
-    pub fn new(solid: &Solid, of: Of, edge: Option<f64>) -> Result<Domains, Fault> {
+    pub fn new(solid: &Solid, of: VolumeTarget, edge: Option<f64>) -> Result<Domains, Fault> {
         let sheet = solid.field.as_ref().is_some_and(|f| f.faces().is_some());
         let (names, mut surfaces, trees) = match of {
-            Of::Lower | Of::Upper | Of::All if sheet || of != Of::All => {
+            VolumeTarget::Lower | VolumeTarget::Upper | VolumeTarget::All if sheet || of != VolumeTarget::All => {
                 let spaces = solid.spaces().map_err(|f| Fault { at: "of".into(), ..f })?;
                 let chosen: &[Space] = match of {
-                    Of::Lower => &[Space::Lower],
-                    Of::Upper => &[Space::Upper],
+                    VolumeTarget::Lower => &[Space::Lower],
+                    VolumeTarget::Upper => &[Space::Upper],
                     _ => &Space::ALL,
                 };
                 let names = chosen.iter().map(|s| ["WALL", "LOWER", "UPPER"][*s as usize]).collect();
@@ -74,8 +79,8 @@ impl Domains {
                 let region = surfaces.iter().take_while(|s| s.cut).count();
                 let pore = CsgTree::Intersection(vec![region_of(&tree, region), tree.clone().inverse()]);
                 match of {
-                    Of::Solid => (vec!["SOLID"], surfaces, vec![tree]),
-                    Of::Pore => (vec!["PORE"], surfaces, vec![pore]),
+                    VolumeTarget::Solid => (vec!["SOLID"], surfaces, vec![tree]),
+                    VolumeTarget::Pore => (vec!["PORE"], surfaces, vec![pore]),
                     _ => (vec!["SOLID", "PORE"], surfaces, vec![tree, pore]),
                 }
             }

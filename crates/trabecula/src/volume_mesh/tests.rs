@@ -12,14 +12,14 @@ fn built(region: &str, cell: &str, part: &str) -> crate::design::Built {
     Design::from_toml(&text).and_then(|d| d.build(&NoFiles)).expect("a design")
 }
 
-fn made(region: &str, options: &Options) -> Made {
+fn made(region: &str, options: &Options) -> MeshedVolume {
     built(region, "gyroid", "sheet").volume_mesh(options, &Silent).expect("a mesh")
 }
 
 const BOX: &str = "box = { min = [0, 0, 0], max = [4, 4, 4] }";
 
 fn options(edge: f64) -> Options {
-    Options { edge, of: Of::Solid, order: 1, periodic: false, largest: false }
+    Options { edge, of: VolumeTarget::Solid, order: 1, periodic: false, largest: false }
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn nodes_on_curved_surfaces_of_quadratic_meshes_lie_on_them() {
 #[test]
 fn domains_fill_the_region() {
     for (cell, part, names) in [("gyroid", "sheet", 3), ("primitive", "lower", 2)] {
-        let all = Options { of: Of::All, ..options(0.3) };
+        let all = Options { of: VolumeTarget::All, ..options(0.3) };
         let mesh = built(BOX, cell, part).volume_mesh(&all, &Silent).expect("a mesh").mesh;
         // Sums of a hundred thousand volumes.
         assert!((mesh.volume() - 64.0).abs() < 1e-10 && mesh.domains.len() == names);

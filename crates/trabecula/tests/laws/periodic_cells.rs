@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use geometry::fe_mesh::FeMesh;
 use geometry::progress::Silent;
 use trabecula::design::{Design, NoFiles};
-use trabecula::volume_mesh::{Of, Options};
+use trabecula::volume_mesh::{Options, VolumeTarget};
 
 use crate::common::{Random, campaign, cases};
 
@@ -22,7 +22,7 @@ struct Shifted {
 
 impl Shifted {
     /// The law of its mesh with this edge of the background.
-    fn holds(&self, edge: f64, of: Of, order: u8) {
+    fn holds(&self, edge: f64, of: VolumeTarget, order: u8) {
         let Shifted { cell, part, size, offset, fraction } = self;
         let text = format!(
             "schema = 1\nregion.box.size = {size:?}\n[lattice.a]\ncell = \"{cell}\"\npart = \"{part}\"\n\
@@ -78,16 +78,16 @@ fn planes_match(mesh: &FeMesh, what: &str) {
 fn opposite_planes_of_shifted_cells_match_where_the_surface_nearly_touches_them() {
     let offset = [1.207604827943229, -1.3018887354238862, 1.4865410967506256];
     let iwp = Shifted { cell: "iwp", part: "upper", size: [3.16, 4.21, 3.75], offset, fraction: 0.4366840152632988 };
-    iwp.holds(4.21 / 14.0, Of::Solid, 1);
-    iwp.holds(4.21 / 12.0, Of::Solid, 1);
+    iwp.holds(4.21 / 14.0, VolumeTarget::Solid, 1);
+    iwp.holds(4.21 / 12.0, VolumeTarget::Solid, 1);
     let offset = [-0.3063793105609758, -1.5503876666106309, 1.8330657814633695];
     let frd = Shifted { cell: "frd", part: "lower", size: [3.18, 4.26, 4.96], offset, fraction: 0.26284564220194856 };
-    frd.holds(4.96 / 12.0, Of::Pore, 2);
+    frd.holds(4.96 / 12.0, VolumeTarget::Pore, 2);
     // The last has walls that run along a plane, which takes half a minute.
     let sheets = [([3.58, 3.49, 0.07], 12.0), ([1.74, 3.9, 3.59], 24.0), ([2.71, 0.24, 2.22], 24.0)];
     for (offset, edges) in sheets.into_iter().take(if campaign() { 3 } else { 2 }) {
         let gyroid = Shifted { cell: "gyroid", part: "sheet", size: [4.0; 3], offset, fraction: 0.3 };
-        gyroid.holds(4.0 / edges, Of::Solid, 1);
+        gyroid.holds(4.0 / edges, VolumeTarget::Solid, 1);
     }
 }
 
@@ -100,7 +100,11 @@ fn opposite_planes_of_shifted_cells_match() {
         let offset = [0; 3].map(|_| some.between(-2.0, 2.0));
         let size = [0; 3].map(|_| some.between(3.5, 4.5));
         let fraction = some.between(0.2, 0.6);
-        let of = if part == "sheet" { Of::Solid } else { [Of::Solid, Of::Pore][some.below(2)] };
+        let of = if part == "sheet" {
+            VolumeTarget::Solid
+        } else {
+            [VolumeTarget::Solid, VolumeTarget::Pore][some.below(2)]
+        };
         let edges = some.between(10.0, 16.0);
         let shortest = size.iter().fold(f64::INFINITY, |m, s| s.min(m));
         Shifted { cell, part, size, offset, fraction }.holds(shortest / edges, of, 1 + (i % 2) as u8);

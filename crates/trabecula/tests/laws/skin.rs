@@ -14,7 +14,9 @@ use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade, Linear};
 use trabecula::implicit::Implicit;
-use trabecula::region::{Cut, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
+use trabecula::region::{
+    Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, OpenSurface, Region, Union,
+};
 use trabecula::skin::{outside, skin};
 use trabecula::solid::Solid;
 
@@ -58,8 +60,8 @@ fn half(point: Vec3, normal: Vec3) -> HalfSpace {
     HalfSpace::new(point, normal).expect("half-space")
 }
 
-fn cuts(planes: &[HalfSpace]) -> Vec<Cut> {
-    planes.iter().map(|p| Cut::Plane(*p)).collect()
+fn cuts(planes: &[HalfSpace]) -> Vec<OpenSurface> {
+    planes.iter().map(|p| OpenSurface::Plane(*p)).collect()
 }
 
 fn zone(region: &Region) -> CsgSolid {
@@ -355,7 +357,7 @@ fn open_meshes_keep_their_bounds_and_blocks() {
     let s = surface(&Solid::new(region, None, 1.0), 0.9, &Silent).expect("surface");
     let region: Region = Arc::new(MeshRegion::new(s.mesh, Repair::Refuse).expect("mesh"));
     let cuts = [half([0.0, 0.0, 2.0], [0.0, 0.0, 1.0])];
-    let open = region.opened(&cuts.map(Cut::Plane), &mut [false]).expect("a flat face");
+    let open = region.opened(&cuts.map(OpenSurface::Plane), &mut [false]).expect("a flat face");
     let axes: Vec<f64> = (0..40).map(|i| -1.0 + 0.153 * f64::from(i)).collect();
     let block = trabecula::field::Block { axes: [&axes, &axes[..30], &axes[3..35]] };
     let mut filled = vec![0f32; block.len()];

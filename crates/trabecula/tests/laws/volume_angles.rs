@@ -5,7 +5,7 @@ use std::sync::Arc;
 use geometry::progress::Silent;
 use geometry::tetmesh::volume;
 use trabecula::design::{Built, Design, NoFiles};
-use trabecula::volume_mesh::{Made, Of, Options};
+use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
 
 use crate::common::{Random, cases};
 
@@ -26,8 +26,8 @@ fn built(text: &str) -> Built {
     Design::from_toml(text).and_then(|d| d.build(&NoFiles)).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-fn made(design: &Built, edge: f64, order: u8) -> Made {
-    let options = Options { edge, of: Of::Solid, order, periodic: false, largest: false };
+fn made(design: &Built, edge: f64, order: u8) -> MeshedVolume {
+    let options = Options { edge, of: VolumeTarget::Solid, order, periodic: false, largest: false };
     design.volume_mesh(&options, &Silent).expect("a mesh")
 }
 
@@ -135,12 +135,13 @@ fn creases_between_beams_are_followed() {
 }
 
 /// A periodic cell of 4 mm with this number of edges of the background along it.
-fn cell(cell: &str, part: &str, fraction: f64, edges: u32, order: u8) -> Made {
+fn cell(cell: &str, part: &str, fraction: f64, edges: u32, order: u8) -> MeshedVolume {
     let text = format!(
         "schema = 1\nregion.box.size = [4, 4, 4]\n[lattice.a]\ncell = \"{cell}\"\npart = \"{part}\"\n\
          map.affine.wavelength = 4\nlevel.fraction = {fraction}\n"
     );
-    let options = Options { edge: 4.0 / f64::from(edges), of: Of::Solid, order, periodic: true, largest: false };
+    let options =
+        Options { edge: 4.0 / f64::from(edges), of: VolumeTarget::Solid, order, periodic: true, largest: false };
     built(&text).volume_mesh(&options, &Silent).expect("a mesh")
 }
 

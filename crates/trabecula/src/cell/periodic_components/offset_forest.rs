@@ -17,7 +17,7 @@ fn minus(a: Int3, b: Int3) -> Int3 {
 }
 
 /// The effect of an edge between two elements.
-pub(in crate::cell) enum Joined {
+pub(in crate::cell) enum UnionOutcome {
     /// They were connected in R³ already.
     Same,
     /// A component became connected with a translate of itself that was none of its translations.
@@ -123,14 +123,14 @@ impl Forest {
     }
 
     /// Joins `a` with `b` moved by `wrap` periods.
-    pub(in crate::cell) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> Joined {
+    pub(in crate::cell) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> UnionOutcome {
         let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
         // The period of the root of b relative to the root of a.
         let gap = minus(plus(ga, wrap), gb);
         if ra == rb {
             let grew = self.translations[ra as usize].insert(gap);
             let component = self.elder[ra as usize];
-            return if grew { Joined::Loop { component, shift: gap } } else { Joined::Same };
+            return if grew { UnionOutcome::Loop { component, shift: gap } } else { UnionOutcome::Same };
         }
         let (ea, eb) = (self.elder[ra as usize], self.elder[rb as usize]);
         let shift = minus(plus(gap, self.find(eb).1), self.find(ea).1);
@@ -144,7 +144,7 @@ impl Forest {
         self.translations[keep as usize].absorb(&translations);
         self.parent[lose as usize] = keep;
         self.shift[lose as usize] = gap;
-        Joined::Merged { components, shift }
+        UnionOutcome::Merged { components, shift }
     }
 }
 
@@ -158,12 +158,12 @@ mod tests {
         let mut f = Forest::new(4);
         (0..4).for_each(|i| f.insert(i));
         for i in 0..3 {
-            assert!(matches!(f.join(i, i + 1, [0; 3]), Joined::Merged { components: [0, _], .. }));
+            assert!(matches!(f.join(i, i + 1, [0; 3]), UnionOutcome::Merged { components: [0, _], .. }));
         }
         assert!(f.together(0, 3, [0; 3]) && !f.together(0, 3, [1, 0, 0]));
-        assert!(matches!(f.join(3, 0, [1, 0, 0]), Joined::Loop { component: 0, shift: [1, 0, 0] }));
+        assert!(matches!(f.join(3, 0, [1, 0, 0]), UnionOutcome::Loop { component: 0, shift: [1, 0, 0] }));
         assert!(f.together(0, 3, [-5, 0, 0]) && !f.together(0, 3, [0, 1, 0]));
-        assert!(matches!(f.join(2, 1, [2, 0, 0]), Joined::Same));
+        assert!(matches!(f.join(2, 1, [2, 0, 0]), UnionOutcome::Same));
     }
 
     #[test]
@@ -174,7 +174,7 @@ mod tests {
         f.join(3, 2, [0, 1, 0]);
         // 1 meets 3 across z: 0 at the origin, 1 at x, 3 at x + z, 2 at x + y + z.
         match f.join(1, 3, [0, 0, 1]) {
-            Joined::Merged { components, shift } => assert_eq!((components, shift), ([2, 0], [-1, -1, -1])),
+            UnionOutcome::Merged { components, shift } => assert_eq!((components, shift), ([2, 0], [-1, -1, -1])),
             _ => panic!("two components become one"),
         }
         assert!(f.together(0, 2, [1, 1, 1]) && f.together(2, 0, [-1, -1, -1]));

@@ -28,9 +28,9 @@ const TRIALS: usize = 100;
 /// Relative width of an interval in which a radius is known: the volume is known to 1e-10.
 const WIDTH: f64 = 1e-12;
 
-/// What is found in the search for a radius.
+/// The largest radius that is possible, and the fraction there.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct RadiusLimit {
     radius: f64,
     fraction: f64,
 }
@@ -42,7 +42,7 @@ fn solve(
     start: f64,
     near: f64,
     value: impl Fn(f64) -> Result<Option<f64>, Fault>,
-) -> Result<Result<f64, Found>, Fault> {
+) -> Result<Result<f64, RadiusLimit>, Fault> {
     let (mut low, mut high, mut limit) = ([0.0, -asked], None, f64::INFINITY);
     let (mut x, mut last) = (start, None);
     for _ in 0..TRIALS {
@@ -68,7 +68,7 @@ fn solve(
     let Some(high) = high else {
         return match (low[0] > 0.0, last) {
             (false, Some(fault)) => Err(fault),
-            _ => Ok(Err(Found { radius: low[0], fraction: low[1] + asked })),
+            _ => Ok(Err(RadiusLimit { radius: low[0], fraction: low[1] + asked })),
         };
     };
     let mut search = FalsePosition::new(Bracket { below: low, above: high });
@@ -78,7 +78,7 @@ fn solve(
             break;
         }
         let [radius, off] = bracket.below;
-        let Some(v) = value(x)? else { return Ok(Err(Found { radius, fraction: off + asked })) };
+        let Some(v) = value(x)? else { return Ok(Err(RadiusLimit { radius, fraction: off + asked })) };
         if (v - asked).abs() <= near {
             return Ok(Ok(x));
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{GradeSpec, MapKind};
-use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table, Unit};
+use crate::kind::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor, Table, Unit};
 use ::beams::quador::Fillet;
 
 /// Graphs of beams, by name.
@@ -12,10 +12,10 @@ use ::beams::quador::Fillet;
 pub struct BeamsSpecs(pub BTreeMap<String, BeamsSpec>);
 
 /// Explains that a name comes before the keys of beams.
-fn named_first(at: &At) -> Result<(), DesignError> {
+fn named_first(at: &NodeCursor) -> Result<(), DesignError> {
     let keys = BeamsSpec::keys();
     // Beams may be called as one of their keys is: then they say what they are made of.
-    let named = |at: &At| {
+    let named = |at: &NodeCursor| {
         let graphs = ["cell", "nodes", "struts", "path", "pattern"];
         at.entries("beams").is_ok_and(|all| all.iter().any(|e| graphs.contains(&e.0)))
     };
@@ -241,7 +241,7 @@ impl Kind for NodeId {
         i32::fits(node)
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         i32::read(at).map(NodeId)
     }
 
@@ -295,7 +295,7 @@ impl Kind for PatternStrut {
         Vec::<i32>::fits(node)
     }
 
-    fn read(at: &At) -> Result<Self, DesignError> {
+    fn read(at: &NodeCursor) -> Result<Self, DesignError> {
         let items = at.list(&Self::expected())?;
         if !(2..=5).contains(&items.len()) {
             let found = geometry::fault::counted(items.len(), "value");
@@ -401,7 +401,7 @@ impl From<FilletSpec> for Fillet {
 }
 
 /// Explains what a number alone lacks.
-fn unnamed(at: &At) -> Result<(), DesignError> {
+fn unnamed(at: &NodeCursor) -> Result<(), DesignError> {
     match at.is_number() {
         true => {
             Err(at

@@ -1,6 +1,6 @@
 use super::*;
 use crate::region::tests::check_shape;
-use crate::region::{CadMesh, Cut, FaceLabel, HalfSpace, MeshRegion};
+use crate::region::{CadMesh, FaceLabel, HalfSpace, MeshRegion, OpenSurface};
 use geometry::math::{add, sub};
 use geometry::mesh::Mesh;
 use geometry::random::random;
@@ -74,7 +74,7 @@ fn a_part_without_a_face_is_one_without_its_plane() {
     let by_plane = part.clone().opened(&[plane.into()], &mut [false]).unwrap();
     let mut found = [false; 2];
     // The second name is another's, so that both are missing.
-    let cuts = [Cut::Faces(set(&part, &["INLET"]).unwrap()), Cut::Faces(set(&part, &["5"]).unwrap())];
+    let cuts = [OpenSurface::Faces(set(&part, &["INLET"]).unwrap()), OpenSurface::Faces(set(&part, &["5"]).unwrap())];
     let by_name = part.clone().opened(&cuts, &mut found).unwrap();
     assert_eq!(found, [true, false]);
     let mut seed = 3;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
-use crate::region::{Cut, HalfSpace, Offset, Region, Shape, halving};
+use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, halving};
 use geometry::distance::UNKNOWN;
 use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
@@ -33,11 +33,13 @@ struct OpenMesh {
 }
 
 /// The mesh without its triangles on `cuts`; `None` if there are none.
-pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[Cut], found: &mut [bool]) -> Option<Region> {
+pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[OpenSurface], found: &mut [bool]) -> Option<Region> {
     let off = OFF * norm(whole.bounds.size());
-    let on = |f: &Triangle, c: &Cut| match c {
-        Cut::Plane(c) => dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off),
-        Cut::Faces(set) => set.hold(f, off),
+    let on = |f: &Triangle, c: &OpenSurface| match c {
+        OpenSurface::Plane(c) => {
+            dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off)
+        }
+        OpenSurface::Faces(set) => set.hold(f, off),
     };
     let triangles = whole.distance.triangles();
     let mut rest = Vec::with_capacity(triangles.len());
@@ -47,7 +49,7 @@ pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[Cut], found: &mut [bool]) -
         match cuts.iter().position(|c| on(f, c)) {
             Some(i) => {
                 used[i] = true;
-                *missing = matches!(cuts[i], Cut::Faces(_));
+                *missing = matches!(cuts[i], OpenSurface::Faces(_));
             }
             None => rest.push(*f),
         }
@@ -56,8 +58,8 @@ pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[Cut], found: &mut [bool]) -
         return None;
     }
     found.iter_mut().zip(&used).for_each(|(f, used)| *f |= used);
-    let plane = |(c, used): (&Cut, bool)| match c {
-        Cut::Plane(plane) if used => Some(*plane),
+    let plane = |(c, used): (&OpenSurface, bool)| match c {
+        OpenSurface::Plane(plane) if used => Some(*plane),
         _ => None,
     };
     let planes = cuts.iter().zip(used).filter_map(plane).collect();

@@ -15,8 +15,8 @@ const SAGITTA: f64 = 0.12;
 /// Tetrahedra are not made smaller for curvature than this fraction of the size asked for.
 const LEAST: f64 = 0.25;
 
-/// What decides the sizes of tetrahedra.
-pub(super) struct Needs<'a> {
+/// What decides whether a tetrahedron is divided.
+pub(super) struct RefinementCriterion<'a> {
     pub region: &'a Region,
     /// The region's own surfaces, then the groups of patches of those that are meshes.
     pub surfaces: &'a [Surface],
@@ -24,7 +24,7 @@ pub(super) struct Needs<'a> {
     pub size: &'a Grade,
 }
 
-impl Needs<'_> {
+impl RefinementCriterion<'_> {
     /// Whether a tetrahedron that may intersect the region is larger than requested.
     ///
     /// **Errors**: a size that is not positive.

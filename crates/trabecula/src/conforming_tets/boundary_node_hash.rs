@@ -11,18 +11,18 @@ use rayon::prelude::*;
 /// The most pairs of triangles that cross that are counted.
 const COUNTED: usize = 1000;
 
-/// A cell of `NearSheets`.
+/// A cell of `BoundaryNodeHash`.
 type Cell = [i64; 3];
 
-/// The nodes of the boundary by place.
-pub(super) struct NearSheets {
+/// The nodes of the boundary by the cell of a grid that they are in.
+pub(super) struct BoundaryNodeHash {
     /// Edge of the cells (mm): that of the longest edge of the boundary.
     pub edge: f64,
     nodes: FxHashMap<Cell, Vec<u32>>,
 }
 
-impl NearSheets {
-    pub fn new(shaping: &Shaping) -> NearSheets {
+impl BoundaryNodeHash {
+    pub fn new(shaping: &Shaping) -> BoundaryNodeHash {
         let length = |i: usize| {
             let p = shaping.corners(i as u32);
             let on = shaping.tets[i].map(|n| shaping.on[n as usize] != 0);
@@ -31,11 +31,11 @@ impl NearSheets {
         };
         let there = |i: &usize| shaping.tets[*i] != GONE;
         let edge = (0..shaping.tets.len()).into_par_iter().filter(there).map(length).reduce(|| 0.0, f64::max);
-        let mut sheets = NearSheets { edge, nodes: FxHashMap::default() };
+        let mut node_hash = BoundaryNodeHash { edge, nodes: FxHashMap::default() };
         for n in (0..shaping.nodes.len()).filter(|n| shaping.on[*n] != 0 && !shaping.around[*n].is_empty()) {
-            sheets.nodes.entry(sheets.cell(shaping.nodes[n])).or_default().push(n as u32);
+            node_hash.nodes.entry(node_hash.cell(shaping.nodes[n])).or_default().push(n as u32);
         }
-        sheets
+        node_hash
     }
 
     /// The cell of a position.

@@ -8,20 +8,20 @@ use geometry::fault::{counted, nearest, number};
 
 /// A node and the path that leads to it.
 #[derive(Clone)]
-pub(crate) struct At<'a> {
+pub(crate) struct NodeCursor<'a> {
     pub node: &'a Node,
     pub path: String,
     line: Option<usize>,
 }
 
-impl<'a> At<'a> {
+impl<'a> NodeCursor<'a> {
     pub fn root(node: &'a Node) -> Self {
-        At { node, path: String::new(), line: None }
+        NodeCursor { node, path: String::new(), line: None }
     }
 
     /// A node that stands at `path` of a design, outside any file.
     pub fn alone(node: &'a Node, path: &str) -> Self {
-        At { path: path.into(), ..At::root(node) }
+        NodeCursor { path: path.into(), ..NodeCursor::root(node) }
     }
 
     fn below(&self, key: &str) -> String {
@@ -55,11 +55,14 @@ impl<'a> At<'a> {
     }
 
     /// The entries of a table with any keys.
-    pub fn entries(&self, what: &str) -> Result<Vec<(&'a str, At<'a>)>, DesignError> {
+    pub fn entries(&self, what: &str) -> Result<Vec<(&'a str, NodeCursor<'a>)>, DesignError> {
         let Value::Table(entries) = &self.node.value else {
             return Err(self.expected(what));
         };
-        Ok(entries.iter().map(|(k, line, node)| (k.as_str(), At { node, path: self.below(k), line: *line })).collect())
+        Ok(entries
+            .iter()
+            .map(|(k, line, node)| (k.as_str(), NodeCursor { node, path: self.below(k), line: *line }))
+            .collect())
     }
 
     /// The keys of a table, all among `keys`; `what` is what was expected.
@@ -84,7 +87,7 @@ impl<'a> At<'a> {
     }
 
     /// The kind that stands here: its key and where its value is. A word is its own value.
-    pub fn choice(&self, noun: &str, choices: &[Choice]) -> Result<(&'static str, At<'a>), DesignError> {
+    pub fn choice(&self, noun: &str, choices: &[Choice]) -> Result<(&'static str, NodeCursor<'a>), DesignError> {
         let any = |word: bool| choices.iter().filter(move |c| c.word == word).map(|c| c.key).collect::<Vec<Key>>();
         let known = |name: &str| choices.iter().find(|c| c.key.name == name);
         let all: Vec<Key> = choices.iter().map(|c| c.key).collect();
@@ -181,11 +184,12 @@ impl<'a> At<'a> {
         }
     }
 
-    pub fn list(&self, what: &str) -> Result<Vec<At<'a>>, DesignError> {
+    pub fn list(&self, what: &str) -> Result<Vec<NodeCursor<'a>>, DesignError> {
         let Value::List(items) = &self.node.value else {
             return Err(self.expected(what));
         };
-        let item = |(i, node): (usize, &'a Node)| At { node, path: format!("{}[{i}]", self.path), line: node.line };
+        let item =
+            |(i, node): (usize, &'a Node)| NodeCursor { node, path: format!("{}[{i}]", self.path), line: node.line };
         Ok(items.iter().enumerate().map(item).collect())
     }
 
@@ -213,16 +217,16 @@ impl<'a> At<'a> {
 
 /// A table whose keys are known to be allowed.
 pub(crate) struct Fields<'a> {
-    pub at: At<'a>,
-    entries: Vec<(&'a str, At<'a>)>,
+    pub at: NodeCursor<'a>,
+    entries: Vec<(&'a str, NodeCursor<'a>)>,
 }
 
 impl<'a> Fields<'a> {
-    pub fn get(&self, key: &str) -> Option<&At<'a>> {
+    pub fn get(&self, key: &str) -> Option<&NodeCursor<'a>> {
         self.entries.iter().find(|e| e.0 == key).map(|e| &e.1)
     }
 
-    pub fn need(&self, key: &str, meaning: &str) -> Result<&At<'a>, DesignError> {
+    pub fn need(&self, key: &str, meaning: &str) -> Result<&NodeCursor<'a>, DesignError> {
         self.get(key)
             .ok_or_else(|| DesignError { found: None, ..self.at.error(format!("\"{key}\" is missing: {meaning}")) })
     }
@@ -240,7 +244,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The one of `keys` that is given.
-    pub fn one_of(&self, noun: &str, keys: &[Key]) -> Result<(&'static str, At<'a>), DesignError> {
+    pub fn one_of(&self, noun: &str, keys: &[Key]) -> Result<(&'static str, NodeCursor<'a>), DesignError> {
         let names = || keys.iter().map(|k| k.name).collect::<Vec<_>>().join(", ");
         let mut given = self.entries.iter().filter_map(|(name, at)| Some((keys.iter().find(|k| k.name == *name)?, at)));
         match (given.next(), given.next()) {
