@@ -228,17 +228,17 @@ fn whole(v: f64) -> i32 {
 }
 
 /// Where points lie: the first of the coefficients that count, and weights of derivatives up to an order along each axis.
-struct Spots<const D: usize> {
+struct SplineStencils<const D: usize> {
     first: [i32; LANES],
     /// By axis, derivative, coefficient, point.
     weights: [[[[f64; LANES]; 4]; D]; 3],
 }
 
-impl<const D: usize> Spots<D> {
+impl<const D: usize> SplineStencils<D> {
     #[inline(always)]
     fn new(spline: &Spline, u: &[Vec3]) -> Self {
         let steps = [1, spline.stride[0] as i32, spline.stride[1] as i32];
-        let mut spots = Spots { first: [0; LANES], weights: [[[[0.0; LANES]; 4]; D]; 3] };
+        let mut stencils = SplineStencils { first: [0; LANES], weights: [[[[0.0; LANES]; 4]; D]; 3] };
         for a in 0..3 {
             let n = spline.shape[a] as f64;
             let mut at = [0.0; LANES];
@@ -249,17 +249,17 @@ impl<const D: usize> Spots<D> {
                 // A phase just below a whole number may round up to it.
                 let s = (at[l] - at[l].floor()) * n;
                 let i = s.min(n - 1.0).floor();
-                spots.first[l] += whole(i) * steps[a];
+                stencils.first[l] += whole(i) * steps[a];
                 let t = s - i;
                 let of = [weights(t), slopes(t), bends(t)];
                 for d in 0..D {
                     for k in 0..4 {
-                        spots.weights[a][d][k][l] = of[d][k];
+                        stencils.weights[a][d][k][l] = of[d][k];
                     }
                 }
             }
         }
-        spots
+        stencils
     }
 
     /// The weights along an axis at one point.
@@ -292,10 +292,10 @@ impl<const D: usize> Spots<D> {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn values(spline: &Spline, u: &[Vec3], out: &mut [f64]) {
     for (u, out) in u.chunks(LANES).zip(out.chunks_mut(LANES)) {
-        let spots = Spots::<1>::new(spline, u);
-        let sums = spots.sums(spline, u.len(), [(0, 0)]);
+        let stencils = SplineStencils::<1>::new(spline, u);
+        let sums = stencils.sums(spline, u.len(), [(0, 0)]);
         for (l, o) in out.iter_mut().enumerate() {
-            *o = along(&sums[l][0], &spots.of(0, l)[0]);
+            *o = along(&sums[l][0], &stencils.of(0, l)[0]);
         }
     }
 }
@@ -305,10 +305,10 @@ fn fill_gradients(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &m
     let n = spline.shape.map(|n| n as f64);
     let batches = u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES));
     for ((u, values), gradients) in batches {
-        let spots = Spots::<2>::new(spline, u);
-        let sums = spots.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1)]);
+        let stencils = SplineStencils::<2>::new(spline, u);
+        let sums = stencils.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1)]);
         for (l, (o, g)) in values.iter_mut().zip(gradients).enumerate() {
-            let ([v, vy, vz], [x, dx]) = (&sums[l], spots.of(0, l));
+            let ([v, vy, vz], [x, dx]) = (&sums[l], stencils.of(0, l));
             *o = along(v, &x);
             *g = [along(v, &dx) * n[0], along(vy, &x) * n[1], along(vz, &x) * n[2]];
         }
@@ -321,10 +321,10 @@ fn fill_second(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut 
     let batches =
         u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES).zip(second.chunks_mut(LANES)));
     for ((u, values), (gradients, second)) in batches {
-        let spots = Spots::<3>::new(spline, u);
-        let sums = spots.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]);
+        let stencils = SplineStencils::<3>::new(spline, u);
+        let sums = stencils.sums(spline, u.len(), [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]);
         for (l, ((o, g), h)) in values.iter_mut().zip(gradients).zip(second).enumerate() {
-            let ([v, vy, vz, vyy, vyz, vzz], [x, dx, bx]) = (&sums[l], spots.of(0, l));
+            let ([v, vy, vz, vyy, vyz, vzz], [x, dx, bx]) = (&sums[l], stencils.of(0, l));
             *o = along(v, &x);
             *g = [along(v, &dx) * nx, along(vy, &x) * ny, along(vz, &x) * nz];
             let [xy, xz, yz] = [along(vy, &dx) * nx * ny, along(vz, &dx) * nx * nz, along(vyz, &x) * ny * nz];

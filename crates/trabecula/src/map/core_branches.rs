@@ -8,15 +8,21 @@ use rayon::prelude::*;
 use super::branch_cuts::{BranchCuts, Move};
 use super::cube_turns::nearest_turn;
 use super::phase_request::PhaseRequest;
-use super::phase_target::{Laid, Target};
-use super::singular_lines::Alike;
+use super::phase_target::{SolveDomain, Target};
+use super::singular_lines::FrameEquivalence;
 use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, product, scale, transpose};
 
 /// The rotations of the axes at the nodes after which they agree from node to node where no cut is, first of all at the nodes that
 /// `count`.
-pub(super) fn labels(laid: &Laid, target: &Target, count: &[bool], cuts: &BranchCuts, alike: &Alike) -> Vec<Mat3> {
-    let (grid, frames, turns) = (&laid.grid, &target.frames, alike.turns());
+pub(super) fn labels(
+    domain: &SolveDomain,
+    target: &Target,
+    count: &[bool],
+    cuts: &BranchCuts,
+    alike: &FrameEquivalence,
+) -> Vec<Mat3> {
+    let (grid, frames, turns) = (&domain.grid, &target.frames, alike.turns());
     let mut labels: Vec<Option<Mat3>> = vec![None; grid.len()];
     for inner in [true, false] {
         let mut queue: VecDeque<usize> = (0..grid.len()).filter(|n| labels[*n].is_some()).collect();
@@ -52,13 +58,13 @@ struct Turned {
 /// # Errors
 /// Axes that do not agree where no cut is, or differ along a cut; rotations about several axes of the cell, or by a third of a turn.
 pub(super) fn rotations(
-    laid: &Laid,
+    domain: &SolveDomain,
     target: &Target,
     count: &[bool],
     cuts: &mut BranchCuts,
     wanted: &PhaseRequest,
 ) -> Result<(), Fault> {
-    let (grid, frames, turns) = (&laid.grid, &target.frames, wanted.alike().turns());
+    let (grid, frames, turns) = (&domain.grid, &target.frames, wanted.alike().turns());
     let edges = (0..grid.len()).into_par_iter().filter(|n| count[*n]).flat_map_iter(|n| {
         let above = grid.neighbours(n).filter(move |m| *m > n && count[*m]);
         let turns = &turns;
@@ -92,7 +98,7 @@ pub(super) fn rotations(
                        core out, and keep the lines out of the part";
         return Err(Fault::new("core", message));
     }
-    check_lengths(laid, target, &all)?;
+    check_lengths(domain, target, &all)?;
     all.into_iter().enumerate().for_each(|(line, turn)| cuts.set(line, Move { turn, by: [0.0; 3] }));
     Ok(())
 }
@@ -103,12 +109,12 @@ fn common_axis(turns: &[Mat3]) -> Option<usize> {
 }
 
 /// Refuses cells of unequal edges where axes change places.
-fn check_lengths(laid: &Laid, target: &Target, turns: &[Mat3]) -> Result<(), Fault> {
+fn check_lengths(domain: &SolveDomain, target: &Target, turns: &[Mat3]) -> Result<(), Fault> {
     let swapped = |t: &Mat3| {
         (0..3).find(|a| t[*a][*a] == 0.0).map(|a| (a, (0..3).fold(a, |m, b| if t[a][b] != 0.0 { b } else { m })))
     };
     let Some((a, b)) = turns.iter().find_map(swapped) else { return Ok(()) };
-    let unequal = laid.given.iter().any(|w| (w[a] / w[b] - 1.0).abs() > 1e-9);
+    let unequal = domain.given.iter().any(|w| (w[a] / w[b] - 1.0).abs() > 1e-9);
     if target.lengths.is_some() || unequal {
         let message = "axes come back turned by a quarter round a singular line, and cells have different edges along them: give one \
                        wavelength, or leave core out";

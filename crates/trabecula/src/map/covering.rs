@@ -6,14 +6,14 @@ use super::core_branches::{labels, rotations};
 use super::core_cover::{CoreFill, Covering};
 use super::cut_cells::{self, CutCells};
 use super::edge_squares::weights;
-use super::judged::{Judged, fold_at_node, fold_between};
 use super::pace;
 use super::periods::{least, nearest};
 use super::phase_candidate::Candidate;
-use super::phase_request::{PhaseRequest, Settings};
-use super::phase_target::{LEAST_ROOT, Laid, Target, wavelengths};
-use super::singular_lines::{Alike, SingularLine, singular_lines};
+use super::phase_request::{PhaseRequest, SolverOptions};
+use super::phase_target::{LEAST_ROOT, SolveDomain, Target, wavelengths};
+use super::singular_lines::{FrameEquivalence, SingularLine, singular_lines};
 use super::solution::Solution;
+use super::solution_quality::{SolutionQuality, fold_at_node, fold_between};
 use super::winding::Winding;
 use crate::field::Field;
 use crate::region::{OutsideTube, Tube, smoothed};
@@ -44,7 +44,7 @@ pub struct Cores {
 
 /// A map of one value but for the branches at covered lines.
 pub(super) struct Covered {
-    pub laid: Laid,
+    pub domain: SolveDomain,
     pub found: Candidate,
     pub lines: Vec<SingularLine>,
     pub cores: Cores,
@@ -56,7 +56,7 @@ impl Covering {
         &self,
         bounds: &Aabb,
         wanted: &PhaseRequest,
-        settings: &Settings,
+        settings: &SolverOptions,
         (coarse, lines): (f64, &[SingularLine]),
     ) -> Result<Option<Covered>, Fault> {
         refuse(wanted)?;
@@ -64,16 +64,18 @@ impl Covering {
         let step = settings.step.unwrap_or(coarse).min(radius / FINE);
         let chosen = pace::choose(bounds, wanted, Some(step), settings.region)
             .map_err(|f| if f.at == "step" { too_fine(radius) } else { f })?;
-        let laid = Laid::over(bounds, chosen.grid.padded(PADDING), wanted, settings.region)?;
+        let domain = SolveDomain::over(bounds, chosen.grid.padded(PADDING), wanted, settings.region)?;
         checkpoint();
-        let mut target = Target::new(&laid, wanted, None)?;
+        let mut target = Target::new(&domain, wanted, None)?;
         checkpoint();
-        let least_length = 0.5 * shortest(&laid);
-        let lines = singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least_length, radius);
-        let pieces =
-            lines.iter().map(|l| Ok((path(l, &laid, wanted, settings)?, l.turn))).collect::<Result<Vec<_>, Fault>>()?;
+        let least_length = 0.5 * shortest(&domain);
+        let lines = singular_lines(&domain.grid, &target.frames, &domain.inside, &wanted.alike(), least_length, radius);
+        let pieces = lines
+            .iter()
+            .map(|l| Ok((path(l, &domain, wanted, settings)?, l.turn)))
+            .collect::<Result<Vec<_>, Fault>>()?;
         let mut paths = joined(pieces);
-        paths.iter_mut().for_each(|p| lead_on(p, radius + END * laid.longest()));
+        paths.iter_mut().for_each(|p| lead_on(p, radius + END * domain.longest()));
         if paths.is_empty() {
             return Ok(None);
         }
@@ -85,22 +87,22 @@ impl Covering {
             );
             return Err(Fault::new("core", message));
         }
-        let mut cuts = BranchCuts::new(&laid.grid, &mut paths);
+        let mut cuts = BranchCuts::new(&domain.grid, &mut paths);
         let tube = Tube::new(&paths, radius);
         let outside: Vec<bool> =
-            (laid.nodes.iter().zip(&laid.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
+            (domain.nodes.iter().zip(&domain.inside)).map(|(p, i)| *i && tube.value(*p) > 0.0).collect();
         if !outside.contains(&true) {
             let message =
                 format!("{} mm; cores of this radius cover the whole part: give a smaller one", number(radius));
             return Err(Fault::new("core_radius", message));
         }
         let alike = wanted.alike();
-        let labels = labels(&laid, &target, &outside, &cuts, &alike);
-        target.relabel(&labels, &laid.given);
-        rotations(&laid, &target, &outside, &mut cuts, wanted)?;
+        let labels = labels(&domain, &target, &outside, &cuts, &alike);
+        target.relabel(&labels, &domain.given);
+        rotations(&domain, &target, &outside, &mut cuts, wanted)?;
         let cores = Cores { fill: self.fill, tube };
-        let found = found(Laid { inside: outside, ..laid }, wanted, settings, target, cuts, &cores)?;
-        Ok(Some(Covered { laid: found.0, found: found.1, lines, cores }))
+        let found = found(SolveDomain { inside: outside, ..domain }, wanted, settings, target, cuts, &cores)?;
+        Ok(Some(Covered { domain: found.0, found: found.1, lines, cores }))
     }
 
     /// The radius of cores, mm.
@@ -114,8 +116,8 @@ impl Covering {
     }
 }
 
-fn shortest(laid: &Laid) -> f64 {
-    laid.given.iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w))
+fn shortest(domain: &SolveDomain) -> f64 {
+    domain.given.iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w))
 }
 
 fn too_fine(radius: f64) -> Fault {
@@ -132,7 +134,7 @@ pub(super) fn refuse(wanted: &PhaseRequest) -> Result<(), Fault> {
         let message = format!("core covers singular lines here, and {why}; leave {key} or core out");
         Err(Fault::new(key, message))
     };
-    if matches!(wanted.alike(), Alike::Line) {
+    if matches!(wanted.alike(), FrameEquivalence::Line) {
         let message = "a direction alone comes back reversed round a line, and says nothing of the cell's other two axes there: core needs \
                        a stress or a frame; give one of these, or leave core out";
         return Err(Fault::new("core", message));
@@ -153,7 +155,12 @@ pub(super) fn refuse(wanted: &PhaseRequest) -> Result<(), Fault> {
 }
 
 /// A smooth polyline along a singular line, from surface to surface.
-fn path(line: &SingularLine, laid: &Laid, wanted: &PhaseRequest, settings: &Settings) -> Result<Vec<Vec3>, Fault> {
+fn path(
+    line: &SingularLine,
+    domain: &SolveDomain,
+    wanted: &PhaseRequest,
+    settings: &SolverOptions,
+) -> Result<Vec<Vec3>, Fault> {
     if line.is_closed() {
         let message = format!(
             "a singular line is closed, {}: core covers lines from surface to surface; {}, or leave core out",
@@ -162,11 +169,11 @@ fn path(line: &SingularLine, laid: &Laid, wanted: &PhaseRequest, settings: &Sett
         );
         return Err(Fault::new("core", message));
     }
-    let path = smoothed(&line.points, laid.longest());
-    let Aabb { min, max } = laid.bounds;
+    let path = smoothed(&line.points, domain.longest());
+    let Aabb { min, max } = domain.bounds;
     let box_depth = |p: Vec3| (0..3).map(|a| (min[a] - p[a]).max(p[a] - max[a])).fold(f64::NEG_INFINITY, f64::max);
     for p in [path[0], path[path.len() - 1]] {
-        if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * laid.longest() {
+        if settings.region.map_or_else(|| box_depth(p), |r| r.value(p)) < -END * domain.longest() {
             let message = format!(
                 "a singular line ends within the part at {}, where lines meet or directions are not clear: core covers lines from surface to \
                  surface; {}, or leave core out",
@@ -223,43 +230,43 @@ fn lead_on(line: &mut [Vec3], by: f64) {
 /// The map for the whole numbers with the least error that does not fold outside the cores, and the grid whose nodes in the cores do not
 /// count.
 fn found(
-    laid: Laid,
+    domain: SolveDomain,
     wanted: &PhaseRequest,
-    settings: &Settings,
+    settings: &SolverOptions,
     target: Target,
     mut cuts: BranchCuts,
     cores: &Cores,
-) -> Result<(Laid, Candidate), Fault> {
+) -> Result<(SolveDomain, Candidate), Fault> {
     let Cores { tube, .. } = cores;
-    let plain = || vec![1.0; laid.grid.len()];
-    let mut roots = target.roots(&laid, wanted)?.unwrap_or_else(plain);
-    for (root, p) in roots.iter_mut().zip(&laid.nodes) {
+    let plain = || vec![1.0; domain.grid.len()];
+    let mut roots = target.roots(&domain, wanted)?.unwrap_or_else(plain);
+    for (root, p) in roots.iter_mut().zip(&domain.nodes) {
         let near = (tube.from_lines(*p) / tube.radius).min(1.0).powi(2);
         *root = (*root * near).max(LEAST_ROOT);
     }
-    let edges = weights(laid.grid, &roots, None);
+    let edges = weights(domain.grid, &roots, None);
     let mean = target.mean(&roots);
     // Every other node is enough to find the numbers with the least error.
     let numbers = {
-        let (half, nodes) = laid.grid.halved();
+        let (half, nodes) = domain.grid.halved();
         let k = target.k.each_ref().map(|k| nodes.iter().map(|n| k[*n]).collect());
         let roots: Vec<f64> = nodes.iter().map(|n| roots[*n]).collect();
         Numbers::new(&half, &k, weights(half, &roots, None), &mut cuts.at(&nodes))
     };
     let asked = least(&numbers.form, numbers.free.len());
     let part = OutsideTube { region: settings.region, tube };
-    let mut problem = Branched::new(&laid.grid, &target.k, edges, &cuts);
+    let mut problem = Branched::new(&domain.grid, &target.k, edges, &cuts);
     let (mut first, mut steps) = (None, 0);
     for (_, given) in nearest(&numbers.form, &asked) {
         checkpoint();
         numbers.set(&given, &mut cuts);
         let (mut values, taken) = problem.phases(&cuts);
         steps = steps.max(taken);
-        anchor(&mut values, &laid, &cuts, &mean, &roots);
-        let (spline, branches) = cut_cells::through(laid.grid, &values, cuts.clone());
+        anchor(&mut values, &domain, &cuts, &mean, &roots);
+        let (spline, branches) = cut_cells::through(domain.grid, &values, cuts.clone());
         torn(&branches, &part, tube.radius, wanted)?;
         let solution = Solution { spline, winding: Winding::default(), branches: Some(branches) };
-        let fold = fold_at_node(&solution, &laid).or_else(|| fold_between(&solution, &laid.inside));
+        let fold = fold_at_node(&solution, &domain).or_else(|| fold_between(&solution, &domain.inside));
         if fold.is_none() || first.is_none() {
             first = Some(solution);
         }
@@ -268,16 +275,16 @@ fn found(
         }
     }
     let Some(solution) = first else { return Err(Fault::new("core", "no map was found")) };
-    let judged = Judged::of(&laid, wanted, Some(&part), &target, &solution)?;
-    Ok((laid, Candidate { target, weights: None, solution, periods: Vec::new(), mean, steps, judged }))
+    let quality = SolutionQuality::of(&domain, wanted, Some(&part), &target, &solution)?;
+    Ok((domain, Candidate { target, weights: None, solution, periods: Vec::new(), mean, steps, quality }))
 }
 
 /// Moves phases that no rotation fixes so that their mean is that of K̄ x, as where there are no lines.
-fn anchor(values: &mut [Vec3], laid: &Laid, cuts: &BranchCuts, mean: &Mat3, roots: &[f64]) {
+fn anchor(values: &mut [Vec3], domain: &SolveDomain, cuts: &BranchCuts, mean: &Mat3, roots: &[f64]) {
     let free = |a: &usize| (0..cuts.len()).all(|line| cuts.step(line).turn[*a] == IDENTITY[*a]);
     let whole: f64 = roots.iter().map(|r| r * r).sum();
     for a in (0..3).filter(free) {
-        let off = |n: usize| roots[n] * roots[n] * (values[n][a] - dot(mean[a], laid.nodes[n]));
+        let off = |n: usize| roots[n] * roots[n] * (values[n][a] - dot(mean[a], domain.nodes[n]));
         let off = (0..values.len()).map(off).sum::<f64>() / whole;
         values.iter_mut().for_each(|u| u[a] -= off);
     }

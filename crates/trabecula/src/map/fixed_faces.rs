@@ -5,7 +5,7 @@
 //! many cells lie between as is nearest to what there were.
 
 use super::integral::Problem;
-use super::phase_target::Laid;
+use super::phase_target::SolveDomain;
 use super::solution::Solution;
 use super::spline::Spline;
 use crate::field::Field;
@@ -53,7 +53,7 @@ struct Face {
 /// A region that holds no part of the surface; cells that do not lie along a normal; faces too near to each other for a whole cell.
 pub(super) fn fixed(
     problem: &Problem,
-    laid: &Laid,
+    domain: &SolveDomain,
     region: &dyn Field,
     fix: &[Region],
     shift: Vec3,
@@ -61,15 +61,15 @@ pub(super) fn fixed(
 ) -> Result<Solution, Fault> {
     let mut faces = Vec::new();
     for (i, of) in fix.iter().enumerate() {
-        faces.extend(faces_in(laid, region, &**of, i)?.into_iter().map(|nodes| face(nodes, laid, &solution, i)));
+        faces.extend(faces_in(domain, region, &**of, i)?.into_iter().map(|nodes| face(nodes, domain, &solution, i)));
     }
     let mut faces = faces.into_iter().collect::<Result<Vec<Face>, Fault>>()?;
     for face in &mut faces {
-        let sum: f64 = face.nodes.iter().map(|n| on_face(n, face.axis, laid, &solution, shift)).sum();
+        let sum: f64 = face.nodes.iter().map(|n| on_face(n, face.axis, domain, &solution, shift)).sum();
         face.mean = sum / face.nodes.len() as f64;
     }
     (0..3).for_each(|axis| number_faces(&mut faces, axis));
-    check_apart(&faces, laid)?;
+    check_apart(&faces, domain)?;
     let mut solution = solution;
     for _ in 0..PASSES {
         checkpoint();
@@ -78,7 +78,7 @@ pub(super) fn fixed(
             let (mut mass, mut off) = (vec![0.0; values.len()], vec![0.0; values.len()]);
             for face in faces.iter().filter(|f| f.axis == axis) {
                 for n in &face.nodes {
-                    (mass[n.node], off[n.node]) = (PULL, face.whole - on_face(n, axis, laid, &solution, shift));
+                    (mass[n.node], off[n.node]) = (PULL, face.whole - on_face(n, axis, domain, &solution, shift));
                 }
             }
             if mass.iter().any(|m| *m > 0.0) {
@@ -86,7 +86,7 @@ pub(super) fn fixed(
                 values.iter_mut().zip(change).for_each(|(v, d)| *v += d);
             }
         }
-        solution = Solution { spline: Spline::through(laid.grid, values), winding: solution.winding, branches: None };
+        solution = Solution { spline: Spline::through(domain.grid, values), winding: solution.winding, branches: None };
     }
     Ok(solution)
 }
@@ -102,7 +102,7 @@ fn number_faces(faces: &mut [Face], axis: usize) {
 }
 
 /// Refuses two sides of a wall between which there is less than half a cell: no whole cell can be there.
-fn check_apart(faces: &[Face], laid: &Laid) -> Result<(), Fault> {
+fn check_apart(faces: &[Face], domain: &SolveDomain) -> Result<(), Fault> {
     for (i, b) in faces.iter().enumerate() {
         let opposite =
             |a: &&Face| a.axis == b.axis && a.whole == b.whole && dot(a.nodes[0].normal, b.nodes[0].normal) < -SMOOTH;
@@ -111,9 +111,9 @@ fn check_apart(faces: &[Face], laid: &Laid) -> Result<(), Fault> {
                 "only {:.2} cells lie between the face at {} and that of fix[{}] at {}: no whole cell can be there. Use smaller cells, or fix \
                  one of them only",
                 (b.mean - a.mean).abs(),
-                position(laid.nodes[b.nodes[0].node]),
+                position(domain.nodes[b.nodes[0].node]),
                 a.index,
-                position(laid.nodes[a.nodes[0].node])
+                position(domain.nodes[a.nodes[0].node])
             );
             return Err(Fault::new(format!("fix[{}]", b.index), message));
         }
@@ -122,18 +122,18 @@ fn check_apart(faces: &[Face], laid: &Laid) -> Result<(), Fault> {
 }
 
 /// The phase on the face at the foot of a node.
-fn on_face(near: &Near, axis: usize, laid: &Laid, solution: &Solution, shift: Vec3) -> f64 {
-    let p = laid.nodes[near.node];
+fn on_face(near: &Near, axis: usize, domain: &SolveDomain, solution: &Solution, shift: Vec3) -> f64 {
+    let p = domain.nodes[near.node];
     let mut u = [[0.0; 3]];
     solution.phases(&[p], &mut u);
     u[0][axis] + shift[axis] - near.distance * dot(solution.jacobian(p)[axis], near.normal)
 }
 
 /// A face, with the axis whose phase changes most along its normal.
-fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Result<Face, Fault> {
+fn face(nodes: Vec<Near>, domain: &SolveDomain, solution: &Solution, index: usize) -> Result<Face, Fault> {
     let mut along = [0.0; 3];
     for n in &nodes {
-        let j = solution.jacobian(laid.nodes[n.node]);
+        let j = solution.jacobian(domain.nodes[n.node]);
         (0..3).for_each(|i| along[i] += dot(j[i], n.normal).abs() / norm(j[i]) / nodes.len() as f64);
     }
     let axis = (0..3).fold(0, |m, i| if along[i] > along[m] { i } else { m });
@@ -142,7 +142,7 @@ fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Res
         let message = format!(
             "no axis of the cells is along the normal of the surface at {}: the nearest is {degrees:.0} degrees off, and at most {:.0} can be \
              taken. Turn the cells along it (align = \"surface\", direction), or leave it out",
-            position(laid.nodes[nodes[0].node]),
+            position(domain.nodes[nodes[0].node]),
             ALONG.acos().to_degrees()
         );
         return Err(Fault::new(format!("fix[{index}]"), message));
@@ -151,10 +151,10 @@ fn face(nodes: Vec<Near>, laid: &Laid, solution: &Solution, index: usize) -> Res
 }
 
 /// The faces of the surface that lie in a region, by the nodes next to each, without slivers.
-fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Result<Vec<Vec<Near>>, Fault> {
-    let (grid, reach) = (&laid.grid, NEAR * laid.longest());
-    let close: Vec<usize> = (0..grid.len()).filter(|n| laid.depth[*n].abs() <= reach).collect();
-    let points: Vec<Vec3> = close.iter().map(|n| laid.nodes[*n]).collect();
+fn faces_in(domain: &SolveDomain, region: &dyn Field, of: &dyn Field, index: usize) -> Result<Vec<Vec<Near>>, Fault> {
+    let (grid, reach) = (&domain.grid, NEAR * domain.longest());
+    let close: Vec<usize> = (0..grid.len()).filter(|n| domain.depth[*n].abs() <= reach).collect();
+    let points: Vec<Vec3> = close.iter().map(|n| domain.nodes[*n]).collect();
     let (mut distance, mut gradient) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
     region.gradients(&points, &mut distance, &mut gradient);
     let feet: Vec<Vec3> = points.iter().zip(&distance).zip(&gradient).map(|((p, d), g)| foot(*p, *d, *g)).collect();
@@ -171,11 +171,11 @@ fn faces_in(laid: &Laid, region: &dyn Field, of: &dyn Field, index: usize) -> Re
     if found.is_empty() {
         let message = format!(
             "the region holds no part of the surface that the phase grid sees (steps of {} mm); give one that the face lies in",
-            number(laid.longest())
+            number(domain.longest())
         );
         return Err(Fault::new(format!("fix[{index}]"), message));
     }
-    let mut faces = parts(laid, found, &at);
+    let mut faces = parts(domain, found, &at);
     // A region about a face holds slivers of those next to it too.
     let least = faces.iter().map(Vec::len).max().unwrap_or(0) as f64 * SLIVER;
     faces.retain(|f| f.len() as f64 >= least);
@@ -188,12 +188,12 @@ fn foot(p: Vec3, distance: f64, gradient: Vec3) -> Vec3 {
 }
 
 /// Nodes by the face that they are next to: adjacent ones with nearly the same normal.
-fn parts(laid: &Laid, found: Vec<Near>, at: &[usize]) -> Vec<Vec<Near>> {
+fn parts(domain: &SolveDomain, found: Vec<Near>, at: &[usize]) -> Vec<Vec<Near>> {
     let mut root = singles(found.len());
     for (i, near) in found.iter().enumerate() {
-        let index = laid.grid.index(near.node);
-        for (a, stride) in laid.grid.strides().into_iter().enumerate() {
-            if index[a] + 1 == laid.grid.shape[a] {
+        let index = domain.grid.index(near.node);
+        for (a, stride) in domain.grid.strides().into_iter().enumerate() {
+            if index[a] + 1 == domain.grid.shape[a] {
                 continue;
             }
             let j = at[near.node + stride];

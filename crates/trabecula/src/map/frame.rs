@@ -10,7 +10,7 @@ use super::cut_cells::CutCells;
 use super::load_cases::Stress;
 use super::phase_grid::Grid;
 use super::principal::{Principal, range};
-use super::singular_lines::Alike;
+use super::singular_lines::FrameEquivalence;
 use super::smooth_frames::{Octahedral, Smoothing};
 use super::surface_frames::Surface;
 use super::two_axes::TwoAxes;
@@ -142,11 +142,11 @@ impl Orientation {
     }
 
     /// What counts as the same axes.
-    pub(super) fn alike(&self) -> Alike {
+    pub(super) fn alike(&self) -> FrameEquivalence {
         match self {
-            Orientation::Direction(_) => Alike::Line,
-            Orientation::Frame(_) | Orientation::Stress(_) => Alike::Turned(cube()),
-            Orientation::Angles(_) => Alike::Turned(vec![IDENTITY]),
+            Orientation::Direction(_) => FrameEquivalence::Line,
+            Orientation::Frame(_) | Orientation::Stress(_) => FrameEquivalence::Turned(cube()),
+            Orientation::Angles(_) => FrameEquivalence::Turned(vec![IDENTITY]),
         }
     }
 

@@ -104,7 +104,7 @@ impl Phase {
 mod tests {
     use super::*;
     use crate::grade::{Formula, Grade};
-    use crate::map::{Affine, Map, Orientation, PhaseRequest, Round, Settings};
+    use crate::map::{Affine, Map, Orientation, PhaseRequest, Round, SolverOptions};
     use std::sync::Arc;
 
     #[test]
@@ -117,7 +117,7 @@ mod tests {
             offset: [0.2, 0.3, -0.1],
             ..PhaseRequest::new([wave.clone(), wave.clone(), wave], Orientation::Angles([still.clone(), still, turn]))
         };
-        let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
+        let phase = Phase::solve(&bounds, &wanted, &SolverOptions::default()).expect("map");
         let round = |sphere: bool| {
             let (c, axis, radii) = ([1.0, 2.0, -1.0], [0.2, 0.3, 1.0], [1.0, 5.0, 9.0]);
             if sphere {

@@ -54,7 +54,7 @@ pub(super) fn choose(
         return Ok(Chosen { grid: first, hasty: None, lost: None });
     };
     let missed = probe.missed(first.step)?;
-    if !missed.iter().any(Missed::much) {
+    if !missed.iter().any(SamplingError::much) {
         return Ok(Chosen { grid: first, hasty: None, lost: None });
     }
     let (grid, left) = probe.refined(bounds, first, missed)?;
@@ -70,12 +70,12 @@ pub(super) fn choose(
         _ if wanted.averaged().is_some() || missed[axis].key != of.key() => "let it vary more slowly",
         _ => "smooth it over about a wavelength (smooth, in mm), or let it vary more slowly",
     };
-    let remedy = match (left.iter().any(Missed::much), step) {
+    let remedy = match (left.iter().any(SamplingError::much), step) {
         (false, _) if fits => format!("{slower}, or give step = {}", number(enough)),
         (false, Some(_)) => format!("{slower}, or leave step out"),
         _ => slower.to_string(),
     };
-    let lost = |missed: &[Missed; 3]| {
+    let lost = |missed: &[SamplingError; 3]| {
         let wrong = missed.iter().any(|m| m.lost > FALSE[1]);
         let message = format!("{what}: the grid does not see how it varies; {remedy}");
         wrong.then(|| Fault::new(missed[axis].key, message))
@@ -158,7 +158,7 @@ fn rounded_down(v: f64) -> f64 {
 
 /// What a step along an axis misses.
 #[derive(Clone, Copy)]
-struct Missed {
+struct SamplingError {
     /// The share of the points at which it is more than `MISSED`, and more than `FALSE`.
     share: f64,
     lost: f64,
@@ -171,7 +171,7 @@ struct Missed {
     lengths: [f64; 2],
 }
 
-impl Missed {
+impl SamplingError {
     fn much(&self) -> bool {
         self.share > MISSED[1]
     }
@@ -234,19 +234,19 @@ impl<'a> Probe<'a> {
     }
 
     /// What each axis' step of a grid misses.
-    fn missed(&self, step: Vec3) -> Result<[Missed; 3], Fault> {
+    fn missed(&self, step: Vec3) -> Result<[SamplingError; 3], Fault> {
         Ok([self.missed_along(0, step[0])?, self.missed_along(1, step[1])?, self.missed_along(2, step[2])?])
     }
 
     /// What is missed within half a step, and within a part of it: what has the period of the nodes, or half of it, shows there only.
-    fn missed_along(&self, axis: usize, step: f64) -> Result<Missed, Fault> {
+    fn missed_along(&self, axis: usize, step: f64) -> Result<SamplingError, Fault> {
         let half = 0.5 * step.min(self.bounds.size()[axis]);
         let [whole, part] = [self.missed_within(axis, half)?, self.missed_within(axis, GOLDEN * half)?];
         let lost = whole.lost.max(part.lost);
-        Ok(Missed { lost, ..if whole.much() || whole.share >= part.share { whole } else { part } })
+        Ok(SamplingError { lost, ..if whole.much() || whole.share >= part.share { whole } else { part } })
     }
 
-    fn missed_within(&self, axis: usize, half: f64) -> Result<Missed, Fault> {
+    fn missed_within(&self, axis: usize, half: f64) -> Result<SamplingError, Fault> {
         // Both ends of the step lie in the box.
         let (low, high) = (self.bounds.min[axis] + half, self.bounds.max[axis] - half);
         let moved = |p: &Vec3, by: f64| {
@@ -259,8 +259,15 @@ impl<'a> Probe<'a> {
         let here = self.target(&middle, &vec![IDENTITY; middle.len()])?;
         let like: Vec<Mat3> = here.iter().map(|h| h.1).collect();
         let [before, after] = [self.target(&of(-half), &like)?, self.target(&of(half), &like)?];
-        let mut found =
-            Missed { share: 0.0, lost: 0.0, at: middle[0], within: half, key: "rotate", turn: 0.0, lengths: [1.0; 2] };
+        let mut found = SamplingError {
+            share: 0.0,
+            lost: 0.0,
+            at: middle[0],
+            within: half,
+            key: "rotate",
+            turn: 0.0,
+            lengths: [1.0; 2],
+        };
         let mut most = 0.0;
         let each = 1.0 / middle.len() as f64;
         for (n, ((h, b), a)) in here.iter().zip(&before).zip(&after).enumerate() {
@@ -278,14 +285,19 @@ impl<'a> Probe<'a> {
                 let pair = |i: usize| [h.0[i % 3], if i < 3 { b.0[i % 3] } else { a.0[i % 3] }];
                 let lengths = (0..6).map(pair).fold([1.0; 2], |m, l| if ratio(l) > ratio(m) { l } else { m });
                 let key = if ratio(lengths) - 1.0 > turn { "wavelength" } else { self.wanted.orientation.key() };
-                found = Missed { at: middle[n], key, turn: turn.to_degrees(), lengths, ..found };
+                found = SamplingError { at: middle[n], key, turn: turn.to_degrees(), lengths, ..found };
             }
         }
         Ok(found)
     }
 
     /// The grid with steps halved along the axes along which much is missed, if as many nodes are possible, and what is missed then.
-    fn refined(&self, bounds: &Aabb, first: Grid, missed: [Missed; 3]) -> Result<(Grid, [Missed; 3]), Fault> {
+    fn refined(
+        &self,
+        bounds: &Aabb,
+        first: Grid,
+        missed: [SamplingError; 3],
+    ) -> Result<(Grid, [SamplingError; 3]), Fault> {
         let (mut grid, mut missed) = (first, missed);
         let mut halvings = [0; 3];
         loop {

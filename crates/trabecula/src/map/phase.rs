@@ -12,16 +12,16 @@ use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
 use super::integral::{Integral, Problem};
-use super::judged::{Judged, fold_at_node, fold_between, targets};
 use super::pace;
 use super::periods::{Angles, Period, tried};
 use super::phase_candidate::Candidate;
-use super::phase_request::{PhaseRequest, Settings};
-use super::phase_target::{Laid, Target};
-use super::region_holes::{MOST, Sought};
+use super::phase_request::{PhaseRequest, SolverOptions};
+use super::phase_target::{SolveDomain, Target};
+use super::region_holes::{HoleSearch, MOST};
 use super::remedy::{folded, remedy};
 use super::singular_lines::{SingularLine, singular_lines};
 use super::solution::Solution;
+use super::solution_quality::{SolutionQuality, fold_at_node, fold_between, targets};
 use super::spline::Spline;
 use super::stretch::{MARGINS, Stretch, bounded};
 use super::winding::Winding;
@@ -75,7 +75,7 @@ impl Phase {
     /// # Errors
     /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
     /// grid that is too coarse or too large; a map that folds.
-    pub fn solve(bounds: &Aabb, wanted: &PhaseRequest, settings: &Settings) -> Result<Phase, Fault> {
+    pub fn solve(bounds: &Aabb, wanted: &PhaseRequest, settings: &SolverOptions) -> Result<Phase, Fault> {
         let Some(range) = wanted.stretch else {
             return Phase::solved_once(bounds, wanted, settings);
         };
@@ -94,88 +94,95 @@ impl Phase {
         }
     }
 
-    fn solved_once(bounds: &Aabb, wanted: &PhaseRequest, settings: &Settings) -> Result<Phase, Fault> {
+    fn solved_once(bounds: &Aabb, wanted: &PhaseRequest, settings: &SolverOptions) -> Result<Phase, Fault> {
         let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
         // A part mostly touches its bounds: there cells are held within a range only if the grid has some on both sides.
         let grid = match (wanted.stretch, settings.region) {
             (Some(_), Some(_)) => chosen.grid.padded(PADDING),
             _ => chosen.grid,
         };
-        let laid = Laid::over(bounds, grid, wanted, settings.region)?;
+        let domain = SolveDomain::over(bounds, grid, wanted, settings.region)?;
         checkpoint();
-        let target = Target::new(&laid, wanted, None)?;
+        let target = Target::new(&domain, wanted, None)?;
         checkpoint();
-        pace::check_pace(&laid.grid, &wanted.wavelength, &laid.given, &laid.inside)?;
+        pace::check_pace(&domain.grid, &wanted.wavelength, &domain.given, &domain.inside)?;
         chosen.refuse()?;
         let ratio = wanted.ratio()?;
         checkpoint();
         if let Some(core) = wanted.core {
-            let lines = lines(&laid, wanted, &target);
-            let step = laid.grid.step.into_iter().fold(f64::INFINITY, f64::min);
+            let lines = lines(&domain, wanted, &target);
+            let step = domain.grid.step.into_iter().fold(f64::INFINITY, f64::min);
             let covered = match lines.is_empty() {
                 true => None,
                 false => core.solve(bounds, wanted, settings, (step, &lines))?,
             };
-            if let Some(Covered { laid, mut found, lines, cores }) = covered {
-                found.judged.distortion.singular = lines;
-                let made = Phase::of(bounds, wanted, settings, (laid, found), (chosen.hasty, String::new()))?;
+            if let Some(Covered { domain, mut found, lines, cores }) = covered {
+                found.quality.distortion.singular = lines;
+                let made = Phase::of(bounds, wanted, settings, (domain, found), (chosen.hasty, String::new()))?;
                 return Ok(Phase { cores: Some(cores), ..made });
             }
         }
-        let problem = Problem::new(laid.grid, &target.k, target.roots(&laid, wanted)?, ratio);
+        let problem = Problem::new(domain.grid, &target.k, target.roots(&domain, wanted)?, ratio);
         let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
         checkpoint();
         let solution =
-            Solution { spline: Spline::through(laid.grid, values), winding: Winding::default(), branches: None };
-        let judged = Judged::of(&laid, wanted, settings.region, &target, &solution)?;
-        let mut found = Candidate { target, weights, solution, periods: Vec::new(), mean, steps, judged };
+            Solution { spline: Spline::through(domain.grid, values), winding: Winding::default(), branches: None };
+        let quality = SolutionQuality::of(&domain, wanted, settings.region, &target, &solution)?;
+        let mut found = Candidate { target, weights, solution, periods: Vec::new(), mean, steps, quality };
         let mut tried = String::new();
-        if found.judged.fold.is_some() || found.judged.missed > MISSED[0] {
-            let (closed, words) = closed(&laid, wanted, settings, ratio)?;
+        if found.quality.fold.is_some() || found.quality.missed > MISSED[0] {
+            let (closed, words) = closed(&domain, wanted, settings, ratio)?;
             tried = words;
             if let Some(closed) = closed.filter(|c| c.is_better_than(&found)) {
                 found = closed;
             }
         }
         if let Some(range) = wanted.stretch {
-            found = found.bounded(&laid, wanted, settings.region, range)?;
+            found = found.bounded(&domain, wanted, settings.region, range)?;
         }
         if let (false, Some(region)) = (wanted.fix.is_empty(), settings.region) {
-            found = found.fixed(&laid, wanted, region)?;
+            found = found.fixed(&domain, wanted, region)?;
         }
-        found.judged.distortion.singular = lines(&laid, wanted, &found.target);
-        Phase::of(bounds, wanted, settings, (laid, found), (chosen.hasty, tried))
+        found.quality.distortion.singular = lines(&domain, wanted, &found.target);
+        Phase::of(bounds, wanted, settings, (domain, found), (chosen.hasty, tried))
     }
 
     /// The map of what was found, if it does not fold.
     fn of(
         bounds: &Aabb,
         wanted: &PhaseRequest,
-        settings: &Settings,
-        (laid, found): (Laid, Candidate),
+        settings: &SolverOptions,
+        (domain, found): (SolveDomain, Candidate),
         (hasty, mut tried): (Option<String>, String),
     ) -> Result<Phase, Fault> {
-        let wavelength = found.target.wavelength(&laid);
-        let mean_length = mean_within(&laid.inside, wavelength);
-        let edges = edges_within(&laid.inside, wavelength);
+        let wavelength = found.target.wavelength(&domain);
+        let mean_length = mean_within(&domain.inside, wavelength);
+        let edges = edges_within(&domain.inside, wavelength);
         let lengths_range =
             (wavelength.iter().flatten()).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
-        if let (Some(p), false) = (found.judged.fold, settings.folds) {
+        if let (Some(p), false) = (found.quality.fold, settings.folds) {
             if found.solution.branches.is_some() {
                 let remedy = remedy(wanted, lengths_range[1], true, &[]);
                 return Err(folded(p, &remedy, ", outside the cores of its singular lines"));
             }
-            let distortion = &found.judged.distortion;
+            let distortion = &found.quality.distortion;
             tried += &distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
-        let hasty = hasty.or_else(|| pace::thin(&laid.grid, found.judged.deepest));
-        let Candidate { target, solution, periods, mean, steps, judged: Judged { distortion, jacobians, .. }, .. } =
-            found;
+        let hasty = hasty.or_else(|| pace::thin(&domain.grid, found.quality.deepest));
+        let Candidate {
+            target,
+            solution,
+            periods,
+            mean,
+            steps,
+            quality: SolutionQuality { distortion, jacobians, .. },
+            ..
+        } = found;
         let stress_range = target.range;
         let shift = wanted.shift(&mean);
-        let corner = norm(laid.grid.step);
-        let max_lipschitz = solution.max_lipschitz(bounds, |n| laid.depth[n] <= corner);
+        let corner = norm(domain.grid.step);
+        let max_lipschitz = solution.max_lipschitz(bounds, |n| domain.depth[n] <= corner);
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = solution.jacobian(bounds.center());
@@ -352,9 +359,9 @@ impl Mapping for Phase {
 }
 
 /// The singular lines of a target, but for short ones.
-fn lines(laid: &Laid, wanted: &PhaseRequest, target: &Target) -> Vec<SingularLine> {
-    let least = 0.5 * target.wavelength(laid).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
-    singular_lines(&laid.grid, &target.frames, &laid.inside, &wanted.alike(), least, 0.0)
+fn lines(domain: &SolveDomain, wanted: &PhaseRequest, target: &Target) -> Vec<SingularLine> {
+    let least = 0.5 * target.wavelength(domain).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
+    singular_lines(&domain.grid, &target.frames, &domain.inside, &wanted.alike(), least, 0.0)
 }
 
 /// The mean of lengths at the nodes in a region; of all nodes if none is.
@@ -375,102 +382,103 @@ fn edges_within(inside: &[bool], of: &[Vec3]) -> [f64; 2] {
 impl Candidate {
     /// Whether it is taken where phases of one value would be: its error is far less, and it does not fold where they do not.
     fn is_better_than(&self, single: &Candidate) -> bool {
-        let (own, other) = (&self.judged, &single.judged);
+        let (own, other) = (&self.quality, &single.quality);
         (own.fold.is_none() || other.fold.is_some()) && own.missed <= MISSED[1] * other.missed
     }
 
     /// The solution with whole phases on faces.
-    fn fixed(self, laid: &Laid, wanted: &PhaseRequest, region: &dyn Field) -> Result<Candidate, Fault> {
+    fn fixed(self, domain: &SolveDomain, wanted: &PhaseRequest, region: &dyn Field) -> Result<Candidate, Fault> {
         let Candidate { target, weights, solution, periods, mean, steps, .. } = self;
-        let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
-        let solution = fixed(&problem, laid, region, &wanted.fix, wanted.shift(&mean), solution)?;
+        let problem = Problem { grid: domain.grid, k: &target.k, weights, ratio: wanted.ratio()? };
+        let solution = fixed(&problem, domain, region, &wanted.fix, wanted.shift(&mean), solution)?;
         let weights = problem.weights;
-        let judged = Judged::of(laid, wanted, Some(region), &target, &solution)?;
-        Ok(Candidate { target, weights, solution, periods, mean, steps, judged })
+        let quality = SolutionQuality::of(domain, wanted, Some(region), &target, &solution)?;
+        Ok(Candidate { target, weights, solution, periods, mean, steps, quality })
     }
 
     /// The solution whose cells are stretched within a range; where that folds and the one without a range does not, the latter.
     fn bounded(
         self,
-        laid: &Laid,
+        domain: &SolveDomain,
         wanted: &PhaseRequest,
         region: Option<&dyn Field>,
         range: Stretch,
     ) -> Result<Candidate, Fault> {
         let [least, most] = range.range();
-        let [low, high] = self.judged.distortion.stretch;
-        if self.judged.fold.is_none() && low >= least && high <= most {
+        let [low, high] = self.quality.distortion.stretch;
+        if self.quality.fold.is_none() && low >= least && high <= most {
             return Ok(self);
         }
-        let Candidate { target, weights, solution, periods, mean, steps, judged: before } = self;
-        let problem = Problem { grid: laid.grid, k: &target.k, weights, ratio: wanted.ratio()? };
+        let Candidate { target, weights, solution, periods, mean, steps, quality: before } = self;
+        let problem = Problem { grid: domain.grid, k: &target.k, weights, ratio: wanted.ratio()? };
         // The cells of the grid that the region reaches into.
-        let reach = norm(laid.grid.step);
-        let counts: Vec<bool> = laid.depth.iter().map(|d| *d <= reach).collect();
-        let hold = |margin: f64| -> Result<(Solution, Judged), Fault> {
+        let reach = norm(domain.grid.step);
+        let counts: Vec<bool> = domain.depth.iter().map(|d| *d <= reach).collect();
+        let hold = |margin: f64| -> Result<(Solution, SolutionQuality), Fault> {
             let held = bounded(&problem, &counts, (range, margin), &solution);
-            let judged = Judged::of(laid, wanted, region, &target, &held)?;
-            Ok((held, judged))
+            let quality = SolutionQuality::of(domain, wanted, region, &target, &held)?;
+            Ok((held, quality))
         };
-        let excess = |of: &Judged| if of.fold.is_some() { f64::INFINITY } else { range.excess(of.distortion.stretch) };
-        let (mut held, mut judged) = hold(MARGINS[0])?;
+        let excess =
+            |of: &SolutionQuality| if of.fold.is_some() { f64::INFINITY } else { range.excess(of.distortion.stretch) };
+        let (mut held, mut quality) = hold(MARGINS[0])?;
         for margin in &MARGINS[1..] {
-            if excess(&judged) <= 1.0 {
+            if excess(&quality) <= 1.0 {
                 break;
             }
             let next = hold(*margin)?;
-            if excess(&next.1) < excess(&judged) {
-                (held, judged) = next;
+            if excess(&next.1) < excess(&quality) {
+                (held, quality) = next;
             }
         }
         let weights = problem.weights;
         // What keeps to no range is no worse than what folds.
-        let (solution, judged) = match (before.fold, judged.fold) {
+        let (solution, quality) = match (before.fold, quality.fold) {
             (None, Some(_)) => (solution, before),
-            _ => (held, judged),
+            _ => (held, quality),
         };
-        Ok(Candidate { target, weights, solution, periods, mean, steps, judged })
+        Ok(Candidate { target, weights, solution, periods, mean, steps, quality })
     }
 }
 
 /// The map whose phases close round all holes, if the region has some: of the best whole numbers of cells the first that does not fold, or
 /// if all do and where they may, the best. Also what was tried, in words.
 fn closed(
-    laid: &Laid,
+    domain: &SolveDomain,
     wanted: &PhaseRequest,
-    settings: &Settings,
+    settings: &SolverOptions,
     ratio: f64,
 ) -> Result<(Option<Candidate>, String), Fault> {
     let Some(region) = settings.region else { return Ok((None, String::new())) };
-    let sought = Sought { grid: &laid.grid, depth: &laid.depth, region };
-    let count = sought.count();
+    let search = HoleSearch { grid: &domain.grid, depth: &domain.depth, region };
+    let count = search.count();
     if count > MOST {
         return Ok((None, format!("; the region has {count} holes, and phases close round {MOST} at most")));
     }
-    let holes = if count > 0 { sought.all() } else { Vec::new() };
+    let holes = if count > 0 { search.all() } else { Vec::new() };
     if holes.is_empty() {
         return Ok((None, String::new()));
     }
     // What is asked for within a hole may have little to do with the part.
-    let outside: Vec<f64> = laid.inside.iter().zip(&laid.depth).map(|(i, d)| if *i { 0.0 } else { *d }).collect();
-    let target = Target::new(laid, wanted, Some(&outside))?;
-    let ones = || vec![1.0; laid.grid.len()];
+    let outside: Vec<f64> = domain.inside.iter().zip(&domain.depth).map(|(i, d)| if *i { 0.0 } else { *d }).collect();
+    let target = Target::new(domain, wanted, Some(&outside))?;
+    let ones = || vec![1.0; domain.grid.len()];
     let roots = |steps: f64| -> Result<Vec<f64>, Fault> {
-        Ok(laid.roots(wanted.weight.as_ref(), target.trust.as_deref(), steps)?.unwrap_or_else(ones))
+        Ok(domain.roots(wanted.weight.as_ref(), target.trust.as_deref(), steps)?.unwrap_or_else(ones))
     };
-    let squares = EdgeSquares::new(laid.grid, &roots(f64::INFINITY)?, Some(&laid.depth));
-    let problem = Problem { grid: laid.grid, k: &target.k, weights: Some((roots(SHARP)?, squares)), ratio };
+    let squares = EdgeSquares::new(domain.grid, &roots(f64::INFINITY)?, Some(&domain.depth));
+    let problem = Problem { grid: domain.grid, k: &target.k, weights: Some((roots(SHARP)?, squares)), ratio };
     let Integral { values, mean, steps } = problem.solve();
     let angles = Angles::new(&problem, holes, &values);
     let weights = problem.weights;
     let mut first = None;
-    for (solution, periods) in angles.solutions(&laid.grid, &values) {
+    for (solution, periods) in angles.solutions(&domain.grid, &values) {
         checkpoint();
-        if fold_at_node(&solution, laid).or_else(|| fold_between(&solution, &laid.inside)).is_none() {
-            let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
-            if judged.fold.is_none() {
+        if fold_at_node(&solution, domain).or_else(|| fold_between(&solution, &domain.inside)).is_none() {
+            let quality = SolutionQuality::of(domain, wanted, settings.region, &target, &solution)?;
+            if quality.fold.is_none() {
                 let words = tried(&periods);
-                return Ok((Some(Candidate { target, weights, solution, periods, mean, steps, judged }), words));
+                return Ok((Some(Candidate { target, weights, solution, periods, mean, steps, quality }), words));
             }
         }
         first.get_or_insert((solution, periods));
@@ -480,8 +488,8 @@ fn closed(
     if !settings.folds && wanted.stretch.is_none() {
         return Ok((None, words));
     }
-    let judged = Judged::of(laid, wanted, settings.region, &target, &solution)?;
-    Ok((Some(Candidate { target, weights, solution, periods, mean, steps, judged }), words))
+    let quality = SolutionQuality::of(domain, wanted, settings.region, &target, &solution)?;
+    Ok((Some(Candidate { target, weights, solution, periods, mean, steps, quality }), words))
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! A solution of phases, and what it was found for.
 
 use super::integral::Weights;
-use super::judged::Judged;
 use super::periods::Period;
 use super::phase_target::Target;
 use super::solution::Solution;
+use super::solution_quality::SolutionQuality;
 use geometry::math::Mat3;
 
 /// A solution, and what it was found for.
@@ -17,5 +17,5 @@ pub(super) struct Candidate {
     /// The mean of the rows of K.
     pub mean: Mat3,
     pub steps: usize,
-    pub judged: Judged,
+    pub quality: SolutionQuality,
 }

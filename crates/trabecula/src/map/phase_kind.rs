@@ -2,7 +2,7 @@
 
 use super::stress_kind::{StressKind, each};
 use super::{
-    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, PhaseRequest, Settings,
+    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, PhaseRequest, SolverOptions,
     Stretch, TwoAxes, given_twice, shared,
 };
 use crate::environment::Environment;
@@ -354,8 +354,11 @@ impl PhaseKind {
             core: self.covering().map_err(|f| DesignError::fault(path, f))?,
         };
         let region: &dyn Field = &**environment.region;
-        let settings =
-            Settings { step: self.step, region: (self.domain == Domain::Region).then_some(region), folds: self.folds };
+        let settings = SolverOptions {
+            step: self.step,
+            region: (self.domain == Domain::Region).then_some(region),
+            folds: self.folds,
+        };
         let made = Phase::solve(&environment.region.bounds(), &wanted, &settings);
         shared(made.map_err(|f| self.orientation.fault(f)), path)
     }

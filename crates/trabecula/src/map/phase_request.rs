@@ -3,7 +3,7 @@
 use super::core_cover::Covering;
 use super::cube_turns::cube;
 use super::frame::Orientation;
-use super::singular_lines::Alike;
+use super::singular_lines::FrameEquivalence;
 use super::stretch::Stretch;
 use super::surface_frames::Aligned;
 use crate::field::Field;
@@ -71,8 +71,8 @@ impl PhaseRequest {
     }
 
     /// What counts as the same axes.
-    pub(super) fn alike(&self) -> Alike {
-        if self.align.is_some() { Alike::Turned(cube()) } else { self.orientation.alike() }
+    pub(super) fn alike(&self) -> FrameEquivalence {
+        if self.align.is_some() { FrameEquivalence::Turned(cube()) } else { self.orientation.alike() }
     }
 
     /// What an error of angle counts, if it is in its range.
@@ -92,7 +92,7 @@ impl PhaseRequest {
 
 /// How a map is solved for.
 #[derive(Clone, Copy, Default)]
-pub struct Settings<'a> {
+pub struct SolverOptions<'a> {
     /// Spacing of the grid (mm); chosen if not given.
     pub step: Option<f64>,
     /// Signed distance of the region that counts; all of the box if none.

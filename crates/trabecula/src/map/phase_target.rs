@@ -20,7 +20,7 @@ const FALL: f64 = 3.0;
 pub(super) const LEAST_ROOT: f64 = 1e-3;
 
 /// A grid over a region, and the wavelengths at its nodes.
-pub(super) struct Laid {
+pub(super) struct SolveDomain {
     pub bounds: Aabb,
     pub grid: Grid,
     pub nodes: Vec<Vec3>,
@@ -36,8 +36,13 @@ pub(super) struct Laid {
     pub given: Vec<Vec3>,
 }
 
-impl Laid {
-    pub fn over(bounds: &Aabb, grid: Grid, wanted: &PhaseRequest, region: Option<&dyn Field>) -> Result<Laid, Fault> {
+impl SolveDomain {
+    pub fn over(
+        bounds: &Aabb,
+        grid: Grid,
+        wanted: &PhaseRequest,
+        region: Option<&dyn Field>,
+    ) -> Result<SolveDomain, Fault> {
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
         let clamp = |p: &Vec3| core::array::from_fn(|a| p[a].clamp(bounds.min[a], bounds.max[a]));
         let beyond = grid.origin.iter().zip(bounds.min).any(|(o, b)| *o < b);
@@ -51,7 +56,7 @@ impl Laid {
         let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
         let reach = 1e-9 * norm(bounds.size());
         let inside = depth.iter().map(|d| *d <= reach).collect();
-        Ok(Laid { bounds: *bounds, grid, nodes, clamped, depth, inside, surface, given })
+        Ok(SolveDomain { bounds: *bounds, grid, nodes, clamped, depth, inside, surface, given })
     }
 
     /// Where nodes are asked what is wanted.
@@ -136,40 +141,40 @@ pub(super) struct Target {
 impl Target {
     /// Signs and axes that are not given are chosen so that neighbours agree, the nearest to the part first, if it is known how far each
     /// node is `outside`.
-    pub fn new(laid: &Laid, wanted: &PhaseRequest, outside: Option<&[f64]>) -> Result<Target, Fault> {
-        let weight: Vec<f64> = (0..laid.grid.len()).map(|n| laid.nearness(FALL, n).powi(2)).collect();
+    pub fn new(domain: &SolveDomain, wanted: &PhaseRequest, outside: Option<&[f64]>) -> Result<Target, Fault> {
+        let weight: Vec<f64> = (0..domain.grid.len()).map(|n| domain.nearness(FALL, n).powi(2)).collect();
         let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
         let Frames { at_nodes: frames, trust, range } = wanted.orientation.frames(
-            &laid.grid,
-            laid.asked_at(),
+            &domain.grid,
+            domain.asked_at(),
             smoothing.as_ref(),
-            laid.surface.as_ref(),
+            domain.surface.as_ref(),
             outside,
         )?;
         checkpoint();
         let lengths = match wanted.by_principal {
             true => {
-                let of = wanted.orientation.principal(laid.asked_at())?;
-                Some(along_axes(&laid.grid, &of, range, &laid.given, &frames, smoothing.as_ref()))
+                let of = wanted.orientation.principal(domain.asked_at())?;
+                Some(along_axes(&domain.grid, &of, range, &domain.given, &frames, smoothing.as_ref()))
             }
             false => None,
         };
         checkpoint();
         let k = core::array::from_fn(|i| {
-            let of = frames.iter().zip(lengths.as_ref().unwrap_or(&laid.given));
+            let of = frames.iter().zip(lengths.as_ref().unwrap_or(&domain.given));
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
         });
         Ok(Target { frames, trust, range, lengths, k })
     }
 
     /// The wavelengths at the nodes along the cell's axes, mm.
-    pub fn wavelength<'a>(&'a self, laid: &'a Laid) -> &'a [Vec3] {
-        self.lengths.as_ref().unwrap_or(&laid.given)
+    pub fn wavelength<'a>(&'a self, domain: &'a SolveDomain) -> &'a [Vec3] {
+        self.lengths.as_ref().unwrap_or(&domain.given)
     }
 
     /// The roots of the weights of nodes, as surroundings count where phases have one value everywhere.
-    pub fn roots(&self, laid: &Laid, wanted: &PhaseRequest) -> Result<Option<Vec<f64>>, Fault> {
-        laid.roots(wanted.weight.as_ref(), self.trust.as_deref(), FALL)
+    pub fn roots(&self, domain: &SolveDomain, wanted: &PhaseRequest) -> Result<Option<Vec<f64>>, Fault> {
+        domain.roots(wanted.weight.as_ref(), self.trust.as_deref(), FALL)
     }
 }
 

@@ -28,13 +28,13 @@ pub(super) struct Hole {
 }
 
 /// Where holes are looked for: a region on a grid, with the distance from it at each node.
-pub(super) struct Sought<'a> {
+pub(super) struct HoleSearch<'a> {
     pub grid: &'a Grid,
     pub depth: &'a [f64],
     pub region: &'a dyn Field,
 }
 
-impl Sought<'_> {
+impl HoleSearch<'_> {
     fn step(&self) -> f64 {
         self.grid.step.into_iter().fold(0.0, f64::max)
     }

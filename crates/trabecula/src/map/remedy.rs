@@ -3,7 +3,7 @@
 use super::covering;
 use super::frame::Orientation;
 use super::phase_request::PhaseRequest;
-use super::singular_lines::{Alike, SingularLine};
+use super::singular_lines::{FrameEquivalence, SingularLine};
 use geometry::fault::{Fault, number, position};
 use geometry::math::Vec3;
 
@@ -24,7 +24,7 @@ impl PhaseRequest {
         let served = !singular.is_empty()
             && singular.len() <= covering::MOST
             && self.core.is_none()
-            && !matches!(self.alike(), Alike::Line)
+            && !matches!(self.alike(), FrameEquivalence::Line)
             && !singular.iter().any(SingularLine::is_closed);
         let lines = if singular.len() == 1 { "the line" } else { "the lines" };
         served.then(|| match covering::refuse(self) {

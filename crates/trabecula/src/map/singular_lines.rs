@@ -12,7 +12,7 @@ use super::pierced_faces::{Pierced, length, matched, polylines};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
 
 /// What counts as the same axes.
-pub(super) enum Alike {
+pub(super) enum FrameEquivalence {
     /// The third axis and its opposite; the others follow it.
     Line,
     /// Frames that differ by one of these rotations, with which any two have their product.
@@ -64,7 +64,7 @@ pub(super) fn singular_lines(
     grid: &Grid,
     frames: &[Mat3],
     inside: &[bool],
-    alike: &Alike,
+    alike: &FrameEquivalence,
     least: f64,
     near: f64,
 ) -> Vec<SingularLine> {
@@ -134,20 +134,20 @@ fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
     made
 }
 
-impl Alike {
+impl FrameEquivalence {
     /// The rotations that change nothing; of a line alone none but none at all.
     pub fn turns(&self) -> Vec<Mat3> {
         match self {
-            Alike::Line => vec![IDENTITY],
-            Alike::Turned(all) => all.clone(),
+            FrameEquivalence::Line => vec![IDENTITY],
+            FrameEquivalence::Turned(all) => all.clone(),
         }
     }
 
     /// Whether the axes of two frames differ by so little that once round a face of four such edges they come back.
     fn is_near(&self, a: &Mat3, b: &Mat3) -> bool {
         match self {
-            Alike::Line => dot(third(a), third(b)) > 0.0,
-            Alike::Turned(_) => is_near(a, b),
+            FrameEquivalence::Line => dot(third(a), third(b)) > 0.0,
+            FrameEquivalence::Turned(_) => is_near(a, b),
         }
     }
 
@@ -155,11 +155,11 @@ impl Alike {
     fn round(&self, frames: &[Mat3; 4]) -> f64 {
         let pairs = || (0..4).map(|i| (&frames[i], &frames[(i + 1) % 4]));
         match self {
-            Alike::Line => {
+            FrameEquivalence::Line => {
                 let turned = pairs().filter(|(a, b)| dot(third(a), third(b)) < 0.0).count();
                 if turned % 2 == 1 { 180.0 } else { 0.0 }
             }
-            Alike::Turned(all) => {
+            FrameEquivalence::Turned(all) => {
                 // The rotations in space, one after the other, as quaternions: a whole turn is −1.
                 let step = |(a, b): (&Mat3, &Mat3)| quaternion(&product(&nearest(b, a, all), &transpose(a)));
                 // Each edge is followed in one direction, so that both faces at it see the same.
@@ -218,15 +218,19 @@ mod tests {
     use super::*;
     use geometry::math::{Aabb, rotation};
 
-    fn equal() -> Alike {
-        Alike::Turned(vec![IDENTITY])
+    fn equal() -> FrameEquivalence {
+        FrameEquivalence::Turned(vec![IDENTITY])
     }
 
     fn grid() -> Grid {
         Grid::over(&Aabb { min: [-5.0, -4.0, 0.0], max: [6.0, 5.0, 8.0] }, [24, 22, 18])
     }
 
-    fn found(alike: &Alike, frame: impl Fn(Vec3) -> Mat3, solid: impl Fn(Vec3) -> bool) -> Vec<SingularLine> {
+    fn found(
+        alike: &FrameEquivalence,
+        frame: impl Fn(Vec3) -> Mat3,
+        solid: impl Fn(Vec3) -> bool,
+    ) -> Vec<SingularLine> {
         let g = grid();
         let nodes: Vec<Vec3> = (0..g.len()).map(|n| g.node(n)).collect();
         let frames: Vec<Mat3> = nodes.iter().map(|p| frame(*p)).collect();
@@ -253,10 +257,13 @@ mod tests {
 
     #[test]
     fn disclinations_are_at_their_place() {
-        let quarter = Alike::Turned(crate::map::cube_turns::cube());
-        for (alike, index, turn) in
-            [(&Alike::Line, 0.5, 180.0), (&quarter, 0.5, 180.0), (&quarter, -0.25, 90.0), (&equal(), 1.0, 360.0)]
-        {
+        let quarter = FrameEquivalence::Turned(crate::map::cube_turns::cube());
+        for (alike, index, turn) in [
+            (&FrameEquivalence::Line, 0.5, 180.0),
+            (&quarter, 0.5, 180.0),
+            (&quarter, -0.25, 90.0),
+            (&equal(), 1.0, 360.0),
+        ] {
             let lines = found(alike, about(index), |_| true);
             assert_eq!(lines.len(), 1, "{index}: {lines:?}");
             is_at(&lines[0], turn);
@@ -266,11 +273,11 @@ mod tests {
     /// Where the line lies in a hole of the part there is none, nor in a field that turns by less.
     #[test]
     fn there_is_none_in_a_hole() {
-        let quarter = Alike::Turned(crate::map::cube_turns::cube());
+        let quarter = FrameEquivalence::Turned(crate::map::cube_turns::cube());
         let hole = |[x, _, z]: Vec3| (x - 0.7).hypot(z - 3.3) > 1.0;
         assert_eq!(found(&quarter, about(0.25), hole), []);
         let slow = |p: Vec3| rotation([20.0 * p[0], 5.0 * p[1] * p[2], -8.0 * p[0]]);
-        for alike in [&Alike::Line, &quarter, &equal()] {
+        for alike in [&FrameEquivalence::Line, &quarter, &equal()] {
             assert_eq!(found(alike, slow, |_| true), []);
         }
     }
@@ -279,7 +286,7 @@ mod tests {
     #[test]
     fn arbitrary_axes_change_nothing() {
         let turns = crate::map::cube_turns::cube();
-        let quarter = Alike::Turned(turns.clone());
+        let quarter = FrameEquivalence::Turned(turns.clone());
         let mut s = 3u64;
         let mut any: Vec<usize> =
             (0..grid().len()).map(|_| (24.0 * geometry::random::random(&mut s).abs()) as usize % 24).collect();
@@ -303,7 +310,7 @@ mod tests {
             product(&product(&about, &rotation([0.0, turn, 0.0])), &transpose(&about))
         };
         let ring = |p: Vec3| (p[0] - 0.52).hypot(p[1] - 0.47) > 0.9;
-        let lines = found(&Alike::Line, frame, ring);
+        let lines = found(&FrameEquivalence::Line, frame, ring);
         assert_eq!(lines.len(), 1, "{lines:?}");
         let [a, b] = lines[0].ends();
         assert_eq!(a, b);

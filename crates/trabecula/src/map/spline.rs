@@ -33,7 +33,7 @@ pub(super) struct Spline {
 
 /// Where a coordinate falls: the interval, and the weights of its four coefficients in the value and in the slope.
 #[derive(Clone, Copy)]
-struct Spot {
+struct SplineStencil {
     first: usize,
     value: [f64; 4],
     slope: [f64; 4],
@@ -130,7 +130,7 @@ impl Spline {
 
     /// Where the coordinate `x` falls along an axis.
     #[inline(always)]
-    fn spot(&self, x: f64, axis: usize) -> Spot {
+    fn stencil(&self, x: f64, axis: usize) -> SplineStencil {
         let h = self.grid.step[axis];
         let s = (x - self.grid.origin[axis]) / h;
         let last = self.grid.shape[axis] - 1;
@@ -143,7 +143,7 @@ impl Spline {
             *v += beyond * d;
         }
         let per = 1.0 / h;
-        Spot { first, value, slope: slope.map(|d| d * per) }
+        SplineStencil { first, value, slope: slope.map(|d| d * per) }
     }
 
     /// u at points.
@@ -279,10 +279,10 @@ impl Spline {
     /// The map on the rows of a block.
     pub fn rows<'a>(&'a self, block: &Block<'a>) -> Rows<'a> {
         let [x, y, z] = [0, 1, 2].map(|a| {
-            let spots = block.axes[a].iter().map(|&x| self.spot(x, a));
-            spots.collect::<Vec<Spot>>()
+            let stencils = block.axes[a].iter().map(|&x| self.stencil(x, a));
+            stencils.collect::<Vec<SplineStencil>>()
         });
-        let range = |s: &[Spot]| {
+        let range = |s: &[SplineStencil]| {
             let first = s.iter().map(|s| s.first).min().unwrap_or(0);
             let last = s.iter().map(|s| s.first).max().unwrap_or(0);
             (first, last - first + 4)
@@ -291,7 +291,7 @@ impl Spline {
         // On an interval a spline is a cubic; beyond the box it is another one, which is straight.
         let last = self.grid.shape[0] - 1;
         let in_steps = |x: &f64| (x - self.grid.origin[0]) / self.grid.step[0];
-        let runs = block.axes[0].iter().zip(&x).map(|(at, spot)| {
+        let runs = block.axes[0].iter().zip(&x).map(|(at, stencil)| {
             let s = in_steps(at);
             let beyond = if s < 0.0 {
                 0
@@ -303,9 +303,9 @@ impl Spline {
             let t = match beyond {
                 0 => s,
                 2 => s - last as f64,
-                _ => s - spot.first as f64,
+                _ => s - stencil.first as f64,
             };
-            (beyond, spot.first - along_x.0, t)
+            (beyond, stencil.first - along_x.0, t)
         });
         let mut segments: Vec<Segment> = Vec::new();
         let mut t = Vec::with_capacity(x.len());
@@ -347,8 +347,8 @@ pub(in super::super) struct Rows<'a> {
     /// First coefficient and number of them.
     along_x: (usize, usize),
     along_y: (usize, usize),
-    y: Vec<Spot>,
-    z: Vec<Spot>,
+    y: Vec<SplineStencil>,
+    z: Vec<SplineStencil>,
     t: Vec<f64>,
     segments: Vec<Segment>,
     layer: [Vec<f64>; 3],
@@ -422,7 +422,7 @@ fn along(row: &[f64; 4], w: &[f64; 4]) -> f64 {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
     for (o, p) in out.iter_mut().zip(points) {
-        let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
+        let [x, y, z] = [spline.stencil(p[0], 0), spline.stencil(p[1], 1), spline.stencil(p[2], 2)];
         let sums = spline.sums([x.first, y.first, z.first], [[&y.value], [&z.value]], [(0, 0)]);
         *o = sums.map(|[s]| along(&s, &x.value));
     }
@@ -431,7 +431,7 @@ fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn jacobians(spline: &Spline, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
     for ((u, m), p) in u.iter_mut().zip(m).zip(points) {
-        let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
+        let [x, y, z] = [spline.stencil(p[0], 0), spline.stencil(p[1], 1), spline.stencil(p[2], 2)];
         let weights = [[&y.value, &y.slope], [&z.value, &z.slope]];
         let sums = spline.sums([x.first, y.first, z.first], weights, [(0, 0), (1, 0), (0, 1)]);
         *u = sums.map(|[s, ..]| along(&s, &x.value));

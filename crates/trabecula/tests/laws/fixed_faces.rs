@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm};
 use trabecula::grade::Grade;
-use trabecula::map::{Aligned, Mapping, Orientation, Phase, PhaseRequest, Settings};
+use trabecula::map::{Aligned, Mapping, Orientation, Phase, PhaseRequest, SolverOptions};
 use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
 fn wanted(wavelength: f64, rotate: Vec3, fix: Vec<Region>) -> PhaseRequest {
@@ -20,7 +20,7 @@ fn wanted(wavelength: f64, rotate: Vec3, fix: Vec<Region>) -> PhaseRequest {
 }
 
 fn solve(region: &Region, wanted: &PhaseRequest) -> Result<Phase, String> {
-    let settings = Settings { region: Some(&**region), ..Settings::default() };
+    let settings = SolverOptions { region: Some(&**region), ..SolverOptions::default() };
     Phase::solve(&region.bounds(), wanted, &settings).map_err(|f| f.to_string())
 }
 
@@ -67,7 +67,7 @@ fn a_curved_wall_has_whole_cells_through_it() {
     let errors = [0.5, 0.25].map(|step| {
         let align = Some(Aligned::new(4.0).expect("depth"));
         let wanted = PhaseRequest { align, ..wanted(2.0, [0.0; 3], faces.to_vec()) };
-        let settings = Settings { region: Some(&*panel), step: Some(step), ..Settings::default() };
+        let settings = SolverOptions { region: Some(&*panel), step: Some(step), ..SolverOptions::default() };
         let map = Phase::solve(&panel.bounds(), &wanted, &settings).expect("solved");
         let mut worst = 0.0f64;
         for i in 0..200 {

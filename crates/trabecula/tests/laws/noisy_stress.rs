@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::{cuboid, mean, off_axis, points, within};
 use geometry::math::{Aabb, Vec3, determinant, dot, norm, scale};
 use trabecula::grade::{Grade, Samples};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Settings, Stretch, TwoAxes};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, SolverOptions, Stretch, TwoAxes};
 use trabecula::region::{Cylinder, Difference, Region};
 
 const STEP: f64 = 0.75;
@@ -28,7 +28,7 @@ fn samples<const N: usize>(b: &Aabb, of: impl Fn(Vec3, &mut dyn FnMut() -> f64) 
 
 fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Phase, String> {
     let wanted = PhaseRequest { smooth, ..PhaseRequest::new([0; 3].map(|_| Grade::Constant(WAVELENGTH)), orientation) };
-    Phase::solve(b, &wanted, &Settings::default()).map_err(|f| f.message)
+    Phase::solve(b, &wanted, &SolverOptions::default()).map_err(|f| f.message)
 }
 
 /// Pure bending about z, with noise of each component at each node: wherever the beam carries a tenth of the greatest stress an axis of
@@ -158,7 +158,7 @@ fn a_plate_with_a_hole_is_followed_through_noise() {
             stretch,
             ..PhaseRequest::new(wavelength, Orientation::Stress(stress.into()))
         };
-        let settings = Settings { region: Some(&*part), ..Settings::default() };
+        let settings = SolverOptions { region: Some(&*part), ..SolverOptions::default() };
         let map = Phase::solve(&b, &wanted, &settings).unwrap_or_else(|f| panic!("{noise}: {f}"));
         assert!(far.iter().all(|p| determinant(&map.jacobian(*p)) > 0.0));
         mean(far.iter().map(|p| {

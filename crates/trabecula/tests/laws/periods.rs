@@ -13,7 +13,7 @@ use trabecula::field::Block;
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Round, Settings, TwoAxes};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Round, SolverOptions, TwoAxes};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region};
 use trabecula::solid::Solid;
 
@@ -33,7 +33,7 @@ fn tube(base: Vec3, axis: Vec3, radii: [f64; 2], height: f64) -> Region {
 }
 
 fn solve(region: &Region, wanted: &PhaseRequest, step: Option<f64>) -> Phase {
-    let settings = Settings { region: Some(&**region), step, ..Settings::default() };
+    let settings = SolverOptions { region: Some(&**region), step, ..SolverOptions::default() };
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
 }
 
@@ -270,7 +270,7 @@ fn a_lattice_goes_round_holes_without_a_seam() {
 #[test]
 fn what_cannot_close_is_refused_and_what_is_straight_stays() {
     let region = tube([0.0; 3], [0.0, 0.0, 1.0], [5.0, 9.0], 4.0);
-    let settings = Settings { region: Some(&*region), ..Settings::default() };
+    let settings = SolverOptions { region: Some(&*region), ..SolverOptions::default() };
     let still = || Grade::Constant(0.0);
     let twisted = formula("atan2(y, x)*57.29577951308232 + 360*tanh(z-2)");
     let twisted = wanted(3.0, Orientation::Angles([still(), still(), twisted]));

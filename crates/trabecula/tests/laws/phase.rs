@@ -11,7 +11,7 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Map, Orientation, Phase, PhaseRequest, Settings};
+use trabecula::map::{Map, Orientation, Phase, PhaseRequest, SolverOptions};
 use trabecula::region::{Cuboid, Region};
 use trabecula::solid::Solid;
 
@@ -28,7 +28,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         offset: [0.1, 0.2, 0.3],
         ..PhaseRequest::new(wavelength.map(formula), Orientation::Angles(angles.map(formula)))
     };
-    Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))
+    Arc::new(Phase::solve(b, &wanted, &SolverOptions::default()).expect("solved"))
 }
 
 fn numbers(n: usize) -> impl Iterator<Item = Vec3> {

@@ -3,7 +3,7 @@
 use geometry::math::{Aabb, Mat3, Vec3, apply, norm, product, rotation, transpose};
 use geometry::random::random;
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Mapping, Orientation, Phase, PhaseRequest, Settings};
+use trabecula::map::{Mapping, Orientation, Phase, PhaseRequest, SolverOptions};
 
 const BOX: Aabb = Aabb { min: [0.0; 3], max: [24.0, 12.0, 12.0] };
 const LENGTHS: Vec3 = [3.0, 4.0, 5.0];
@@ -14,7 +14,7 @@ fn solved(stress: [Grade; 6], smooth: Option<f64>) -> Phase {
         smooth,
         ..PhaseRequest::new(LENGTHS.map(Grade::Constant), Orientation::Stress(stress.into()))
     };
-    Phase::solve(&BOX, &wanted, &Settings::default()).unwrap_or_else(|f| panic!("{f}"))
+    Phase::solve(&BOX, &wanted, &SolverOptions::default()).unwrap_or_else(|f| panic!("{f}"))
 }
 
 /// The tensor of a frame (columns) and principal values.

@@ -5,7 +5,7 @@ use geometry::math::{Aabb, Vec3, determinant};
 use trabecula::design::{Built, Design, NoFiles};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Mapping, Orientation, Phase, PhaseRequest, Settings, Stretch};
+use trabecula::map::{Mapping, Orientation, Phase, PhaseRequest, SolverOptions, Stretch};
 use trabecula::region::Cylinder;
 
 fn wanted(rotate: [&str; 3], range: Option<[f64; 2]>) -> PhaseRequest {
@@ -45,7 +45,7 @@ fn cells_keep_to_the_range() {
         (["0", "0", "5*x"], [0.67, 1.5]),
     ];
     for (rotate, range) in targets.into_iter().take(if campaign() { 3 } else { 2 }) {
-        let settings = Settings { region: Some(&rod), ..Settings::default() };
+        let settings = SolverOptions { region: Some(&rod), ..SolverOptions::default() };
         let solve = |range| Phase::solve(&BOX, &wanted(rotate, range), &settings).expect("no fold");
         let [free, held] = [solve(None), solve(Some(range))];
         let [before, after] = [&free, &held].map(|m| beyond(m, &rod, range));
@@ -60,7 +60,7 @@ fn cells_keep_to_the_range() {
 #[test]
 fn a_map_that_folds_is_unfolded() {
     let (rod, rotate) = (rod(), ["0", "0", "90*sin(x/2)"]);
-    let settings = Settings { region: Some(&rod), ..Settings::default() };
+    let settings = SolverOptions { region: Some(&rod), ..SolverOptions::default() };
     let refused = Phase::solve(&BOX, &wanted(rotate, None), &settings).err().expect("it folds");
     assert!(refused.message.contains("stretch"), "{}", refused.message);
     let map = Phase::solve(&BOX, &wanted(rotate, Some([0.67, 1.5])), &settings).expect("no fold");
@@ -72,7 +72,7 @@ fn a_map_that_folds_is_unfolded() {
 #[test]
 fn a_map_within_the_range_is_that_of_least_squares() {
     for rotate in [["0", "0", "2*x"], ["3*sin(x/4)", "2*y", "20"]] {
-        let solve = |range| Phase::solve(&BOX, &wanted(rotate, range), &Settings::default()).expect("no fold");
+        let solve = |range| Phase::solve(&BOX, &wanted(rotate, range), &SolverOptions::default()).expect("no fold");
         let [free, held] = [solve(None), solve(Some([0.5, 2.0]))];
         for p in points(&BOX, 500) {
             assert_eq!(free.jacobian(p), held.jacobian(p));

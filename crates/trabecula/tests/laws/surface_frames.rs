@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, determinant, norm, unit};
 use trabecula::grade::{Formula, Grade};
-use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, PhaseRequest, Settings, TwoAxes};
+use trabecula::map::{Aligned, Axis, Mapping, Orientation, Phase, PhaseRequest, SolverOptions, TwoAxes};
 use trabecula::region::{Cylinder, Difference, Intersection, Region};
 
 fn wanted(wavelength: f64, orientation: Orientation, depth: Option<f64>) -> PhaseRequest {
@@ -20,7 +20,7 @@ fn angles(of: Vec3) -> Orientation {
 }
 
 fn solve(region: &Region, wanted: &PhaseRequest) -> Phase {
-    let settings = Settings { region: Some(&**region), ..Settings::default() };
+    let settings = SolverOptions { region: Some(&**region), ..SolverOptions::default() };
     Phase::solve(&region.bounds(), wanted, &settings).unwrap_or_else(|f| panic!("{f}"))
 }
 

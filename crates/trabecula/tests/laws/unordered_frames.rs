@@ -7,7 +7,7 @@ use geometry::math::{Aabb, Mat3, Vec3, cross, norm, product, rotation, scale, su
 use geometry::random::random;
 use trabecula::design::{Design, NoFiles};
 use trabecula::grade::{Formula, Grade, Samples};
-use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, Settings, TwoAxes};
+use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, SolverOptions, TwoAxes};
 
 const BOX: Aabb = Aabb { min: [0.0; 3], max: [12.0, 9.0, 9.0] };
 const STEP: f64 = 0.75;
@@ -49,7 +49,7 @@ fn result(seed: Option<u64>) -> TwoAxes {
 
 fn solved(orientation: Orientation, smooth: Option<f64>) -> Phase {
     let wanted = PhaseRequest { smooth, ..PhaseRequest::new([0; 3].map(|_| Grade::Constant(3.0)), orientation) };
-    Phase::solve(&BOX, &wanted, &Settings::default()).expect("solved")
+    Phase::solve(&BOX, &wanted, &SolverOptions::default()).expect("solved")
 }
 
 fn apart(a: &Phase, b: &Phase) -> f64 {

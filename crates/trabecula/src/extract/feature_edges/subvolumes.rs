@@ -21,11 +21,11 @@ const MOST: usize = 8;
 #[derive(Clone, Copy)]
 struct Facet<'b> {
     ids: [usize; 3],
-    of: Of<'b>,
+    of: FacetOrigin<'b>,
 }
 
 #[derive(Clone, Copy)]
-enum Of<'b> {
+enum FacetOrigin<'b> {
     CellFace(&'b Base),
     Patch,
     /// A partition of a volume that is not star-shaped.
@@ -74,12 +74,12 @@ impl FeatureCells<'_> {
         if bases.iter().any(is_perturbed) {
             return None;
         }
-        let face = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: Of::CellFace(b) };
+        let face = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: FacetOrigin::CellFace(b) };
         let faces: Vec<Facet> = bases.iter().map(face).collect();
         let boundary_loops: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
         let mut volumes: Vec<Volume> = Vec::with_capacity(patches.len() + 1);
         for facets in parts(&faces, &boundary_loops) {
-            let inside = matches!(facets[0].of, Of::CellFace(b) if b.inside);
+            let inside = matches!(facets[0].of, FacetOrigin::CellFace(b) if b.inside);
             volumes.push(Volume { facets, inside });
         }
         // A closed polyline divides the boundary of the cell in two.
@@ -96,7 +96,7 @@ impl FeatureCells<'_> {
             let meets = |v: &&mut Volume| v.facets.iter().any(|f| lines_of(f.ids).contains(&start));
             for volume in volumes.iter_mut().filter(meets) {
                 let stays = volume.inside;
-                let facet = |t: &[usize; 3]| Facet { ids: turned(t.map(|i| ids[i]), stays), of: Of::Patch };
+                let facet = |t: &[usize; 3]| Facet { ids: turned(t.map(|i| ids[i]), stays), of: FacetOrigin::Patch };
                 volume.facets.extend(patch.triangles.iter().map(facet));
             }
         }
@@ -144,9 +144,9 @@ impl FeatureCells<'_> {
         };
         let apex = self.inner_point(cell, apex);
         tets.extend(volume.facets.iter().map(|f| match f.of {
-            Of::CellFace(b) => Tet::over(b, apex),
-            Of::Patch => Tet::inner(f.ids, volume.inside, apex, volume.inside),
-            Of::Partition => Tet::inner(f.ids, volume.inside, apex, false),
+            FacetOrigin::CellFace(b) => Tet::over(b, apex),
+            FacetOrigin::Patch => Tet::inner(f.ids, volume.inside, apex, volume.inside),
+            FacetOrigin::Partition => Tet::inner(f.ids, volume.inside, apex, false),
         }));
         true
     }
@@ -178,7 +178,7 @@ impl FeatureCells<'_> {
 fn closed<'b>(mut half: Vec<Facet<'b>>, partition: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
     let runs = |ids: [usize; 3]| (0..3).any(|k| [ids[k], ids[(k + 1) % 3]] == line);
     let stays = !half.iter().any(|f| runs(f.ids));
-    half.extend(partition.iter().map(|t| Facet { ids: turned(*t, stays), of: Of::Partition }));
+    half.extend(partition.iter().map(|t| Facet { ids: turned(*t, stays), of: FacetOrigin::Partition }));
     half
 }
 
@@ -213,7 +213,7 @@ fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
 /// faces, meeting no patch or partition.
 fn back(facets: &[Facet], route: &[usize]) -> Option<Vec<usize>> {
     let (start, end) = (route[route.len() - 1], route[0]);
-    let is_cell_face = |f: &&Facet| matches!(f.of, Of::CellFace(_));
+    let is_cell_face = |f: &&Facet| matches!(f.of, FacetOrigin::CellFace(_));
     let others = facets.iter().filter(|f| !is_cell_face(f));
     let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
     let lines: Vec<Line> = (facets.iter().filter(is_cell_face)).flat_map(|f| lines_of(f.ids)).collect();
@@ -278,7 +278,7 @@ mod tests {
             ids.push([i, next, next + n]);
             ids.push([i, next + n, i + n]);
         }
-        let facets = ids.iter().map(|ids| Facet { ids: *ids, of: Of::Patch });
+        let facets = ids.iter().map(|ids| Facet { ids: *ids, of: FacetOrigin::Patch });
         let at = |z: f64| polygon.iter().map(move |p| [p[0], p[1], z]);
         (facets.collect(), at(0.0).chain(at(1.0)).collect())
     }

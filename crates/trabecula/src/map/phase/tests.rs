@@ -1,5 +1,5 @@
-use super::super::judged::compared;
 use super::super::phase_grid::Grid;
+use super::super::solution_quality::compared;
 use super::*;
 use crate::grade::Grade;
 use crate::grade::{Formula, Linear};
@@ -47,7 +47,7 @@ fn what_does_not_vary_is_the_affine_map() {
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
     let affine = Affine::rigid(wavelength, angles, offset, &[]).expect("map");
     for region in [None, Some(&ball as &dyn Field)] {
-        let settings = Settings { region, ..Settings::default() };
+        let settings = SolverOptions { region, ..SolverOptions::default() };
         let map = Phase::solve(&b, &wanted, &settings).expect("solved");
         for i in 0..200 {
             let s = [0.371, 0.713, 0.193].map(|s| (s * f64::from(i)).fract());
@@ -118,7 +118,7 @@ fn the_ramp_meets_its_closed_form_at_second_order() {
     let wanted = about_z("22.5*x", Grade::Constant(1.0));
     let mut errors = Vec::new();
     for n in [16.0, 32.0, 64.0] {
-        let settings = Settings { step: Some(l / n), ..Settings::default() };
+        let settings = SolverOptions { step: Some(l / n), ..SolverOptions::default() };
         let phase = Phase::solve(&b, &wanted, &settings).expect("solved");
         let center = at(&phase, [l / 2.0; 3]);
         let mut worst = 0.0f64;
@@ -148,7 +148,7 @@ fn a_conformal_map_is_found_at_second_order() {
     let exact = |p: Vec3| [2.5 * p[0].hypot(p[1]).ln(), 2.5 * p[1].atan2(p[0])];
     let mut errors = Vec::new();
     for step in [0.25, 0.125, 0.0625] {
-        let settings = Settings { step: Some(step), ..Settings::default() };
+        let settings = SolverOptions { step: Some(step), ..SolverOptions::default() };
         let phase = Phase::solve(&b, &wanted, &settings).expect("solved");
         let c = b.center();
         let mut worst = 0.0f64;
@@ -211,7 +211,7 @@ fn the_region_counts_and_its_surroundings_hardly() {
     .expect("quarter");
     let b = bounds([0.0; 3], [12.0, 12.0, 4.0]);
     let wanted = about_z("atan2(y, x) * 57.29577951308232", Grade::Constant(2.0));
-    let solve = |region| Phase::solve(&b, &wanted, &Settings { region, folds: true, step: None }).expect("solved");
+    let solve = |region| Phase::solve(&b, &wanted, &SolverOptions { region, folds: true, step: None }).expect("solved");
     let (near, all) = (solve(Some(&quarter)), solve(None));
     let judge = |phase: &Phase| {
         let mut sum = (0.0, 0);
@@ -234,7 +234,7 @@ fn the_region_counts_and_its_surroundings_hardly() {
 #[test]
 fn what_cannot_be_solved_is_refused_with_its_place() {
     let b = bounds([0.0; 3], [10.0, 10.0, 10.0]);
-    let solve = |w: &PhaseRequest, step| Phase::solve(&b, w, &Settings { step, ..Settings::default() }).err();
+    let solve = |w: &PhaseRequest, step| Phase::solve(&b, w, &SolverOptions { step, ..SolverOptions::default() }).err();
     let refused = |w: &PhaseRequest, key: &str, words: &str| {
         let f = solve(w, None).expect("refused");
         assert!(f.at == key && f.message.contains(words), "{f}");
@@ -267,7 +267,7 @@ fn errors_go_where_they_weigh_least() {
     let left = |p: Vec3| (-p[0] / 4.0).exp();
     let solve = |weight| {
         let wanted = PhaseRequest { weight, ..turned.clone() };
-        Phase::solve(&b, &wanted, &Settings::default()).expect("solved")
+        Phase::solve(&b, &wanted, &SolverOptions::default()).expect("solved")
     };
     let miss = |map: &Phase, weight: &dyn Fn(Vec3) -> f64| -> f64 {
         let positions = (0..4000).map(|i| {
@@ -289,7 +289,7 @@ fn errors_go_where_they_weigh_least() {
     assert!(miss(&heavy, &left) < 0.97 * miss(&even, &left));
     for bad in ["x - 1", "0*x"] {
         let wanted = PhaseRequest { weight: Some(formula(bad)), ..turned.clone() };
-        let fault = Phase::solve(&b, &wanted, &Settings::default()).err();
+        let fault = Phase::solve(&b, &wanted, &SolverOptions::default()).err();
         assert_eq!(fault.expect("refused").at, "weight", "{bad}");
     }
 }
@@ -303,7 +303,7 @@ fn angles_are_bought_with_spacings() {
     for region in [None, Some(&ball as &dyn Field)] {
         let solve = |angle_weight, angle: &str| {
             let wanted = PhaseRequest { angle_weight, ..about_z(angle, Grade::Constant(2.0)) };
-            let settings = Settings { region, ..Settings::default() };
+            let settings = SolverOptions { region, ..SolverOptions::default() };
             Phase::solve(&b, &wanted, &settings)
         };
         let off = |angle_weight| {
@@ -338,7 +338,7 @@ fn misfits_are_those_of_the_report() {
     let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
     let laid = |stress: [Grade; 6]| PhaseRequest { orientation: Orientation::Stress(stress.into()), ..turned.clone() };
     for wanted in [turned.clone(), laid(stress), laid(bar)] {
-        let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
+        let map = Phase::solve(&b, &wanted, &SolverOptions::default()).expect("solved");
         let grid = *map.solution.grid();
         let (nodes, between) = compared(&grid, &vec![f64::NEG_INFINITY; grid.len()], &vec![true; grid.len()], None);
         // Every node of a grid as small as this, and a point in every cell.
@@ -369,7 +369,7 @@ fn what_hides_between_the_nodes_is_refused_or_resolved() {
     for (wanted, key, words) in
         [(&swinging, "rotate", "turns by"), (&pulsing, "wavelength", "the wavelength goes from")]
     {
-        let given = Settings { step: Some(1.0), ..Settings::default() };
+        let given = SolverOptions { step: Some(1.0), ..SolverOptions::default() };
         let fault = Phase::solve(&b, wanted, &given).err().expect("refused");
         assert_eq!(fault.at, key);
         assert!(
@@ -377,7 +377,7 @@ fn what_hides_between_the_nodes_is_refused_or_resolved() {
             "{fault}"
         );
 
-        let map = Phase::solve(&b, wanted, &Settings::default()).expect("solved");
+        let map = Phase::solve(&b, wanted, &SolverOptions::default()).expect("solved");
         assert!(map.hasty().expect("reported").contains(words));
         // 60 degrees within half a period, an eighth of a cell.
         assert!(key != "rotate" || map.distortion().turn > 110.0, "{}", map.distortion().turn);
@@ -404,7 +404,7 @@ fn what_hides_between_the_nodes_is_refused_or_resolved() {
         assert!((d.spacing[1].max - spacing).abs() < 0.05 * spacing, "{spacing} {:?}", d.spacing[1]);
     }
     // A period of several cells is carried by the usual grid.
-    let slow = Phase::solve(&b, &about_z("30*sin(2*pi*x/12)", Grade::Constant(4.0)), &Settings::default());
+    let slow = Phase::solve(&b, &about_z("30*sin(2*pi*x/12)", Grade::Constant(4.0)), &SolverOptions::default());
     let slow = slow.expect("solved");
     assert!(slow.hasty().is_none() && slow.effort().0[0] < 50, "{:?}", slow.effort());
 }
@@ -417,7 +417,7 @@ fn a_short_ramp_turns_as_steeply_as_half_a_cell_sees() {
         let ramp = Grade::from(Linear::new([1.0, 0.0, 0.0], stops).expect("grade"));
         let mut wanted = about_z("0*x", Grade::Constant(4.0));
         wanted.orientation = Orientation::Angles([Grade::Constant(0.0), Grade::Constant(0.0), ramp]);
-        Phase::solve(&b, &wanted, &Settings::default()).expect("solved").distortion().turn
+        Phase::solve(&b, &wanted, &SolverOptions::default()).expect("solved").distortion().turn
     };
     // 40 degrees within 2 mm of a 4 mm cell; the angle between frames is good to √ε.
     assert!((turn(vec![[11.0, 0.0], [13.0, 40.0]]) - 80.0).abs() < 1e-4);
@@ -441,7 +441,7 @@ fn a_region_thinner_than_the_grid_is_judged_inside_it() {
         ];
         let slab = Intersection::new(parts).expect("slab");
         let b = bounds([-10.0; 3], [10.0; 3]);
-        let settings = Settings { region: Some(&slab), folds: true, step: None };
+        let settings = SolverOptions { region: Some(&slab), folds: true, step: None };
         let map = Phase::solve(&b, &about_z("12*x", Grade::Constant(3.0)), &settings).expect("solved");
         let across = cross(unit, [1.0, 0.0, 0.0]);
         let (e, f) = (scale(across, 1.0 / norm(across)), cross(unit, scale(across, 1.0 / norm(across))));
@@ -490,7 +490,7 @@ fn a_wider_range_is_met_where_a_narrower_one_gives_such_a_map() {
                 stretch: Some(Stretch::new(range).expect("range")),
                 ..PhaseRequest::new([3.0; 3].map(Grade::Constant), Orientation::Angles(angles.map(formula)))
             };
-            let settings = Settings { region: Some(&ball), folds: true, step: None };
+            let settings = SolverOptions { region: Some(&ball), folds: true, step: None };
             Phase::solve(&b, &wanted, &settings).expect("solved")
         };
         let wide = Stretch::new([0.67, 1.5]).expect("range");
@@ -515,7 +515,7 @@ fn aligned_cells_are_asked_for_along_the_normal_at_the_surface() {
             align: Some(Aligned::new(6.0).expect("depth")),
             ..about_z(&format!("{angle}"), Grade::Constant(3.0))
         };
-        let settings = Settings { region: Some(&cube), folds: true, step: None };
+        let settings = SolverOptions { region: Some(&cube), folds: true, step: None };
         let map = Phase::solve(&b, &wanted, &settings).expect("solved");
         let asked = |x: f64| {
             let k = map.asked(&[[x, 12.0, 12.0]]).expect("asked")[0];
@@ -548,7 +548,8 @@ fn whole_cells_go_round_a_tube_of_any_size() {
     for length in [2.6, 2.8, 3.0] {
         let wanted =
             PhaseRequest::new([length; 3].map(Grade::Constant), Orientation::Stress(stress.map(formula).into()));
-        let map = Phase::solve(&b, &wanted, &Settings { region: Some(&tube), ..Settings::default() }).expect("solved");
+        let map = Phase::solve(&b, &wanted, &SolverOptions { region: Some(&tube), ..SolverOptions::default() })
+            .expect("solved");
         let [period] = map.periods() else { panic!("{length}: {:?}", map.distortion()) };
         let round = period.cells.iter().map(|n| n.abs()).max().expect("three");
         assert!((round as f64 - TAU * 10.35 / length).abs() < 1.0, "{length}: {period:?}");

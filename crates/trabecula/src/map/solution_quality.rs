@@ -7,7 +7,7 @@ use super::distortion::{self, Distortion, Frames};
 use super::frame;
 use super::phase_grid::Grid;
 use super::phase_request::PhaseRequest;
-use super::phase_target::{Laid, Target, wavelengths};
+use super::phase_target::{SolveDomain, Target, wavelengths};
 use super::solution::Solution;
 use super::surface_feet::feet;
 use crate::field::Field;
@@ -23,7 +23,7 @@ const BETWEEN: usize = 30_000;
 /// Points in a region that is thin or small for the grid, of which more are looked for where fewer are found.
 const FEW: usize = 100;
 /// How a solution compares with its target.
-pub(super) struct Judged {
+pub(super) struct SolutionQuality {
     pub distortion: Distortion,
     /// Jacobians where they were compared.
     pub jacobians: Vec<Mat3>,
@@ -35,15 +35,15 @@ pub(super) struct Judged {
     pub deepest: f64,
 }
 
-impl Judged {
+impl SolutionQuality {
     pub fn of(
-        laid: &Laid,
+        domain: &SolveDomain,
         wanted: &PhaseRequest,
         region: Option<&dyn Field>,
         target: &Target,
         solution: &Solution,
-    ) -> Result<Judged, Fault> {
-        let (Laid { grid, nodes, inside, depth, .. }, wavelength) = (laid, target.wavelength(laid));
+    ) -> Result<SolutionQuality, Fault> {
+        let (SolveDomain { grid, nodes, inside, depth, .. }, wavelength) = (domain, target.wavelength(domain));
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // The density at every node; the other measures, which cost more, at some tens of thousands.
         let density: Vec<f64> = within
@@ -77,7 +77,7 @@ impl Judged {
         let mut distortion = Distortion {
             // Without a node in the region that of the points alone.
             density: [least.map_or(f64::INFINITY, |n| density[n]), most.map_or(0.0, |n| density[n])],
-            least_at: least.map_or(laid.bounds.center(), |n| nodes[within[n]]),
+            least_at: least.map_or(domain.bounds.center(), |n| nodes[within[n]]),
             ..Distortion::of(&found, compared.len(), &curl, turn)
         };
         distortion.widen(&found, &positions);
@@ -89,13 +89,13 @@ impl Judged {
         let fold = worst.or_else(|| fold_between(solution, inside));
         let at_nodes = depth.iter().fold(0.0, |m: f64, d| m.max(-d));
         let deepest = values(region, &between).into_iter().fold(at_nodes, |m, d| m.max(-d));
-        Ok(Judged { distortion, jacobians, missed, fold, deepest })
+        Ok(SolutionQuality { distortion, jacobians, missed, fold, deepest })
     }
 }
 
 /// A node in the region where det J is not positive.
-pub(super) fn fold_at_node(solution: &Solution, laid: &Laid) -> Option<Vec3> {
-    let nodes = laid.nodes.par_iter().zip(&laid.inside).filter(|(_, inside)| **inside);
+pub(super) fn fold_at_node(solution: &Solution, domain: &SolveDomain) -> Option<Vec3> {
+    let nodes = domain.nodes.par_iter().zip(&domain.inside).filter(|(_, inside)| **inside);
     nodes.map(|(p, _)| *p).find_first(|p| determinant(&solution.jacobian(*p)) <= 0.0)
 }
 
