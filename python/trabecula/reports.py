@@ -1271,7 +1271,8 @@ class TilingReport(Report):
     thickness: WallSpread | None
     """Thickness of the walls, mm; None for networks and for zones."""
     volume: float
-    """Volume of the mesh, mm³."""
+    """Volume of its flat tetrahedra with their nodes on the surface, mm³; where `trabecula tets` writes them they balance
+    about it."""
     zones: dict[str, ZoneReport] | None
     """The zones by the number or the name in the design, where zones have cells of their own."""
 

@@ -177,7 +177,8 @@ def _tiling(it: TilingReport) -> Iterator[str]:
     yield f"  method     {it.method}, " + (
         "in each tetrahedron apart" if it.method == "explicit" else f"on a grid over the part: {it.method_reason}"
     )
-    yield f"  mesh       {it.count} tetrahedra, edges {figure(it.edge)} mm on average, {figure(it.volume)} mm³"
+    size, volume = figure(it.edge), figure(it.volume)
+    yield f"  mesh       {it.count} tetrahedra, edges {size} mm on average, {volume} mm³ in flat tetrahedra"
     for zone, z in (it.zones or {}).items():
         yield f"  zone {zone}     {z.cell} in {z.count} tetrahedra; solid fraction {_finished(z)}"
     for join in it.joins or []:

@@ -250,7 +250,7 @@ pub struct TilingReport {
     pub mesh: TetMeshReport,
     /// Mean length of edges, mm.
     pub edge: f64,
-    /// Volume of the mesh, mm³.
+    /// Volume of its flat tetrahedra with their nodes on the surface, mm³; where `trabecula tets` writes them they balance about it.
     pub volume: f64,
     /// Solid fraction of the lattice in its flat tetrahedra, without net or rounding.
     pub solid_fraction: f64,
