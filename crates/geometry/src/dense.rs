@@ -26,8 +26,8 @@ pub fn diagonalise<R: Row>(a: &mut [R], vectors: &mut [R], near: f64) {
                 }
                 is_diagonal = false;
                 let theta = (y - x) / (2.0 * off);
-                let t = (if theta < 0.0 { -1.0 } else { 1.0 }) / (theta.abs() + theta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
+                let t = (if theta < 0.0 { -1.0 } else { 1.0 }) / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let c = 1.0 / (t * t + 1.0).sqrt();
                 let s = t * c;
                 // a ← JᵀaJ, rows of `vectors` ← Jᵀ vectors.
                 for row in &mut *a {
