@@ -226,9 +226,9 @@ fn cut<'a>(
 ) -> Result<Partition<'a>, Stopped> {
     let mut partition = background(domains, cubes, planes);
     if options.periodic {
-        let (p, lattice) = (&partition, domains.lattice);
-        partition.next =
-            cyclic_nodes::cycles(cubes, planes, &p.nodes, p.surfaces, lattice).map_err(Stopped::Refused)?;
+        let lattice = &partition.surfaces[domains.lattice..];
+        partition.next = cyclic_nodes::cycles(cubes, planes, &partition.nodes, lattice, &domains.filled)
+            .map_err(Stopped::Refused)?;
     }
     let step = cubes.step().into_iter().fold(0.0, f64::max);
     let structural: Vec<usize> = planes.iter().flatten().flatten().copied().collect();

@@ -3,10 +3,10 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::body_centred::Cubes;
-use crate::conforming_tets::SurfaceSet;
-use crate::conforming_tets::images;
+use crate::conforming_tets::{SurfaceSet, evaluated, images};
+use crate::csg_tree::CsgSolid;
 use crate::implicit::Surface;
-use geometry::fault::{Fault, number};
+use geometry::fault::{Fault, number, position};
 use geometry::fe_mesh::{FeMesh, Pair};
 use geometry::math::Vec3;
 
@@ -18,13 +18,13 @@ pub const PLANES: [[&str; 2]; 3] = [["X0", "X1"], ["Y0", "Y1"], ["Z0", "Z1"]];
 /// The next image of each node, along cycles; itself without images.
 ///
 /// # Errors
-/// A surface that differs between opposite planes; a region that is no box.
+/// A lattice, or what fills its place, that differs between opposite planes; a region that is no box.
 pub(super) fn cycles(
     cubes: &Cubes,
     planes: &[[Option<usize>; 2]; 3],
     nodes: &[Vec3],
-    surfaces: &[Surface],
-    lattice: usize,
+    lattice: &[Surface],
+    filled: &[CsgSolid],
 ) -> Result<Vec<u32>, Fault> {
     if planes.iter().flatten().any(Option::is_none) {
         return Err(Fault::new(
@@ -47,17 +47,29 @@ pub(super) fn cycles(
                 }
             }
         }
-        let step = cubes.step()[axis];
-        for surface in &surfaces[lattice..] {
-            let at = |k: usize| -> Vec<Vec3> { pairs.iter().map(|p| nodes[p[k] as usize]).collect() };
-            let [v, w] = [at(0), at(1)].map(|p| crate::conforming_tets::evaluated(&*surface.field, &p));
+        let near = OFF * cubes.step()[axis];
+        let [a, b] = PLANES[axis];
+        let at = [0, 1].map(|k| pairs.iter().map(|p| nodes[p[k] as usize]).collect::<Vec<Vec3>>());
+        for surface in lattice {
+            let [v, w] = at.each_ref().map(|p| evaluated(&*surface.field, p));
             let off = v.iter().zip(&w).map(|(v, w)| (v - w).abs()).fold(0.0, f64::max) / surface.lipschitz;
-            if off > OFF * step {
-                let [a, b] = PLANES[axis];
+            if off > near {
                 let message = format!(
                     "the lattice differs between {a} and {b} by about {} mm; the region must hold whole cells along each axis, and \
                      nothing may vary between them",
                     number(off)
+                );
+                return Err(Fault::new("periodic", message));
+            }
+        }
+        for body in filled {
+            let [v, w] = at.each_ref().map(|p| evaluated(body, p));
+            let differs = |i: &usize| v[*i].min(w[*i]) < -near && v[*i].max(w[*i]) > near;
+            if let Some(i) = (0..pairs.len()).find(differs) {
+                let message = format!(
+                    "a keep zone or skin is solid at {} and not at {}, its image; let it be the same at {a} and {b}, or reach neither",
+                    position(at[usize::from(v[i] > 0.0)][i]),
+                    position(at[usize::from(v[i] < 0.0)][i]),
                 );
                 return Err(Fault::new("periodic", message));
             }
