@@ -152,7 +152,8 @@ campaign: $(VENV)/.test-tools
 	TRABECULA_CASES=$$(($(CASES) / 5)) cargo test --profile checked --locked -p trabecula --test laws -- combined --nocapture
 	TRABECULA_CASES=$$(($(CASES) / 10)) cargo test --profile checked --locked -p trabecula --test laws -- skin:: islands::
 	TRABECULA_CASES=$$(($(CASES) / 50)) cargo test --profile checked --locked -p trabecula --test laws -- \
-	  crease:: shells:: simplify:: tets thickness:: tiling::
+	  cores:: crease:: disclinations:: measured:: noisy_stress:: patches:: periodic_cells:: pore:: shells:: simplify:: smooth:: \
+	  spacing:: stretch:: tets thickness:: tiling volume_angles:: wavelength::
 	TRABECULA_CAMPAIGN=1 $(PYTEST) tests/test_parts.py tests/test_laws.py tests/test_corpus.py tests/test_ranges.py
 
 python-test: $(VENV)/.test-tools

@@ -281,7 +281,7 @@ def test_what_a_map_misses_is_said_of_the_worst_axes():
 
 def test_a_range_of_stretch_makes_no_map_worse():
     """Where the map without a range keeps to it, that is the map; where none does, it is the one that comes nearest."""
-    ring = lt.region.difference(lt.region.cylinder([0, 0, 0], 14, 8), lt.region.cylinder([0, 0, -1], 7, 12))
+    ring = lt.region.difference(lt.region.cylinder([0, 0, 0], 11, 4.5), lt.region.cylinder([0, 0, -1], 5.5, 8))
 
     def stretch(**keys):
         map = lt.map.phase(wavelength=3, align="surface", **keys)

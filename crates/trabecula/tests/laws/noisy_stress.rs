@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::common::{cuboid, mean, off_axis, points, within};
+use crate::common::{cuboid, mean, off_axis, points, rows, within};
 use geometry::math::{Aabb, Vec3, determinant, dot, norm, scale};
 use trabecula::grade::{Grade, Samples};
 use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, SolverOptions, Stretch, TwoAxes};
@@ -36,7 +36,7 @@ fn solved(b: &Aabb, orientation: Orientation, smooth: Option<f64>) -> Result<Pha
 #[test]
 fn a_bent_beam_is_followed_through_noise() {
     let b = Aabb { min: [0.0; 3], max: [24.0, 24.0, 9.0] };
-    for noise in [0.0, 0.001, 0.01, 0.03] {
+    for noise in rows(2, [0.0, 0.03, 0.001, 0.01]) {
         let stress = samples(&b, |p, random| {
             let mut s = [0.0; 6].map(|_| noise * random());
             s[0] += (p[1] - 12.0) / 12.0;
@@ -135,7 +135,7 @@ fn signs_of_vectors_do_not_count() {
 /// without stress have no place of their own, and cells are kept from folding by a bound on their stretch.
 #[test]
 fn a_plate_with_a_hole_is_followed_through_noise() {
-    let (a, b) = (5.0, Aabb { min: [-21.0, -21.0, 0.0], max: [21.0, 21.0, WAVELENGTH] });
+    let (a, b) = (4.0, Aabb { min: [-16.5, -16.5, 0.0], max: [16.5, 16.5, WAVELENGTH] });
     let kirsch = |[x, y, _]: Vec3| {
         let r2 = (x * x + y * y).max(a * a);
         let (double, sine, q) = ((x * x - y * y) / r2, 2.0 * x * y / r2, a * a / r2);
@@ -149,7 +149,7 @@ fn a_plate_with_a_hole_is_followed_through_noise() {
     let hole: Region = Arc::new(Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], a, 8.0).expect("hole"));
     let part: Region = Arc::new(Difference::new(vec![cuboid(b.min, b.max), hole]).expect("part"));
     let far: Vec<Vec3> = within(&part, 20_000, 9).into_iter().filter(|p| p[0].hypot(p[1]) > a + WAVELENGTH).collect();
-    let found = [0.0, 0.001, 0.01, 0.03].map(|noise| {
+    let found = rows(3, [0.0, 0.01, 0.03, 0.001]).map(|noise| {
         let stress = samples(&b, |p, random| kirsch(p).map(|v| v + 3.0 * noise * random()));
         let wavelength = [0; 3].map(|_| Grade::Constant(WAVELENGTH));
         let stretch = (noise > 0.01).then(|| Stretch::new([0.67, 1.5]).expect("range"));
@@ -167,6 +167,7 @@ fn a_plate_with_a_hole_is_followed_through_noise() {
             off_axis(&map.jacobian(*p), [c, s, 0.0])
         }))
     });
+    let found: Vec<f64> = found.collect();
     println!("plate: {found:?} degrees");
     assert!(found[0] < 3.0 && found.iter().all(|f| *f < 1.5 * found[0]), "{found:?}");
 }

@@ -9,7 +9,7 @@ use trabecula::cell::{Cell, Part, Series, Term, catalogue, named};
 use trabecula::design::{Built, Design, DesignError, NoFiles};
 use trabecula::report::Varying;
 
-use crate::common::cases;
+use crate::common::{cases, rows};
 
 fn cell(name: &str) -> Cell {
     Cell::new(Series::new(named(name).expect(name).terms()).expect(name))
@@ -201,7 +201,7 @@ fn pores_of_a_sheet_are_those_of_its_sides() {
 /// where their saddle was not found.
 #[test]
 fn pores_fall_smoothly() {
-    for (name, first) in [("diamond", 27), ("gyroid", 15)] {
+    for (name, first) in rows(1, [("diamond", 27), ("gyroid", 15)]) {
         let cell = cell(name);
         let pore = |k: i32| cell.pores(Part::Sheet, cell.level(Part::Sheet, 0.01 * f64::from(k)), &cubic(1.0))[0];
         let found: Vec<f64> = (first..41).map(pore).collect();

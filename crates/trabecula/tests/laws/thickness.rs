@@ -18,7 +18,7 @@ use trabecula::map::Affine;
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;
 
-use crate::common::{campaign, cases};
+use crate::common::{campaign, cases, rows};
 
 fn series(name: &str) -> Series {
     Series::new(named(name).expect(name).terms()).expect(name)
@@ -135,7 +135,7 @@ fn walls_are_as_thick_as_asked() {
         let s = series(name);
         let map = rigid([5.0; 3], [0.0; 3]);
         let limit = Distance::new(&s, &map.matrix).folding().expect("a surface");
-        for w in [0.05, 0.15, 0.25] {
+        for w in rows(2, [0.05, 0.25, 0.15]) {
             if 5.0 * w < limit {
                 let found = judged(&s, map, Grade::Constant(5.0 * w), 5.0 / 48.0);
                 within(&format!("{name} {w}"), found);

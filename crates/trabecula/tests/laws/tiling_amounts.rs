@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::common::{Random, check};
+use super::common::{Random, check, rows};
 use super::tiling::{cell, made, shaken};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::measure::size;
@@ -48,11 +48,12 @@ fn spread(map: &Tets, n: usize, some: &mut Random) -> Vec<(Vec3, f64)> {
 #[test]
 fn overlap_keeps_the_fraction() {
     let mut some = Random(21);
-    for (mesh, overlap) in [
-        (shaken(3, 0.15, 4.0, &mut some), 0.05),
+    let meshes = [
         (shaken(2, 0.25, 5.0, &mut some), 0.1),
         (shaken(3, 0.1, 3.0, &mut some), 0.2),
-    ] {
+        (shaken(3, 0.15, 4.0, &mut some), 0.05),
+    ];
+    for (mesh, overlap) in rows(2, meshes) {
         let map = overlapping(&mesh, overlap);
         let one = |name: &str, part, fraction: f64| {
             let cell = ready(name);

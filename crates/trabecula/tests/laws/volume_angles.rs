@@ -189,7 +189,7 @@ fn named_cells_have_angles_of_15_to_150_degrees_and_their_volume() {
 #[test]
 fn balanced_boundaries_cross_no_more_than_others() {
     let mut some = Random(75);
-    for _ in 0..cases(6) {
+    for _ in 0..cases(3) {
         let text = random(&mut some);
         let design = built(&text);
         let edge = 4.0 / some.between(6.0, 10.0);

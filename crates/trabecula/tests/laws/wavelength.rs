@@ -8,7 +8,7 @@ use trabecula::design::{Built, Design, DesignError, NoFiles};
 use trabecula::field::Field;
 use trabecula::report::Varying;
 
-use crate::common::{Random, cases};
+use crate::common::{Random, cases, rows};
 
 fn built(cell: &str, part: &str, map: &str, level: &str) -> Result<Built, DesignError> {
     let text = format!(
@@ -79,11 +79,12 @@ fn graded_fractions_and_lengths_are_graded_wavelengths() {
     };
     let mut some = Random(5);
     let points: Vec<Vec3> = (0..500).map(|_| some.point(4.5)).collect();
-    for (cell, part, key) in [
+    let kinds = [
         ("gyroid", Part::Sheet, "thickness"),
-        ("diamond", Part::Lower, "thickness"),
         ("primitive", Part::Upper, "pore"),
-    ] {
+        ("diamond", Part::Lower, "thickness"),
+    ];
+    for (cell, part, key) in rows(2, kinds) {
         let series = Series::new(named(cell).expect("named").terms()).expect("series");
         let of = Cell::new(series.clone());
         let wall = Distance::new(&series, &IDENTITY);
