@@ -277,6 +277,11 @@ SOLIDS = {
         lambda p: np.maximum(tube(p, 9, 0, 5), -tube(p, 4, -1, 6)),
         lambda p: np.abs(seen("diamond", p, iso(5))) - (0.4 + 0.1 * np.sin(p[0] / 3)),
     ),
+    "graded_about_bore": (
+        ((-6, -6, 0), (6, 6, 5)),
+        lambda p: np.maximum(box(p, (-6, -6, 0), (6, 6, 5)), -tube(p, 2, -1, 6)),
+        lambda p: np.abs(seen("diamond", p, iso(5))) - ramp(2 - np.hypot(p[0], p[1]), -4, 0.3, 0, 0.6) * (1 + p[0] / 40),
+    ),
     "skewed_lens": (
         ((-9.5, -9.5, -1.5), (9.5, 9.5, 5.5)),
         lens,

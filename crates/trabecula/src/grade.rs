@@ -31,7 +31,7 @@ mod stops;
 
 pub use control_points::ControlPoints;
 pub use depth::Depth;
-pub use formula::Formula;
+pub use formula::{Combined, Formula};
 pub use invariant::{Invariant, TensorOrder};
 pub use linear::Linear;
 pub use polyline::Polyline;
@@ -69,6 +69,7 @@ pub enum GradeKind {
     Depth(depth::DepthKind),
     Radial(radial::RadialKind),
     Formula(formula::FormulaKind),
+    Combined(formula::CombinedKind),
     Grid(grid::GridKind),
     Points(scattered::PointsKind),
     Field(FieldKind),
@@ -202,6 +203,15 @@ mod tests {
             Polyline::new(chain(), true, Some([0.1, -0.2, 1.0]), None).unwrap().into(),
             Rbf::new(chain(), &values, Some(1.1), None).unwrap().into(),
             Product::of(formula("x + y*z - 0.1"), grid().into()),
+            Combined::new(
+                "max(a, 0.4*z) * (1 + sin(b)) - a^2/(2 + x^2)",
+                vec![
+                    ("a".into(), Depth::new(ball(), vec![[-0.6, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into()),
+                    ("b".into(), grid().into()),
+                ],
+            )
+            .unwrap()
+            .into(),
         ]
     }
 

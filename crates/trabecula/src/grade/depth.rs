@@ -5,14 +5,17 @@ use std::sync::Arc;
 use super::{BuildGrade, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
-use crate::region::{DistanceTable, Region};
+use crate::region::{DistanceTable, Region, RegionKind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
-/// By depth below the region's surface: piecewise linear, constant beyond the ends.
+/// By depth below a surface: piecewise linear, constant beyond the ends.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Depth", noun = "a grade by depth")]
 pub struct DepthKind {
+    /// Another region whose surface is meant, such as that of a bore or a bearing face; depth is negative outside it. The design's own
+    /// unless given.
+    of: Option<Box<RegionKind>>,
     /// Pairs [depth in mm, value], depth rising.
     #[kind(inherit)]
     stops: Stops,
@@ -20,7 +23,11 @@ pub struct DepthKind {
 
 impl BuildGrade for DepthKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(Depth::of(of.environment.region.clone(), of.stops(self.stops.clone())).into())
+        let region = match &self.of {
+            Some(kind) => of.environment.region(kind, &format!("{}.of", of.path))?,
+            None => of.environment.region.clone(),
+        };
+        Ok(Depth::of(region, of.stops(self.stops.clone())).into())
     }
 }
 
@@ -40,7 +47,7 @@ impl Depth {
     /// # Errors
     /// Stops that are none, not finite or not rising in depth.
     pub fn new(region: Region, stops: Vec<[f64; 2]>) -> Result<Depth, Fault> {
-        let kind = DepthKind { stops: Stops(stops) };
+        let kind = DepthKind { of: None, stops: Stops(stops) };
         kind.valid()?;
         Ok(Depth::of(region, kind.stops))
     }

@@ -6,10 +6,12 @@ use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
 
+mod combined;
 mod operation;
 mod parse;
+pub use combined::{Combined, CombinedKind};
 use operation::Operation;
-use parse::parse;
+use parse::{AXES, parse};
 
 /// Points that an instruction is done for at once.
 const LANES: usize = 16;
@@ -101,7 +103,17 @@ impl Formula {
     /// **Errors** name the column, what was found there and what is expected; an unknown word gets the nearest
     /// known one.
     pub fn parse(text: &str) -> Result<Formula, Fault> {
-        Ok(Formula { program: parse(text)? })
+        Formula::with_names(text, &[])
+    }
+
+    /// The same with further variables, whose numbers are given with the position.
+    fn with_names(text: &str, names: &[&str]) -> Result<Formula, Fault> {
+        Ok(Formula { program: parse(text, names)? })
+    }
+
+    /// Whether it names a variable.
+    fn has_variable(&self, n: usize) -> bool {
+        self.program.iter().any(|i| matches!(i, Instruction::Variable(v) if *v == n))
     }
 
     /// The program: words, after those of their arguments, and a number. `number` stands for it, `x`, `y`, `z` for the position, other words
@@ -109,7 +121,7 @@ impl Formula {
     pub fn postfix(&self) -> Vec<(&'static str, f64)> {
         let word = |instruction: &Instruction| match *instruction {
             Instruction::Number(v) => ("number", v),
-            Instruction::Variable(a) => (["x", "y", "z"][a], 0.0),
+            Instruction::Variable(a) => (AXES[a], 0.0),
             Instruction::Apply(op) => (op.name(), 0.0),
         };
         self.program.iter().map(word).collect()
@@ -157,7 +169,7 @@ impl Formula {
         stack.pop().unwrap_or([T::constant(f64::NAN); LANES])
     }
 
-    fn run<T: Operand>(&self, variables: [T; 3], stack: &mut Vec<T>) -> T {
+    fn run<T: Operand>(&self, variables: &[T], stack: &mut Vec<T>) -> T {
         stack.clear();
         for instruction in &self.program {
             match *instruction {
@@ -199,14 +211,14 @@ impl Field for Formula {
     /// By interval arithmetic; everything where the formula may be undefined.
     fn bound(&self, b: &Aabb) -> Interval {
         let at = [0, 1, 2].map(|a| Interval::new(b.min[a], b.max[a]));
-        self.run(at, &mut Vec::new())
+        self.run(&at, &mut Vec::new())
     }
 }
 
 impl Varying for Formula {
     /// The axes that it names.
     fn varies(&self) -> [bool; 3] {
-        [0, 1, 2].map(|a| self.program.iter().any(|i| matches!(i, Instruction::Variable(n) if *n == a)))
+        [0, 1, 2].map(|a| self.has_variable(a))
     }
 }
 
@@ -251,7 +263,7 @@ mod tests {
         f.values(&points, &mut v);
         f.gradients(&points, &mut w, &mut g);
         for (i, p) in points.iter().enumerate() {
-            let alone: f64 = f.run(*p, &mut Vec::new());
+            let alone: f64 = f.run(p, &mut Vec::new());
             assert!(v[i] == alone && w[i] == alone, "{} {} {alone}", v[i], w[i]);
             assert_eq!(gradient(&f, *p), (w[i], g[i]));
         }

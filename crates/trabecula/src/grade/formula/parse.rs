@@ -17,13 +17,22 @@ const LONGEST: usize = 4096;
 /// The deepest nesting of brackets, signs and powers.
 const DEEPEST: usize = 64;
 
-/// The program of a formula. **Errors** as `Formula::parse` says.
-pub(super) fn parse(text: &str) -> Result<Vec<Instruction>, Fault> {
+/// The variables of every formula.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+const CONSTANTS: [(&str, f64); 2] = [("pi", core::f64::consts::PI), ("e", core::f64::consts::E)];
+
+/// The words that have a meaning in every formula.
+pub(super) fn reserved() -> impl Iterator<Item = &'static str> + Clone {
+    AXES.into_iter().chain(CONSTANTS.iter().map(|c| c.0)).chain(FUNCTIONS.iter().map(|f| f.0))
+}
+
+/// The program of a formula whose variables are x, y, z and `names`. **Errors** as `Formula::parse` says.
+pub(super) fn parse(text: &str, names: &[&str]) -> Result<Vec<Instruction>, Fault> {
     if text.len() > LONGEST {
         let n = text.len();
         return Err(Fault::new("", format!("the formula has {n} characters; at most {LONGEST} are read")));
     }
-    let mut p = Parser { text, at: 0, depth: 0, program: Vec::new() };
+    let mut p = Parser { text, names, at: 0, depth: 0, program: Vec::new() };
     p.sum()?;
     match p.peek() {
         None => Ok(p.program),
@@ -35,6 +44,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Instruction>, Fault> {
 
 struct Parser<'a> {
     text: &'a str,
+    names: &'a [&'a str],
     at: usize,
     depth: usize,
     program: Vec<Instruction>,
@@ -139,13 +149,11 @@ impl<'a> Parser<'a> {
         let rest = &self.text[self.at..];
         let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
         let word = &rest[..end];
-        let instruction = match word {
-            "x" => Instruction::Variable(0),
-            "y" => Instruction::Variable(1),
-            "z" => Instruction::Variable(2),
-            "pi" => Instruction::Number(core::f64::consts::PI),
-            "e" => Instruction::Number(core::f64::consts::E),
-            _ => return self.call(word),
+        let variable = AXES.iter().chain(self.names).position(|name| *name == word);
+        let instruction = match (variable, CONSTANTS.iter().find(|c| c.0 == word)) {
+            (Some(n), _) => Instruction::Variable(n),
+            (None, Some((_, v))) => Instruction::Number(*v),
+            (None, None) => return self.call(word),
         };
         self.program.push(instruction);
         self.at += end;
@@ -157,8 +165,8 @@ impl<'a> Parser<'a> {
 
     fn call(&mut self, word: &str) -> Result<(), Fault> {
         let Some(&(_, op)) = FUNCTIONS.iter().find(|f| f.0 == word) else {
-            let names = ["x", "y", "z", "pi", "e"].into_iter();
-            let names = names.chain(FUNCTIONS.iter().map(|f| f.0));
+            let known = reserved().map(|word| -> &'a str { word });
+            let names = known.clone().take(AXES.len()).chain(self.names.iter().copied()).chain(known.skip(AXES.len()));
             let meant = nearest(word, names.clone());
             let known = match meant {
                 Some(name) => format!("did you mean {name}? Known words"),
