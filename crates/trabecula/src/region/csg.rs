@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::halfspace::polyhedron_bounds;
-use super::meshes::{List, Meshes};
+use super::meshes::List;
 use super::{BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
@@ -60,46 +60,48 @@ pub struct Intersection(List);
 /// What lies in the first region and in none of the others: max(d₀, −d₁, −d₂ …).
 pub struct Difference(List);
 
-fn some(verb: &str, of: Vec<Region>) -> Result<List, Fault> {
-    if of.is_empty() {
-        return Err(Fault::new("", format!("{verb} of no regions: list at least one")));
+/// The list of what joins regions. Errors if it is empty.
+fn list<J: Join>(what: &str, of: Vec<Region>) -> Result<List, Fault> {
+    match of.is_empty() {
+        true => Err(Fault::new("", format!("{what} of no regions: list at least one"))),
+        false => Ok(List::new(of, !J::ALL, J::negated)),
     }
-    Ok(List::new(of))
 }
 
 impl Union {
     /// The union. Errors if the list is empty.
     pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
-        some("a union", of).map(Union)
+        list::<Self>("a union", of).map(Union)
     }
 }
 
 impl Intersection {
     /// The intersection. Errors if the list is empty.
     pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
-        some("an intersection", of).map(Intersection)
+        list::<Self>("an intersection", of).map(Intersection)
     }
 }
 
 impl Difference {
     /// The first region without the others. Errors if the list is empty.
     pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
-        some("a difference", of).map(Difference)
+        list::<Self>("a difference", of).map(Difference)
     }
 }
 
 /// How the regions of a list join: the signs they enter with and whether the greatest or the least counts.
 trait Join: Send + Sync {
     fn list(&self) -> &List;
+    /// The regions as they were given.
     fn regions(&self) -> &[Region] {
         &self.list().of
     }
-    /// The meshes among the regions as one.
-    fn meshes(&self) -> Option<&Meshes> {
-        self.list().meshes(!Self::ALL, |i| self.negated(i))
+    /// The regions with all meshes as one, and whether each enters by its complement; the first does not.
+    fn operands(&self) -> &[(Region, bool)] {
+        &self.list().operands
     }
     /// Whether region `i` enters by its complement.
-    fn negated(&self, i: usize) -> bool;
+    fn negated(i: usize) -> bool;
     /// Whether a later value replaces the one held.
     fn takes(new: f64, held: f64) -> bool;
     /// Whether all must be solid, rather than any.
@@ -112,7 +114,7 @@ impl Join for Union {
     fn list(&self) -> &List {
         &self.0
     }
-    fn negated(&self, _: usize) -> bool {
+    fn negated(_: usize) -> bool {
         false
     }
     fn takes(new: f64, held: f64) -> bool {
@@ -132,7 +134,7 @@ impl Join for Intersection {
     fn list(&self) -> &List {
         &self.0
     }
-    fn negated(&self, _: usize) -> bool {
+    fn negated(_: usize) -> bool {
         false
     }
     fn takes(new: f64, held: f64) -> bool {
@@ -156,7 +158,7 @@ impl Join for Difference {
     fn list(&self) -> &List {
         &self.0
     }
-    fn negated(&self, i: usize) -> bool {
+    fn negated(i: usize) -> bool {
         i > 0
     }
     fn takes(new: f64, held: f64) -> bool {
@@ -175,12 +177,12 @@ macro_rules! joined {
     ($($shape:ty),*) => {$(
         impl Field for $shape {
             fn values(&self, points: &[Vec3], out: &mut [f64]) {
-                self.regions()[0].values(points, out);
+                self.operands()[0].0.values(points, out);
                 let mut other = vec![0.0; points.len()];
-                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                for (r, negated) in &self.operands()[1..] {
                     r.values(points, &mut other);
                     for (o, v) in out.iter_mut().zip(&other) {
-                        let v = if self.negated(i) { -v } else { *v };
+                        let v = if *negated { -v } else { *v };
                         if Self::takes(v, *o) {
                             *o = v;
                         }
@@ -189,11 +191,11 @@ macro_rules! joined {
             }
 
             fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-                self.regions()[0].gradients(points, values, gradients);
+                self.operands()[0].0.gradients(points, values, gradients);
                 let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                for (r, negated) in &self.operands()[1..] {
                     r.gradients(points, &mut v, &mut g);
-                    let sign = if self.negated(i) { -1.0 } else { 1.0 };
+                    let sign = if *negated { -1.0 } else { 1.0 };
                     for k in 0..points.len() {
                         if Self::takes(sign * v[k], values[k]) {
                             values[k] = sign * v[k];
@@ -204,10 +206,10 @@ macro_rules! joined {
             }
 
             fn bound(&self, b: &Aabb) -> Interval {
-                let mut range = self.regions()[0].bound(b);
-                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                let mut range = self.operands()[0].0.bound(b);
+                for (r, negated) in &self.operands()[1..] {
                     let other = r.bound(b);
-                    range = Self::range(range, if self.negated(i) { -other } else { other });
+                    range = Self::range(range, if *negated { -other } else { other });
                 }
                 range
             }
@@ -223,17 +225,17 @@ macro_rules! joined {
             }
 
             fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
-                for (i, r) in self.regions().iter().enumerate() {
-                    r.level_planes(axis, if self.negated(i) { -level } else { level }, out);
+                for (r, negated) in self.operands() {
+                    r.level_planes(axis, if *negated { -level } else { level }, out);
                 }
             }
 
             // Rounding keeps order, so joining rounded values gives the rounded join.
             fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-                self.regions()[0].fill_level(block, level, out);
+                self.operands()[0].0.fill_level(block, level, out);
                 let mut other = vec![0.0f32; out.len()];
-                for (i, r) in self.regions().iter().enumerate().skip(1) {
-                    let sign = if self.negated(i) { -1.0f32 } else { 1.0 };
+                for (r, negated) in &self.operands()[1..] {
+                    let sign = if *negated { -1.0f32 } else { 1.0 };
                     r.fill_level(block, level * f64::from(sign), &mut other);
                     for (o, v) in out.iter_mut().zip(&other) {
                         if Self::takes(f64::from(sign * v), f64::from(*o)) {
@@ -244,22 +246,16 @@ macro_rules! joined {
             }
 
             fn is_searched(&self) -> bool {
-                self.regions().iter().any(|r| r.is_searched())
+                self.operands().iter().any(|(r, _)| r.is_searched())
             }
 
             fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
-                let meshes = self.meshes();
-                let regions = self.regions().iter().enumerate().filter_map(|(i, r)| match meshes {
-                    Some(m) if m.which[0] == i => Some((i, m.one.clone() as Region)),
-                    Some(m) if m.which.contains(&i) => None,
-                    _ => Some((i, r.clone())),
-                });
-                let each = regions.map(|(i, r)| {
-                    if !self.negated(i) {
-                        return r.surfaces(by, out);
+                let each = self.operands().iter().map(|(r, negated)| {
+                    if !negated {
+                        return r.clone().surfaces(by, out);
                     }
                     let first = out.len();
-                    let tree = r.surfaces(-by, out).complement();
+                    let tree = r.clone().surfaces(-by, out).complement();
                     let turned = out.split_off(first);
                     out.extend(turned.into_iter().map(Surface::complement));
                     tree
@@ -272,11 +268,10 @@ macro_rules! joined {
             }
 
             fn as_mesh(&self) -> Option<&MeshRegion> {
-                if let [only] = self.regions() {
-                    return only.as_mesh();
+                match self.operands() {
+                    [(only, _)] => only.as_mesh(),
+                    _ => None,
                 }
-                let meshes = self.meshes()?;
-                (meshes.which.len() == self.regions().len()).then(|| &*meshes.one)
             }
 
             fn cad(&self, out: &mut Vec<Arc<CadMesh>>) {
@@ -287,21 +282,21 @@ macro_rules! joined {
             fn opened(self: Arc<Self>, cuts: &[OpenSurface], found: &mut [bool]) -> Option<Region> {
                 let mut any = false;
                 let mut open = |(i, r): (usize, &Region)| {
-                    let opened = if self.negated(i) { None } else { r.clone().opened(cuts, found) };
+                    let opened = if Self::negated(i) { None } else { r.clone().opened(cuts, found) };
                     any |= opened.is_some();
                     opened.unwrap_or_else(|| r.clone())
                 };
                 let regions = self.regions().iter().enumerate().map(&mut open).collect();
-                any.then(|| Arc::new(Self(List::new(regions))) as Region)
+                any.then(|| Arc::new(Self(List::new(regions, !Self::ALL, Self::negated))) as Region)
             }
 
             fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
                 let mut out = Vec::new();
-                for (i, r) in self.regions().iter().enumerate() {
-                    let own = r.half_spaces().filter(|_| Self::ALL || self.regions().len() == 1)?;
+                for (r, negated) in self.operands() {
+                    let own = r.half_spaces().filter(|_| Self::ALL || self.operands().len() == 1)?;
                     match &own[..] {
-                        [one] if self.negated(i) => out.push(one.complement()),
-                        _ if self.negated(i) => return None,
+                        [one] if *negated => out.push(one.complement()),
+                        _ if *negated => return None,
                         all => out.extend(all),
                     }
                 }
@@ -309,8 +304,8 @@ macro_rules! joined {
             }
 
             fn volume(&self) -> Option<f64> {
-                match self.regions() {
-                    [only] => only.volume(),
+                match self.operands() {
+                    [(only, _)] => only.volume(),
                     _ => None,
                 }
             }
@@ -324,6 +319,8 @@ mod tests {
     use super::*;
     use crate::region::tests::check_shape;
     use crate::region::{Cuboid, Cylinder, Offset, Sphere};
+    use geometry::mesh::Mesh;
+    use geometry::repair::Repair;
     use std::sync::Arc;
 
     fn parts() -> [Region; 3] {
@@ -370,6 +367,35 @@ mod tests {
         assert!((Intersection::new(vec![b.clone(), c]).unwrap().value([1.0, 0.0, 0.0]) - 0.6).abs() < 1e-15);
         assert!((Offset::new(s, 0.5).unwrap().value(p) + 1.4).abs() < 1e-15);
         assert_eq!(Union::new(vec![b.clone()]).unwrap().volume(), b.volume());
+    }
+
+    /// Meshes that touch, overlap or are cut from each other have the distance of what they are together, moved or not: a box of two halves
+    /// is the box.
+    #[test]
+    fn meshes_have_one_distance() {
+        let mesh =
+            |lo: Vec3, hi: Vec3| -> Region { Arc::new(MeshRegion::new(Mesh::cuboid(lo, hi), Repair::Refuse).unwrap()) };
+        let whole = Cuboid::new([0.0; 3], [2.0, 1.0, 1.0]).unwrap();
+        let [low, high] = [mesh([0.0; 3], [1.0; 3]), mesh([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])];
+        let long = mesh([0.0; 3], [3.0, 1.0, 1.0]);
+        let [over, past] = [mesh([0.8, 0.0, 0.0], [2.0, 1.0, 1.0]), mesh([2.0, -1.0, -1.0], [4.0, 2.0, 2.0])];
+        let made: [Region; 4] = [
+            Arc::new(Union::new(vec![low.clone(), high.clone()]).unwrap()),
+            Arc::new(Union::new(vec![low, over]).unwrap()),
+            Arc::new(Difference::new(vec![long.clone(), past]).unwrap()),
+            Arc::new(Intersection::new(vec![long, mesh([-1.0, 0.0, 0.0], [2.0, 1.0, 1.0])]).unwrap()),
+        ];
+        let mut seed = 11;
+        let points: Vec<Vec3> = (0..500).map(|_| [0; 3].map(|_| 3.0 * geometry::random::random(&mut seed))).collect();
+        for (i, region) in made.iter().enumerate() {
+            assert!((region.volume().unwrap() - 2.0).abs() < 1e-12);
+            for by in [0.0, -0.3, 0.2] {
+                let moved = Offset::new(region.clone(), by).unwrap();
+                for p in &points {
+                    assert!((moved.value(*p) - whole.value(*p) + by).abs() < 1e-12, "{i}, {by}: {p:?}");
+                }
+            }
+        }
     }
 
     #[test]

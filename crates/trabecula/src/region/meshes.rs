@@ -3,50 +3,48 @@
 //! Two meshes that meet are two surfaces, each with edges of its own, and a third set where they cross. As one mesh, cut
 //! along each other exactly, they are one surface with all of these edges, and with one distance.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::{MeshRegion, Region};
 
 /// Regions that are combined.
 pub(super) struct List {
+    /// As they were given.
     pub of: Vec<Region>,
-    /// Computed at first use.
-    meshes: OnceLock<Option<Meshes>>,
-}
-
-/// Those of a list that are meshes, as one.
-pub(super) struct Meshes {
-    /// Which they are.
-    pub which: Vec<usize>,
-    pub one: Arc<MeshRegion>,
+    /// With all meshes as one, and whether each enters by its complement; the first does not.
+    pub operands: Vec<(Region, bool)>,
 }
 
 impl List {
-    pub fn new(of: Vec<Region>) -> List {
-        List { of, meshes: OnceLock::new() }
-    }
-
-    /// The meshes of the list as one, if there are several. `any`: whether the solid is what is in any, rather than all;
-    /// `negated` tells the regions that enter by their complement. One that is all of such is what they make together.
-    pub fn meshes(&self, any: bool, negated: impl Fn(usize) -> bool) -> Option<&Meshes> {
-        let find = || {
-            let meshes = self.of.iter().enumerate();
-            let meshes: Vec<_> = meshes.filter_map(|(i, r)| Some((i, r.as_mesh()?))).collect();
-            if meshes.len() < 2 {
-                return None;
-            }
-            let side = |less: bool| -> Vec<&MeshRegion> {
-                let some = meshes.iter().filter(|(i, _)| negated(*i) == less);
-                some.map(|(_, r)| *r).collect()
-            };
-            let (plain, less) = (side(false), side(true));
-            let one = if plain.is_empty() {
-                MeshRegion::combined(&less, true, &[])
-            } else {
-                MeshRegion::combined(&plain, any, &less)
-            };
-            Some(Meshes { which: meshes.iter().map(|(i, _)| *i).collect(), one: Arc::new(one?) })
+    /// Of regions, of which the solid is what is in any, rather than all, if `any`, and of which the `negated` ones enter by their
+    /// complement.
+    pub fn new(of: Vec<Region>, any: bool, negated: fn(usize) -> bool) -> List {
+        let one = of_meshes(&of, any, negated);
+        let operand = |(i, r): (usize, &Region)| match &one {
+            Some((first, one)) if *first == i => Some((one.clone(), negated(i))),
+            Some(_) if r.as_mesh().is_some() => None,
+            _ => Some((r.clone(), negated(i))),
         };
-        self.meshes.get_or_init(find).as_ref()
+        let operands = of.iter().enumerate().filter_map(operand).collect();
+        List { of, operands }
     }
+}
+
+/// The meshes of a list as one, in the place of the first, if there are several and something is left of them: what those make that are not
+/// negated, less those that are; if all are, what is in any of them.
+fn of_meshes(of: &[Region], any: bool, negated: fn(usize) -> bool) -> Option<(usize, Region)> {
+    let meshes: Vec<(usize, &MeshRegion)> =
+        of.iter().enumerate().filter_map(|(i, r)| Some((i, r.as_mesh()?))).collect();
+    if meshes.len() < 2 {
+        return None;
+    }
+    let of_sign = |less: bool| -> Vec<&MeshRegion> {
+        meshes.iter().filter(|(i, _)| negated(*i) == less).map(|(_, r)| *r).collect()
+    };
+    let (plain, less) = (of_sign(false), of_sign(true));
+    let one = match plain.is_empty() {
+        true => MeshRegion::combined(&less, true, &[]),
+        false => MeshRegion::combined(&plain, any, &less),
+    };
+    Some((meshes[0].0, Arc::new(one?)))
 }
