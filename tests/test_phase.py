@@ -266,6 +266,16 @@ def test_walls_of_given_thickness_have_the_fraction_of_each_place():
     assert "wavelength 2.5 to 5 mm" in str(solid.report())
 
 
+def test_cells_along_a_cylinder_are_no_cubes(tmp_path):
+    """On the axis of the map there is no cell: its lengths are not a number, and nothing fails."""
+    ring = lt.region.difference(lt.region.cylinder([0, 0, 0], 8, 6), lt.region.cylinder([0, 0, -1], 5, 8))
+    solid = lt.Design(ring, lt.Lattice("gyroid", "sheet", lt.map.cylinder([1.5, 2], 20), lt.level.fraction(0.3))).build()
+    cell = solid.cell_at([[0, 0, 3], [6, 0, 3]])
+    assert np.isnan(cell["wavelength"][0]).all() and cell["wavelength"][1] == pytest.approx([1.5, 2 * np.pi * 6 / 20, 2])
+    with pytest.raises(ValueError, match="cells of lattice.core are none: edges differ"):
+        solid.render(tmp_path / "ring.png", show="stiffness")
+
+
 def test_what_a_map_misses_is_said_of_the_worst_axes():
     slab = lt.region.box(min=[-5, 0, 0], max=[5, 14, 12])
     ends = [lt.region.box(min=[x - 0.1, -1, -1], max=[x + 0.1, 15, 13]) for x in (-5, 5)]

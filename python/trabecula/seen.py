@@ -52,7 +52,7 @@ class Seen(Picture, Resolution):
 
         ``fraction`` (n,): its solid fraction; ``axes`` (n, 3, 3): the unit vectors along which cells follow each other on their
         axes 1, 2 and 3, each a row; ``wavelength`` (n, 3): the period along each, mm. With the map u(x), they are directions
-        and lengths of the columns of (du/dx)^-1. ``lattice`` names the lattice; by default the first. A ValueError where
+        and lengths of the columns of (du/dx)^-1, NaN where it has none, as on the axis of ``map.cylinder``. ``lattice`` names the lattice; by default the first. A ValueError where
         there is none of that name.
         """
         import numpy as np
@@ -68,7 +68,9 @@ class Seen(Picture, Resolution):
             there = f"there is no lattice named {name}; there are {', '.join(names)}" if names else "the design has no lattice"
             raise ValueError(there)
         fraction, gradients = found
-        columns = np.linalg.inv(gradients).transpose(0, 2, 1)
+        regular = np.linalg.det(gradients) != 0
+        columns = np.full_like(gradients, np.nan)
+        columns[regular] = np.linalg.inv(gradients[regular]).transpose(0, 2, 1)
         wavelength = np.linalg.norm(columns, axis=2)
         return {"fraction": fraction, "axes": columns / wavelength[:, :, None], "wavelength": wavelength}
 
