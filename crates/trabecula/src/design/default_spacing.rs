@@ -57,7 +57,9 @@ impl Built {
         let times = (counted / wanted).powi(2);
         let triangles = self.surface().exceeding(counted, TRIANGLES / times).ok()??.triangles * times;
         let walls = gridded(self, &report.lattices).filter_map(|l| l.thickness).map(|t| t.least());
-        let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(|t| *t > 0.0);
+        // One that is lost at the wanted spacing already, as at the poles of a sphere map, is no reason to keep to it.
+        let is_resolved = |t: &f64| *t > COARSE_PER_WALL * wanted;
+        let necks = walls.chain(report.beams.values().map(|b| b.thickness)).filter(is_resolved);
         let limits = necks.map(|t| t / COARSE_PER_WALL).chain([repeat / COARSE_PER_CELL, wavelength / FEWEST]);
         let limits = limits.chain(self.skin).chain(self.solid.transition).chain(self.whole_steps());
         let most = limits.fold(f64::INFINITY, f64::min);

@@ -10,6 +10,7 @@ use crate::kind::DesignError;
 use crate::lattice::Lattice;
 use crate::map::Map;
 use geometry::fault::{number, position};
+use geometry::math::Vec3;
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
 const TURN: f64 = 45.0;
@@ -105,13 +106,25 @@ const PINCHED: f64 = 1.0 / 8.0;
 pub(super) fn wrapped_map(lattice: &Lattice, spec: &MapKind, environment: &Environment, warnings: &mut Vec<Warning>) {
     let map = &lattice.map;
     let Some(round) = map.round() else { return };
-    let key = spec.key();
+    let path = format!("{}.map.{}.around", environment.path, spec.key());
+    let varies_round = lattice.cell.series().terms().iter().any(|t| t.hkl[1] != 0);
+    let in_region = |p: &Vec3| environment.region.value(*p) < 0.0;
+    if let Some(pole) =
+        round.poles(&environment.region.bounds()).into_iter().rev().find(in_region).filter(|_| varies_round)
+    {
+        let message = format!(
+            "a pole of the sphere lies in the region: cells shrink to nothing on the axis, at ({}) mm for one, where no grid resolves their \
+             walls; cut the poles out of the region with `difference`, or make them solid by a keep zone",
+            pole.map(figure).join(", ")
+        );
+        warnings.push(Warning { path: path.clone(), message });
+    }
     let shrinking = if matches!(spec, MapKind::Sphere(_)) { 1..3 } else { 1..2 };
     if lattice.cell.series().terms().iter().all(|t| t.hkl[shrinking.clone()].iter().all(|h| *h == 0)) {
         return;
     }
     let (core, on_it) = round.core(&environment.region.bounds());
-    let within: Vec<_> = on_it.into_iter().filter(|p| environment.region.value(*p) < 0.0).collect();
+    let within: Vec<_> = on_it.into_iter().filter(in_region).collect();
     let nearest = environment.points.iter().min_by(|a, b| round.edge_at(**a).total_cmp(&round.edge_at(**b)));
     let Some(at) = within.get(within.len() / 2).or(nearest) else { return };
     let edge = round.edge_at(*at);
@@ -131,7 +144,7 @@ pub(super) fn wrapped_map(lattice: &Lattice, spec: &MapKind, environment: &Envir
              core round it out of the region with `difference`"
         )
     };
-    warnings.push(Warning { path: format!("{}.map.{key}.around", environment.path), message });
+    warnings.push(Warning { path, message });
 }
 
 /// A fraction up to which a solid is found in one piece, and beyond which it is in one piece with its voids closed.

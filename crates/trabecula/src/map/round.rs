@@ -147,14 +147,24 @@ impl Round {
 
     /// Where cells shrink to nothing: the word for it, and positions on it within the box (mm).
     pub fn core(&self, b: &Aabb) -> (&'static str, Vec<Vec3>) {
-        const STEPS: i32 = 500;
-        if self.sphere {
-            return ("centre", vec![self.center]);
+        match self.sphere {
+            true => ("centre", vec![self.center]),
+            false => ("axis", self.axis(b)),
         }
+    }
+
+    /// Where cells of a sphere shrink to nothing towards its poles; nowhere of a cylinder.
+    pub fn poles(&self, b: &Aabb) -> Vec<Vec3> {
+        if self.sphere { self.axis(b) } else { Vec::new() }
+    }
+
+    /// Positions on the axis within a box.
+    fn axis(&self, b: &Aabb) -> Vec<Vec3> {
+        const STEPS: i32 = 500;
         let n = self.frame[2];
         let middle = add(self.center, scale(n, dot(n, sub(b.center(), self.center))));
         let step = norm(b.size()) / f64::from(STEPS);
-        ("axis", (-STEPS..=STEPS).map(|i| add(middle, scale(n, 0.5 * step * f64::from(i)))).collect())
+        (-STEPS..=STEPS).map(|i| add(middle, scale(n, 0.5 * step * f64::from(i)))).collect()
     }
 
     /// The edge of a cell round the axis at a position (mm), of a sphere that on the equator as far from the centre, mm.
