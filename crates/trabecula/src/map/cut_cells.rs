@@ -79,10 +79,21 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
     let mut rows = vec![false; grid.shape[1] * grid.shape[2]];
     cells.keys().for_each(|n| rows[n / grid.shape[0]] = true);
     let mut torn = vec![false; grid.len()];
+    // Whether adjacent cells have the same coefficients but for the motion between them, at the nodes that both have.
+    let agree = |axis: usize, [one, other]: [usize; 2]| {
+        let (to, own) = (cuts.between([one, other]), [one, other].map(|n| cells.get(&n)));
+        near(one, -1..=2).enumerate().all(|(i, (by, m))| {
+            let at = |cell: usize, i: usize| own[cell].map_or(coefficients[m], |c| c[i]);
+            // The other cell counts the same nodes from a step further on.
+            by[axis] < 0 || norm(sub(to.of(at(0, i)), at(1, i - 4usize.pow(axis as u32)))) < APART
+        })
+    };
     for n in cells.keys() {
         for (a, stride) in strides.into_iter().enumerate() {
-            for (one, other) in [(*n, n + stride), (n - stride, *n)] {
-                if inner(&one) && inner(&other) && !agree(&coefficients, &cuts, near(one, -1..=2), a, [one, other]) {
+            // A cell below that has coefficients of its own is compared from there.
+            let below = (!cells.contains_key(&(n - stride))).then(|| [n - stride, *n]);
+            for [one, other] in below.into_iter().chain([[*n, n + stride]]) {
+                if inner(&one) && inner(&other) && !agree(a, [one, other]) {
                     (torn[one], torn[other]) = (true, true);
                 }
             }
@@ -90,21 +101,6 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
     }
     let spline = Spline::of(grid, &coefficients, |cell| cells.get(&cell).map(|c| &**c));
     (spline, CutCells { grid, cuts, cells, rows, torn })
-}
-
-/// Whether adjacent cells have the same coefficients but for the motion between them, at the nodes that both have.
-fn agree(
-    coefficients: &[Vec3],
-    cuts: &BranchCuts,
-    mut near: impl Iterator<Item = ([isize; 3], usize)>,
-    axis: usize,
-    [one, other]: [usize; 2],
-) -> bool {
-    let between = cuts.between([one, other]);
-    near.all(|(by, m)| {
-        let there = between.of(cuts.between([m, one]).of(coefficients[m]));
-        by[axis] < 0 || norm(sub(there, cuts.between([m, other]).of(coefficients[m]))) < APART
-    })
 }
 
 impl CutCells {
