@@ -15,7 +15,21 @@ if TYPE_CHECKING:
 
     from .given import Points, Stops, Vector
 
-__all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
+__all__ = [
+    "combined",
+    "depth",
+    "distance",
+    "field",
+    "formula",
+    "grid",
+    "linear",
+    "points",
+    "radial",
+    "rbf",
+    "region",
+    "sigmoid",
+    "steps",
+]
 
 
 @named
@@ -40,12 +54,14 @@ def steps(along: Vector, stops: Stops) -> dict:
 
 
 @named
-def depth(stops: Stops) -> dict:
-    """By depth below the region's surface: piecewise linear, constant beyond the ends.
+def depth(stops: Stops, of: dict | None = None) -> dict:
+    """By depth below a surface: piecewise linear, constant beyond the ends.
 
     stops: Pairs [depth in mm, value], depth rising.
+    of: Another region whose surface is meant, such as that of a bore or a bearing face; depth is negative outside it.
+        The design's own unless given. [optional]
     """
-    return {"depth": settings(stops=pairs(stops))}
+    return {"depth": settings(stops=pairs(stops), of=of)}
 
 
 @named
@@ -63,6 +79,16 @@ def radial(stops: Stops, center: Vector | None = None, axis: Vector | None = Non
 def formula(text: str) -> dict:
     """A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)"; parsed, never run as code."""
     return {"formula": text}
+
+
+@named
+def combined(formula: str, of: dict) -> dict:
+    """Other numbers combined by a formula, such as "load * (1 - 0.5*skin)", "min(a, b)" or "0.2 + 0.1*exp(-depth/2)".
+
+    formula: The formula in x, y, z (mm) and the names of the numbers; parsed, never run as code.
+    of: The numbers by their names, in which letters, digits and _ stand.
+    """
+    return {"combined": settings(formula=formula, of=of)}
 
 
 @named
