@@ -253,6 +253,17 @@ impl Aabb {
         self
     }
 
+    /// The two halves along the longest side.
+    #[must_use]
+    pub fn halves(self) -> [Aabb; 2] {
+        let size = self.size();
+        let a = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
+        let mut halves = [self; 2];
+        halves[0].max[a] = self.center()[a];
+        halves[1].min[a] = halves[0].max[a];
+        halves
+    }
+
     /// The box grown by `by` on every side.
     pub fn grown(self, by: f64) -> Aabb {
         Aabb { min: self.min.map(|v| v - by), max: self.max.map(|v| v + by) }

@@ -11,6 +11,7 @@ mod complement;
 mod control_points;
 mod csv;
 mod depth;
+mod extremes;
 mod formula;
 mod grid;
 mod invariant;
@@ -103,6 +104,11 @@ pub trait Varying: Field {
     fn varies(&self) -> [bool; 3] {
         [true; 3]
     }
+
+    /// The position in a bounded box that is most likely to be an end of the numbers there: a node of a grid, otherwise the middle.
+    fn likely(&self, b: &Aabb) -> Vec3 {
+        b.center()
+    }
 }
 
 /// A number that may vary in space. Its unit is that of its key.
@@ -134,6 +140,14 @@ impl Grade {
         match self {
             Grade::Constant(_) => [false; 3],
             Grade::Varying(of) => of.varies(),
+        }
+    }
+
+    /// The position in a bounded box that is most likely to be an end of the numbers there.
+    fn likely(&self, b: &Aabb) -> Vec3 {
+        match self {
+            Grade::Constant(_) => b.center(),
+            Grade::Varying(of) => of.likely(b),
         }
     }
 

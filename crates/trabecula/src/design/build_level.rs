@@ -180,8 +180,9 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
     if let Some(pore) = amount.constant() {
         return Ok(Level::Iso(Grade::Constant(level(pore)?)));
     }
-    let mut asked = vec![0.0; environment.points.len()];
-    amount.values(environment.points, &mut asked);
+    let points = amount.points(environment);
+    let mut asked = vec![0.0; points.len()];
+    amount.values(&points, &mut asked);
     let (sampled, bound) = (Varied::of(&asked), amount.bound(&environment.region.bounds()));
     // Between the points the grade may go up to its bounds; cells follow it where they can.
     let end = |loose: f64, sampled: f64| match cell.level_of_pore(part, loose, to_phase) {
@@ -253,8 +254,9 @@ pub(super) fn solved_map(
     let ratio = match fraction.constant() {
         Some(fraction) => Grade::Constant(ratio(fraction).map_err(none)?),
         None => {
-            let mut found = vec![0.0; at_level.points.len()];
-            fraction.values(at_level.points, &mut found);
+            let points = fraction.points(at_level);
+            let mut found = vec![0.0; points.len()];
+            fraction.values(&points, &mut found);
             let Varied { min, max } = Varied::of(&found);
             let at = |i: usize| min + (max - min) * i as f64 / (FRACTIONS - 1) as f64;
             let stops = (0..FRACTIONS).into_par_iter().map(|i| Ok([at(i), ratio(at(i))?]));

@@ -78,8 +78,9 @@ pub(super) fn level(
     if let Some(value) = amount.constant() {
         return Ok(Level::Fraction(Grade::Constant(property.fraction(value)?)));
     }
-    let mut asked = vec![0.0; environment.points.len()];
-    amount.values(environment.points, &mut asked);
+    let points = amount.points(environment);
+    let mut asked = vec![0.0; points.len()];
+    amount.values(&points, &mut asked);
     let stops = property.between(Varied::of(&asked))?;
     Ok(Level::Fraction(Grade::from(Remapped::new(amount.clone(), stops))))
 }

@@ -99,8 +99,9 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         faces.push(face);
         places.push(path);
     }
-    let mut widths = vec![0.0; points.len()];
-    thickness.values(points, &mut widths);
+    let here = thickness.points(environment);
+    let mut widths = vec![0.0; here.len()];
+    thickness.values(&here, &mut widths);
     let width = Varied::of(&widths);
     let deepest = || {
         let mut depth = vec![0.0; points.len()];

@@ -11,6 +11,10 @@ impl<V: Varying> Varying for Complement<V> {
     fn varies(&self) -> [bool; 3] {
         self.0.varies()
     }
+
+    fn likely(&self, b: &Aabb) -> Vec3 {
+        self.0.likely(b)
+    }
 }
 
 impl<V: Varying> Field for Complement<V> {

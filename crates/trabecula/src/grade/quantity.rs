@@ -54,21 +54,23 @@ impl<'a> Quantity<'a> {
         if self.complement { self.checked(Complement(of)) } else { self.checked(of) }
     }
 
-    /// Checks a number at the positions of the region where it is least and greatest, of some thousands.
+    /// Checks a number at the positions of the region where it is least and greatest.
     pub fn check(&self, grade: &Grade, admit: impl Fn(f64, &str) -> Result<(), Fault>) -> Result<(), DesignError> {
-        let Environment { region, points, .. } = *self.environment;
+        let environment = self.environment;
+        let region = environment.region;
         let bounds = region.bounds();
         let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
-        let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
-        let mut distance = [0.0; 8];
-        region.values(&corners, &mut distance);
-        let in_corners = corners.iter().zip(distance).filter(|(_, d)| *d <= 1e-9).map(|(c, _)| *c);
-        let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
+        let mut corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+        corners.retain(|c| region.value(*c) <= 1e-9);
+        let points = [grade.points(environment), corners.clone()].concat();
+        let corners = corners.len();
         let mut values = vec![0.0; points.len()];
         grade.values(&points, &mut values);
         let order = |a: &usize, b: &usize| self.own(values[*a]).total_cmp(&self.own(values[*b]));
-        // Not a number comes first or last in this order.
-        let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
+        // Not a number comes first or last in this order. Of positions that are as good those of the search are named last.
+        let searched = points.len() - environment.points.len() - corners;
+        let least = (searched..values.len()).chain(0..searched).min_by(order);
+        let ends = [least, (0..values.len()).max_by(order)];
         for i in ends.into_iter().flatten() {
             admit(self.own(values[i]), &format!(" at {}", position(points[i])))
                 .map_err(|f| DesignError::fault(&self.path, f))?;

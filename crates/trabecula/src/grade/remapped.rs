@@ -55,4 +55,8 @@ impl Varying for Remapped {
     fn varies(&self) -> [bool; 3] {
         self.of.varies()
     }
+
+    fn likely(&self, b: &Aabb) -> Vec3 {
+        self.of.likely(b)
+    }
 }

@@ -109,26 +109,56 @@ impl Samples {
         (i, inside - i as f64, s == inside && last > 0.0)
     }
 
-    /// The four edges along x of the cell of a point, each by the numbers at its ends, and the fractions of the cell at the point.
+    /// The four edges along x of a cell, each by the numbers at its ends.
     #[inline]
-    fn edges(&self, p: Vec3) -> ([[f64; 2]; 4], [(f64, bool); 3]) {
-        let [(i, x, inx), (j, y, iny), (k, z, inz)] =
-            [self.interval(p[0], 0), self.interval(p[1], 1), self.interval(p[2], 2)];
+    fn edges_of(&self, [i, j, k]: [usize; 3]) -> [[f64; 2]; 4] {
         let [nx, ny, nz] = self.shape;
         let edge = |dj: usize, dk: usize| {
             let (j, k) = ((j + dj).min(ny - 1), (k + dk).min(nz - 1));
             let row = &self.values[(k * ny + j) * nx..][..nx];
             [row[i], row[(i + 1).min(nx - 1)]]
         };
-        ([edge(0, 0), edge(1, 0), edge(0, 1), edge(1, 1)], [(x, inx), (y, iny), (z, inz)])
+        [edge(0, 0), edge(1, 0), edge(0, 1), edge(1, 1)]
+    }
+
+    /// The four edges along x of the cell of a point, and the fractions of the cell at the point.
+    #[inline]
+    fn edges(&self, p: Vec3) -> ([[f64; 2]; 4], [(f64, bool); 3]) {
+        let [(i, x, inx), (j, y, iny), (k, z, inz)] =
+            [self.interval(p[0], 0), self.interval(p[1], 1), self.interval(p[2], 2)];
+        (self.edges_of([i, j, k]), [(x, inx), (y, iny), (z, inz)])
+    }
+
+    /// The least and the greatest number in a box that at most one plane of nodes crosses along each axis; none of others. Trilinear numbers
+    /// have their ends in the corners of the boxes that the planes cut it into.
+    fn ends_in(&self, b: &Aabb) -> Option<[f64; 2]> {
+        let mut corners = [([(0, 0.0); 3], 0); 3];
+        for (a, (at, count)) in corners.iter_mut().enumerate() {
+            let ((i, x, _), (j, y, _)) = (self.interval(b.min[a], a), self.interval(b.max[a], a));
+            (*at, *count) = match j - i {
+                0 => ([(i, x), (j, y), (j, y)], 2),
+                1 => ([(i, x), (j, 0.0), (j, y)], 3),
+                _ => return None,
+            };
+        }
+        let [xs, ys, zs] = corners.each_ref().map(|(at, count)| &at[..*count]);
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        for (k, z) in zs {
+            for (j, y) in ys {
+                for (i, x) in xs {
+                    let v = trilinear(self.edges_of([*i, *j, *k]), [*x, *y, *z]);
+                    ends = [ends[0].min(v), ends[1].max(v)];
+                }
+            }
+        }
+        Some(ends)
     }
 
     /// The value at a point.
     #[inline]
     pub fn value_at(&self, p: Vec3) -> f64 {
         let (edges, [x, y, z]) = self.edges(p);
-        let on = edges.map(|[a, b]| mix(a, b, x.0));
-        mix(mix(on[0], on[1], y.0), mix(on[2], on[3], y.0), z.0)
+        trilinear(edges, [x.0, y.0, z.0])
     }
 
     /// Value and gradient (per mm) at a point.
@@ -268,6 +298,13 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
+/// The number at fractions of a cell, by its edges along x.
+#[inline]
+fn trilinear(edges: [[f64; 2]; 4], [x, y, z]: [f64; 3]) -> f64 {
+    let on = edges.map(|[a, b]| mix(a, b, x));
+    mix(mix(on[0], on[1], y), mix(on[2], on[3], y), z)
+}
+
 impl Field for Samples {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, p) in out.iter_mut().zip(points) {
@@ -297,12 +334,25 @@ impl Field for Samples {
                 }
             }
         }
+        // Rounded by the greatest number of the cells, however small those in the box are.
         let slack = 8.0 * f64::EPSILON * all[0].abs().max(all[1].abs());
-        Interval::new(all[0] - slack, all[1] + slack)
+        let [least, most] = self.ends_in(b).unwrap_or(all);
+        Interval::new(least - slack, most + slack)
     }
 }
 
-impl Varying for Samples {}
+impl Varying for Samples {
+    fn likely(&self, b: &Aabb) -> Vec3 {
+        // The node next to the middle, if the box holds it.
+        let middle = b.center();
+        let node: Vec3 = core::array::from_fn(|a| {
+            let last = (self.shape[a] - 1) as f64;
+            let i = ((middle[a] - self.origin[a]) / self.step[a]).round().clamp(0.0, last);
+            self.origin[a] + self.step[a] * i
+        });
+        if b.distance(node) == 0.0 { node } else { middle }
+    }
+}
 
 /// Steps of about `h`, and nodes, over a box.
 fn grid(bounds: &Aabb, h: f64) -> (Vec3, [usize; 3]) {

@@ -74,6 +74,11 @@ fn files() -> Files {
     put("good.npy", npy([9, 9, 9], |[i, j, k]| 0.2 + 0.03 * i as f64 + 0.01 * j as f64 - 0.005 * k as f64));
     put("nan.npy", npy([9, 9, 9], |at| if at == [3, 2, 1] { f64::NAN } else { 0.3 }));
     put("flat.npy", b"\x93NUMPY\x01\x00\x39\x00{'descr': '<f8', 'fortran_order': False, 'shape': (0,), }\n".to_vec());
+    put("high.npy", npy([41; 3], |at| if at == [7, 31, 12] { 1.3 } else { 0.3 }));
+    put("low.npy", npy([41; 3], |at| if at == [7, 31, 12] { -0.5 } else { 0.3 }));
+    put("peak.npy", npy([41; 3], |at| if at == [7, 31, 12] { 0.8 } else { 0.3 }));
+    // What lies beyond the region by more than a step does not count.
+    put("beyond.npy", npy([51; 3], |at| if at[2] > 44 { 9.0 } else { 0.3 + 0.01 * at[0] as f64 }));
     put("good.csv", b"x,y,z,value\n0,0,0,0.2\n8,0,0,0.3\n0,8,0,0.4\n8,8,8,0.5\n".to_vec());
     put("bad.csv", b"0 0 0 0.2\n1 2 three 0.3\n".to_vec());
     let rho = |p: Vec3| 0.2 + 0.02 * p[0] + 0.01 * p[1];
@@ -175,6 +180,30 @@ fn principal_directions_are_followed() {
     let j = built.lattices[0].1.map.jacobian([4.0; 3]);
     assert!((j[2][0] - 0.3).abs() < 1e-9 && (j[2][2] - 0.4).abs() < 1e-9, "{j:?}");
     assert!(built.solid.value([4.0; 3]).is_finite());
+}
+
+/// The range of a fraction that is reported.
+fn reported(level: &str) -> serde_json::Value {
+    let built = design(level, PLAIN).unwrap_or_else(|e| panic!("{level}: {e}"));
+    serde_json::to_value(built.report()).expect("plain data")["lattices"]["a"]["fraction"].clone()
+}
+
+/// One node of a fine grid, which no sample meets, counts in what is checked and in what is reported.
+#[test]
+fn single_nodes_of_a_grid_are_checked_and_reported() {
+    let grid = |file: &str| format!("grid = {{ path = \"{file}\", origin = [0, 0, 0], step = 0.2 }}");
+    for (file, value) in [("high.npy", "1.3"), ("low.npy", "-0.5")] {
+        let e = refused(&format!("fraction = {{ {} }}", grid(file)), PLAIN);
+        assert_eq!(e.path, "lattice.a.level.fraction.grid", "{e}");
+        assert!(e.message.contains(value) && e.message.contains("(1.4, 6.2, 2.4)"), "{e}");
+    }
+    for (key, file, least, most) in
+        [("fraction", "peak.npy", 0.3, 0.8), ("porosity", "peak.npy", 0.2, 0.7), ("fraction", "beyond.npy", 0.3, 0.7)]
+    {
+        let found = reported(&format!("{key} = {{ {} }}", grid(file)));
+        let ends = [0, 1].map(|i| found[i].as_f64().expect("a number"));
+        assert!((ends[0] - least).abs() < 1e-9 && (ends[1] - most).abs() < 1e-9, "{key} {file}: {found}");
+    }
 }
 
 #[test]
