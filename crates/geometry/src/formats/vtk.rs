@@ -2,6 +2,7 @@
 //!
 //! Source: Kitware, VTK File Formats.
 
+mod image;
 mod legacy;
 
 use std::borrow::Cow;
@@ -16,6 +17,7 @@ use super::text::shown;
 use super::xml::{Scanner, attribute};
 use crate::fault::Fault;
 use crate::math::Vec3;
+use image::{ALONG, Axis, Image, along};
 
 /// A named array with a fixed count of numbers for each point or cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,6 +127,7 @@ struct File<'a> {
     extent: Option<[i64; 6]>,
     origin: Vec3,
     step: Vec3,
+    along: [Axis; 3],
     pieces: usize,
     points: usize,
     cells: usize,
@@ -157,9 +160,16 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
             _ => {}
         }
     }
-    let (shape, points, cells) = if file.kind == "ImageData" { file.image()? } else { file.mesh(grid)? };
-    check(&arrays, points, cells)?;
-    Ok(Data { shape, arrays })
+    if file.kind != "ImageData" {
+        let (shape, points, cells) = file.mesh(grid)?;
+        check(&arrays, points, cells)?;
+        return Ok(Data { shape, arrays });
+    }
+    let image = file.image()?;
+    let count = |of_cells| image.count(of_cells).into_iter().fold(1, usize::saturating_mul);
+    check(&arrays, count(false), count(true))?;
+    arrays.iter_mut().for_each(|a| image.turn(a));
+    Ok(Data { shape: image.shape(), arrays })
 }
 
 fn text(tag: &BytesStart, name: &str) -> Option<String> {
@@ -189,6 +199,7 @@ impl<'a> File<'a> {
             extent: None,
             origin: [0.0; 3],
             step: [1.0; 3],
+            along: ALONG,
             pieces: 0,
             points: 0,
             cells: 0,
@@ -244,6 +255,7 @@ impl<'a> File<'a> {
                 let t = text(tag, "WholeExtent").unwrap_or_default();
                 let v: Vec<i64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
                 self.extent = <[i64; 6]>::try_from(v).ok();
+                self.along = text(tag, "Direction").map_or(Ok(ALONG), |t| along(&t))?;
             }
             "Piece" => {
                 self.pieces += 1;
@@ -265,15 +277,13 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    /// The grid of an image, with the numbers of its nodes and cells.
-    fn image(&self) -> Result<(Shape, usize, usize), Fault> {
+    /// The grid of an image.
+    fn image(&self) -> Result<Image, Fault> {
         let e = self.extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
         let along = |a: usize| e[2 * a + 1].saturating_sub(e[2 * a]).saturating_add(1).clamp(1, 1 << 40) as usize;
         let nodes: [usize; 3] = core::array::from_fn(along);
-        let cells = nodes.map(|n| n.saturating_sub(1).max(1));
-        let product = |n: [usize; 3]| n.into_iter().fold(1, usize::saturating_mul);
-        let origin = core::array::from_fn(|a| self.origin[a] + e[2 * a] as f64 * self.step[a]);
-        Ok((Shape::Image { origin, step: self.step, nodes }, product(nodes), product(cells)))
+        let first = core::array::from_fn(|a| e[2 * a] as f64);
+        Ok(Image { origin: self.origin, step: self.step, first, nodes, along: self.along })
     }
 
     /// The elements of an unstructured grid, with the numbers of its points and cells.
