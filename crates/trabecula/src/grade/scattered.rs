@@ -4,7 +4,7 @@ use super::csv::{named, table};
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::Environment;
-use crate::kind::{DesignError, Kind, Unit};
+use crate::kind::{DesignError, Kind, Unit, Warning};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Vec3, scale};
 
@@ -26,6 +26,34 @@ fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64) -> Result<(), Faul
         all.min, all.max, bounds.min, bounds.max
     );
     Err(Fault::new("", message))
+}
+
+/// The share of the region along every axis over which points have to reach at least not to be doubted.
+const TINY: f64 = 0.1;
+
+/// Units that positions may be in by mistake, with their mm.
+const UNITS: [(&str, f64); 2] = [("metres", 1000.0), ("inches", 25.4)];
+
+/// Doubts points that lie close together in the region: they may be in another unit.
+fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
+    let all = positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+    let size = bounds.size();
+    if all.size() == [0.0; 3] || (0..3).any(|a| all.size()[a] > TINY * size[a]) {
+        return None;
+    }
+    let covers = |unit: f64| {
+        let scaled = Aabb { min: scale(all.min, unit), max: scale(all.max, unit) };
+        let met = scaled.intersection(*bounds).size();
+        (0..3).all(|a| met[a] >= COVERED * size[a].max(scaled.size()[a]))
+    };
+    let why = match UNITS.iter().find(|(_, unit)| covers(*unit)) {
+        Some((name, unit)) => format!("in {name} they would cover it: multiply them by {unit} if they are"),
+        None => "are they in mm?".into(),
+    };
+    Some(format!(
+        "the points reach from {:?} to {:?} mm, over less than a tenth of the region, from {:?} to {:?}; {why}",
+        all.min, all.max, bounds.min, bounds.max
+    ))
 }
 
 /// Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the distance.
@@ -51,6 +79,10 @@ impl BuildGrade for PointsKind {
         let bounds = environment.region.bounds();
         check_reach(&positions, &bounds, TOUCHED)
             .map_err(|f| wrong(Fault::new("", f.message + "; are they in mm?")))?;
+        if let Some(message) = doubt(&positions, &bounds) {
+            let message = format!("{}: {message}", self.path);
+            environment.notes.borrow_mut().warnings.push(Warning { path: at.clone(), message });
+        }
         let [one] = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
         sampled(one, &self.remap, of)
     }

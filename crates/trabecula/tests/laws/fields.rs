@@ -80,6 +80,9 @@ fn files() -> Files {
     // What lies beyond the region by more than a step does not count.
     put("beyond.npy", npy([51; 3], |at| if at[2] > 44 { 9.0 } else { 0.3 + 0.01 * at[0] as f64 }));
     put("good.csv", b"x,y,z,value\n0,0,0,0.2\n8,0,0,0.3\n0,8,0,0.4\n8,8,8,0.5\n".to_vec());
+    put("metres.csv", b"x,y,z,value\n0,0,0,0.2\n0.008,0,0,0.3\n0,0.008,0,0.4\n0.008,0.008,0.008,0.5\n".to_vec());
+    put("inches.csv", b"0,0,0,0.2\n0.3,0,0,0.3\n0,0.3,0,0.4\n0.3,0.3,0.3,0.5\n".to_vec());
+    put("close.csv", b"3,3,3,0.2\n3.1,3,3,0.3\n3,3.1,3,0.4\n3.1,3.1,3.1,0.5\n".to_vec());
     put("bad.csv", b"0 0 0 0.2\n1 2 three 0.3\n".to_vec());
     let rho = |p: Vec3| 0.2 + 0.02 * p[0] + 0.01 * p[1];
     // Principal directions turn about z by 5 degrees for each mm along x; the greatest and the least stress change places.
@@ -203,6 +206,21 @@ fn single_nodes_of_a_grid_are_checked_and_reported() {
         let found = reported(&format!("{key} = {{ {} }}", grid(file)));
         let ends = [0, 1].map(|i| found[i].as_f64().expect("a number"));
         assert!((ends[0] - least).abs() < 1e-9 && (ends[1] - most).abs() < 1e-9, "{key} {file}: {found}");
+    }
+}
+
+/// Points in another unit lie close together in the region; the unit in which they would cover it is named.
+#[test]
+fn points_in_another_unit_are_doubted() {
+    let warned = |file: &str| {
+        let built = design(&format!("fraction = {{ points = {{ path = \"{file}\" }} }}"), PLAIN).expect("built");
+        let of = built.warnings.into_iter().filter(|w| w.path == "lattice.a.level.fraction.points.path");
+        of.map(|w| w.message).collect::<Vec<_>>()
+    };
+    assert!(warned("good.csv").is_empty());
+    for (file, guess) in [("metres.csv", "in metres"), ("inches.csv", "in inches"), ("close.csv", "are they in mm?")] {
+        let found = warned(file);
+        assert!(found.len() == 1 && found[0].contains(guess), "{file}: {found:?}");
     }
 }
 
