@@ -11,9 +11,9 @@ use trabecula::cell::Part;
 use trabecula::csg_tree::CsgSolid;
 use trabecula::extract::surface;
 use trabecula::field::Field;
-use trabecula::grade::Grade;
+use trabecula::grade::{Depth, Grade};
 use trabecula::implicit::Implicit;
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 use trabecula::surface_maker::Islands;
@@ -274,6 +274,32 @@ fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
             println!("{name} {turn:?}: {share:.4} of the edges are off, {least:.4} of the exact boundary's");
             // The triangles differ, and with them what rounding does to a few cells.
             assert!(share < least + 0.01, "{name}: {share}, {least}");
+        }
+    }
+}
+
+/// Depth in two meshes that touch, or overlap, is that below the surface of both: their joint is none. So it is in what they are a
+/// part of.
+#[test]
+fn depth_is_below_the_surface_of_joined_meshes() {
+    let bar = |from: f64| {
+        let mesh = moved(block(2.0, 1.0, 1.0), [0.0; 3], [from, 0.0, 0.0]);
+        Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("clean")) as Region
+    };
+    let some = &mut Random(3);
+    for from in [2.0, 1.7] {
+        let both: Region = Arc::new(Union::new(vec![bar(0.0), bar(from)]).expect("union"));
+        let cut = HalfSpace::new([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]).expect("half-space");
+        let rest: Region = Arc::new(Intersection::new(vec![both.clone(), Arc::new(cut)]).expect("intersection"));
+        let less: Region = Arc::new(Offset::new(both.clone(), -0.1).expect("offset"));
+        let truth = |low: f64, by: f64| cuboid([low + by, by, by], [2.0 + from - by, 1.0 - by, 1.0 - by]);
+        for (region, truth) in [(both, truth(0.0, 0.0)), (rest, truth(0.5, 0.0)), (less, truth(0.0, 0.1))] {
+            let depth = Depth::new(region, vec![[0.0, 0.0], [1.0, 1.0]]).expect("depth");
+            for _ in 0..500 {
+                let p = [1.9 + some.between(-0.4, 0.4), some.between(0.1, 0.9), some.between(0.1, 0.9)];
+                let (found, want) = (depth.value(p), -truth.value(p));
+                assert!((found - want).abs() < 1e-3, "{from}: {found} for {want} at {p:?}");
+            }
         }
     }
 }

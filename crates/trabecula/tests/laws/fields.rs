@@ -209,6 +209,24 @@ fn single_nodes_of_a_grid_are_checked_and_reported() {
     }
 }
 
+/// Depth in boxes that touch falls to 0 at their joint, which is warned of; in those that overlap, and in one, it is not.
+#[test]
+fn depth_at_joints_of_boxes_is_warned_of() {
+    let joint = |from: &str| {
+        let text = format!(
+            "schema = 1\n[region]\nunion = [{{ box = {{ min = [0, 0, 0], max = [10, 10, 10] }} }}, {{ box = {{ min = [{from}, 0, 0], max = \
+             [20, 10, 10] }} }}]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\nmap = {{ affine = {{ wavelength = 4 }} }}\n\
+             level = {{ fraction = {{ depth = {{ stops = [[0, 0.5], [2, 0.2]] }} }} }}\n"
+        );
+        let built = Design::from_toml(&text).and_then(|d| d.build(&files())).unwrap_or_else(|e| panic!("{e}"));
+        built.warnings.into_iter().find(|w| w.path == "lattice.a.level.fraction.depth").map(|w| w.message)
+    };
+    let touching = joint("10").expect("a warning");
+    assert!(touching.contains("(10, ") && touching.contains("overlap by 4 mm"), "{touching}");
+    assert_eq!(joint("6"), None);
+    assert_eq!(joint("0"), None);
+}
+
 /// Points in another unit lie close together in the region; the unit in which they would cover it is named.
 #[test]
 fn points_in_another_unit_are_doubted() {
