@@ -227,13 +227,6 @@ impl Grid {
         })
     }
 
-    /// The mean of the steps on both sides of a node.
-    pub(super) fn step_at(&self, axis: usize, node: usize) -> f64 {
-        let axis = &self.axes[axis];
-        let ends = [node.saturating_sub(1), (node + 1).min(axis.len() - 1)];
-        (axis[ends[1]] - axis[ends[0]]) / (ends[1] - ends[0]) as f64
-    }
-
     /// The nodes of a tile with its halo.
     pub(super) fn block(&self, tile: [usize; 3]) -> Block<'_> {
         let n = self.nodes(tile);

@@ -70,26 +70,6 @@ impl Signs {
         nodes
     }
 
-    /// For each row of nodes, those of the feature cells that a surface crosses.
-    pub fn nodes_of_features(&self, surface: usize) -> Vec<u64> {
-        let [_, ny, nz] = self.shape;
-        let mut nodes = vec![0u64; ny * nz];
-        for k in 0..nz - 1 {
-            for j in 0..ny - 1 {
-                let featured = self.featured[k * ny + j];
-                if featured == 0 {
-                    continue;
-                }
-                let (some, all) = self.some_and_all(surface, j, k);
-                let crossed = featured & some & !all;
-                for row in [k * ny + j, k * ny + j + 1, (k + 1) * ny + j, (k + 1) * ny + j + 1] {
-                    nodes[row] |= crossed | crossed << 1;
-                }
-            }
-        }
-        nodes
-    }
-
     /// Classifies the cells; returns whether any contains surface.
     pub fn sort(&mut self, local: &LocalSolid) -> bool {
         let [nx, ny, nz] = self.shape;

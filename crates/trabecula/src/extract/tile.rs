@@ -11,7 +11,7 @@
 //!   in curvature · h². For each triangle the distance from the surface is estimated from the normals at its corners, and its
 //!   vertices share the move that cancels its volume error. What remains is of fourth order.
 //!
-//! Where surfaces meet, `feature_cells` cuts the cell by planes; `node_balance` moves their values at nodes to the same end. Where a flat surface of the solid is a plane of the grid, `planar_caps`
+//! Where surfaces meet, `feature_cells` cuts the cell. Where a flat surface of the solid is a plane of the grid, `planar_caps`
 //! closes it.
 //!
 //! A tile includes a halo of one cell. All that is computed there is a function of the grid edge or triangle alone, in the same
@@ -20,7 +20,6 @@
 mod count;
 mod edge_vertices;
 mod holes;
-mod node_balance;
 mod plain_triangles;
 mod volume_balance;
 
@@ -46,7 +45,6 @@ use super::vertex_numbers::Numbers;
 pub(super) use count::count;
 use edge_vertices::{list_vertices, solve};
 use holes::hole;
-use node_balance::balance_nodes;
 use plain_triangles::list_triangles;
 use volume_balance::balance;
 
@@ -199,7 +197,6 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
         solve(s, &nodes, &*grid.surfaces[surface].field, i, first..first + count);
         first += count;
     }
-    balance_nodes(s, grid, &local, &nodes, from);
     let margin = grid.margin as f32;
     s.positions.clear();
     s.positions.extend(s.vertices.iter_mut().map(|v| {

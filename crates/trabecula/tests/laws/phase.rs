@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::common::meshed;
 use geometry::math::{Aabb, Vec3, determinant, norm, sub};
 use geometry::measure::{self_intersections, size};
 use geometry::progress::Silent;
 use trabecula::cell::{Cell, Part, Series, named};
-use trabecula::extract::{GridSurface, surface};
+use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
@@ -15,7 +14,6 @@ use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Map, Orientation, Phase, PhaseRequest, SolverOptions};
 use trabecula::region::{Cuboid, Region};
 use trabecula::solid::Solid;
-use trabecula::surface_maker::Islands;
 
 fn formula(text: &str) -> Grade {
     Grade::from(Formula::parse(text).expect("formula"))
@@ -145,8 +143,7 @@ fn a_tube_closes_over_its_seam() {
         let exact = matches!(level, Level::Fraction(_));
         let l: Arc<dyn Implicit> = Arc::new(Lattice::new(cell("gyroid"), Arc::new(map), Part::Sheet, level));
         let solid = Solid::new(region.clone(), Some(l), 1.0);
-        // Walls end on the barrel in knife edges, whose crumbs of 1e-8 mm³ are dropped as by default.
-        let m = size(&meshed(&GridSurface(&solid), 0.12, Islands::DropSmall).expect("surface").0.mesh);
+        let m = size(&surface(&solid, 0.12, &Silent).expect("surface").mesh);
         let share = m.volume / (std::f64::consts::PI * 39.0 * 8.0);
         assert!(m.closed && m.pieces == 1, "{m:?}");
         // Within a cell the volume grows with the radius, by a fifth, where the solid share of the layers swings by some
