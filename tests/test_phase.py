@@ -272,7 +272,7 @@ def test_cells_along_a_cylinder_are_no_cubes(tmp_path):
     solid = lt.Design(ring, lt.Lattice("gyroid", "sheet", lt.map.cylinder([1.5, 2], 20), lt.level.fraction(0.3))).build()
     cell = solid.cell_at([[0, 0, 3], [6, 0, 3]])
     assert np.isnan(cell["wavelength"][0]).all() and cell["wavelength"][1] == pytest.approx([1.5, 2 * np.pi * 6 / 20, 2])
-    with pytest.raises(ValueError, match="cells of lattice.core are none: edges differ"):
+    with pytest.raises(ValueError, match=r"cells of lattice\.core are none: edges differ"):
         solid.render(tmp_path / "ring.png", show="stiffness")
 
 

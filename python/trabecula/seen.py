@@ -52,8 +52,8 @@ class Seen(Picture, Resolution):
 
         ``fraction`` (n,): its solid fraction; ``axes`` (n, 3, 3): the unit vectors along which cells follow each other on their
         axes 1, 2 and 3, each a row; ``wavelength`` (n, 3): the period along each, mm. With the map u(x), they are directions
-        and lengths of the columns of (du/dx)^-1, NaN where it has none, as on the axis of ``map.cylinder``. ``lattice`` names the lattice; by default the first. A ValueError where
-        there is none of that name.
+        and lengths of the columns of (du/dx)^-1, NaN where it has none, as on the axis of ``map.cylinder``. ``lattice`` names
+        the lattice; by default the first. A ValueError where there is none of that name.
         """
         import numpy as np
 
