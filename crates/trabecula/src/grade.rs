@@ -106,7 +106,7 @@ pub trait Varying: Field {
     }
 
     /// The position in a bounded box that is most likely to be an end of the numbers there: a node of a grid, otherwise the middle.
-    fn likely(&self, b: &Aabb) -> Vec3 {
+    fn likely_extreme(&self, b: &Aabb) -> Vec3 {
         b.center()
     }
 }
@@ -144,10 +144,10 @@ impl Grade {
     }
 
     /// The position in a bounded box that is most likely to be an end of the numbers there.
-    fn likely(&self, b: &Aabb) -> Vec3 {
+    fn likely_extreme(&self, b: &Aabb) -> Vec3 {
         match self {
             Grade::Constant(_) => b.center(),
-            Grade::Varying(of) => of.likely(b),
+            Grade::Varying(of) => of.likely_extreme(b),
         }
     }
 

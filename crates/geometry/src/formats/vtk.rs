@@ -280,8 +280,8 @@ impl<'a> File<'a> {
     /// The grid of an image.
     fn image(&self) -> Result<Image, Fault> {
         let e = self.extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
-        let along = |a: usize| e[2 * a + 1].saturating_sub(e[2 * a]).saturating_add(1).clamp(1, 1 << 40) as usize;
-        let nodes: [usize; 3] = core::array::from_fn(along);
+        let count = |a: usize| e[2 * a + 1].saturating_sub(e[2 * a]).saturating_add(1).clamp(1, 1 << 40) as usize;
+        let nodes: [usize; 3] = core::array::from_fn(count);
         let first = core::array::from_fn(|a| e[2 * a] as f64);
         Ok(Image { origin: self.origin, step: self.step, first, nodes, along: self.along })
     }

@@ -213,7 +213,7 @@ fn checked_lattice(
         return Err(DesignError::new(format!("{path}.level.of"), message));
     }
     let built = lattice(spec, environment)?;
-    let points = built.level.grade().points(environment);
+    let points = built.level.grade().check_points(environment);
     let environment = &Environment { path: path.clone(), points: &points, ..*environment };
     warn::check(&built, environment, spec)?;
     warn::warn(&built, environment, spec, warnings);

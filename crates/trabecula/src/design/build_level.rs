@@ -180,10 +180,7 @@ fn pore(amount: &Grade, part: Part, cell: &Cell, map: &Map, environment: &Enviro
     if let Some(pore) = amount.constant() {
         return Ok(Level::Iso(Grade::Constant(level(pore)?)));
     }
-    let points = amount.points(environment);
-    let mut asked = vec![0.0; points.len()];
-    amount.values(&points, &mut asked);
-    let (sampled, bound) = (Varied::of(&asked), amount.bound(&environment.region.bounds()));
+    let (sampled, bound) = (Varied::of_grade(amount, environment), amount.bound(&environment.region.bounds()));
     // Between the points the grade may go up to its bounds; cells follow it where they can.
     let end = |loose: f64, sampled: f64| match cell.level_of_pore(part, loose, to_phase) {
         Ok(t) if loose > 0.0 => Ok((loose, t)),
@@ -254,10 +251,7 @@ pub(super) fn solved_map(
     let ratio = match fraction.constant() {
         Some(fraction) => Grade::Constant(ratio(fraction).map_err(none)?),
         None => {
-            let points = fraction.points(at_level);
-            let mut found = vec![0.0; points.len()];
-            fraction.values(&points, &mut found);
-            let Varied { min, max } = Varied::of(&found);
+            let Varied { min, max } = Varied::of_grade(&fraction, at_level);
             let at = |i: usize| min + (max - min) * i as f64 / (FRACTIONS - 1) as f64;
             let stops = (0..FRACTIONS).into_par_iter().map(|i| Ok([at(i), ratio(at(i))?]));
             let mut stops = stops.collect::<Result<Vec<_>, f64>>().map_err(none)?;

@@ -78,10 +78,7 @@ pub(super) fn level(
     if let Some(value) = amount.constant() {
         return Ok(Level::Fraction(Grade::Constant(property.fraction(value)?)));
     }
-    let points = amount.points(environment);
-    let mut asked = vec![0.0; points.len()];
-    amount.values(&points, &mut asked);
-    let stops = property.between(Varied::of(&asked))?;
+    let stops = property.between(Varied::of_grade(amount, environment))?;
     Ok(Level::Fraction(Grade::from(Remapped::new(amount.clone(), stops))))
 }
 

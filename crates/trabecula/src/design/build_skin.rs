@@ -99,10 +99,7 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         faces.push(face);
         places.push(path);
     }
-    let here = thickness.points(environment);
-    let mut widths = vec![0.0; here.len()];
-    thickness.values(&here, &mut widths);
-    let width = Varied::of(&widths);
+    let width = Varied::of_grade(&thickness, environment);
     let deepest = || {
         let mut depth = vec![0.0; points.len()];
         region.values(points, &mut depth);

@@ -52,7 +52,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
     let count = if exact.is_some() { sample::COUNT } else { 25 * sample::COUNT };
     let (mut points, share) = sample::inside(region, count);
     points.extend(sample::nodes(region));
-    points.extend(built.lattices.iter().flat_map(|(_, l)| l.level.grade().ends(region)));
+    points.extend(built.lattices.iter().flat_map(|(_, l)| l.level.grade().extremes(region)));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
     let lattices = built.lattices.iter().map(|(name, l)| (name.clone(), lattice(l, &points)));
     let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it, built)));

@@ -1,6 +1,8 @@
 //! What the values of an amount run from and to.
 
 use super::sample;
+use crate::environment::Environment;
+use crate::grade::Grade;
 use crate::lattice::{Lattice, Level};
 use crate::report::Varying;
 
@@ -18,6 +20,11 @@ impl Varied {
     pub fn of(values: &[f64]) -> Varied {
         let (min, max) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         Varied { min, max }
+    }
+
+    /// A grade in the region, between the ends that a search finds and samples.
+    pub fn of_grade(grade: &Grade, environment: &Environment) -> Varied {
+        Varied::of(&sample::values(&grade.check_points(environment), |points, out| grade.values(points, out)))
     }
 
     pub fn map(self, f: impl Fn(f64) -> f64) -> Varied {

@@ -109,9 +109,7 @@ pub(super) fn wrapped_map(lattice: &Lattice, spec: &MapKind, environment: &Envir
     let path = format!("{}.map.{}.around", environment.path, spec.key());
     let varies_round = lattice.cell.series().terms().iter().any(|t| t.hkl[1] != 0);
     let in_region = |p: &Vec3| environment.region.value(*p) < 0.0;
-    if let Some(pole) =
-        round.poles(&environment.region.bounds()).into_iter().rev().find(in_region).filter(|_| varies_round)
-    {
+    if varies_round && let Some(pole) = round.poles(&environment.region.bounds()).into_iter().rev().find(in_region) {
         let message = format!(
             "a pole of the sphere lies in the region: cells shrink to nothing on the axis, at ({}) mm for one, where no grid resolves their \
              walls; cut the poles out of the region with `difference`, or make them solid by a keep zone",

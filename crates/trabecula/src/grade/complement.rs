@@ -12,8 +12,8 @@ impl<V: Varying> Varying for Complement<V> {
         self.0.varies()
     }
 
-    fn likely(&self, b: &Aabb) -> Vec3 {
-        self.0.likely(b)
+    fn likely_extreme(&self, b: &Aabb) -> Vec3 {
+        self.0.likely_extreme(b)
     }
 }
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::{BuildGrade, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind, Warning};
-use crate::region::{DistanceTable, Region, RegionKind};
+use crate::region::{DistanceTable, Region, RegionKind, joint};
 use geometry::fault::{Fault, number, position};
-use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
+use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// By depth below a surface: piecewise linear, constant beyond the ends.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -28,24 +28,19 @@ impl BuildGrade for DepthKind {
             None => of.environment.region.clone(),
         };
         let depth = Depth::of(region.clone(), of.stops(self.stops.clone()));
-        if let Some(p) = depth.joint(&region, of.environment.points) {
+        let last = depth.stops.ends().hi;
+        if let Some(p) = joint(&region, of.environment.points, last) {
             let message = format!(
                 "depth falls to 0 at {}, inside the region, where parts of a union only touch: faces that two have in common count as \
                  surface; let the parts overlap by {} mm, or make them one mesh",
                 position(p),
-                number(2.0 * depth.stops.ends().hi)
+                number(2.0 * last)
             );
             of.environment.notes.borrow_mut().warnings.push(Warning { path: of.path.clone(), message });
         }
         Ok(depth.into())
     }
 }
-
-/// How far beyond a joint the region has to go on, and how close to it depth has to be 0, as shares of the region's size.
-const BEYOND: f64 = 1e-3;
-const ON: f64 = 1e-7;
-/// Points whose way out is a joint, beyond which it is one.
-const FEW: usize = 2;
 
 /// Piecewise linear in the depth (mm) below the surface of a region, constant beyond the first and last stop.
 ///
@@ -75,24 +70,6 @@ impl Depth {
             false => region,
         };
         Depth { distance, stops }
-    }
-
-    /// A position inside the region at which depth is 0, the way out of one of the points, on both sides of which the region goes on.
-    fn joint(&self, region: &Region, points: &[Vec3]) -> Option<Vec3> {
-        if region.as_mesh().is_some() {
-            return None;
-        }
-        let size = norm(region.bounds().size());
-        let (mut values, mut out) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-        region.gradients(points, &mut values, &mut out);
-        let last = self.stops.ends().hi;
-        let near = points.iter().zip(values).zip(out).filter(|((_, v), _)| -last < *v && *v < 0.0);
-        let mut found = near.filter_map(|((p, v), out)| {
-            let [at, beyond] = [-v, BEYOND * size - v].map(|far| add(*p, scale(out, far)));
-            let joint = region.value(at).abs() <= ON * size && region.value(beyond) < -0.5 * BEYOND * size;
-            joint.then_some(at)
-        });
-        found.nth(FEW)
     }
 }
 

@@ -14,50 +14,50 @@ const MOST: usize = 1000;
 const CLOSE: f64 = 1e-9;
 
 /// A box in which the number may be as great as `bound`, made by `halvings`.
-struct Candidate {
+struct SearchBox {
     bound: f64,
     halvings: usize,
     within: Aabb,
 }
 
-impl Ord for Candidate {
+impl Ord for SearchBox {
     fn cmp(&self, other: &Self) -> Ordering {
         // Of those that promise as much the smallest: many do along a face on which the number is the same.
         self.bound.total_cmp(&other.bound).then(self.halvings.cmp(&other.halvings))
     }
 }
 
-impl PartialOrd for Candidate {
+impl PartialOrd for SearchBox {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Candidate {
+impl PartialEq for SearchBox {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Candidate {}
+impl Eq for SearchBox {}
 
 impl Grade {
     /// Those positions at which the number is least and greatest that a search finds, and points inside the region of an environment.
-    pub(crate) fn points(&self, environment: &Environment) -> Vec<Vec3> {
-        [&self.ends(environment.region)[..], environment.points].concat()
+    pub(crate) fn check_points(&self, environment: &Environment) -> Vec<Vec3> {
+        [&self.extremes(environment.region)[..], environment.points].concat()
     }
 
     /// Positions in a bounded region at which the number is least and greatest, or not a number, found by branch and bound: of the boxes that
     /// may hold an end the most promising is halved. None of a number that does not vary.
-    pub(crate) fn ends(&self, region: &Region) -> Vec<Vec3> {
+    pub(crate) fn extremes(&self, region: &Region) -> Vec<Vec3> {
         match self {
             Grade::Constant(_) => Vec::new(),
-            Grade::Varying(_) => [-1.0, 1.0].into_iter().filter_map(|sign| self.end(region, sign)).collect(),
+            Grade::Varying(_) => [-1.0, 1.0].into_iter().filter_map(|sign| self.extreme(region, sign)).collect(),
         }
     }
 
     /// The position at which the number times `sign` is greatest, if one was found in the region.
-    fn end(&self, region: &Region, sign: f64) -> Option<Vec3> {
+    fn extreme(&self, region: &Region, sign: f64) -> Option<Vec3> {
         let all = region.bounds();
         let reach = 1e-9 * all.size().into_iter().fold(0.0, f64::max);
         let whole = self.bound(&all);
@@ -68,7 +68,7 @@ impl Grade {
         let mut halves = vec![all];
         for halvings in 0..MOST {
             for within in halves.drain(..) {
-                let at = onto(region, self.likely(&within));
+                let at = onto(region, self.likely_extreme(&within));
                 if region.value(at) <= reach {
                     let mut v = [0.0];
                     self.values(&[at], &mut v);
@@ -81,10 +81,10 @@ impl Grade {
                 if region.bound(&within).lo <= reach {
                     let range = self.bound(&within);
                     let bound = if sign > 0.0 { range.hi } else { -range.lo };
-                    heap.push(Candidate { bound, halvings, within });
+                    heap.push(SearchBox { bound, halvings, within });
                 }
             }
-            let Some(Candidate { bound, within, .. }) = heap.pop() else { break };
+            let Some(SearchBox { bound, within, .. }) = heap.pop() else { break };
             if best.is_some_and(|(most, _)| bound <= most + close.max(CLOSE * most.abs())) {
                 break;
             }
@@ -112,7 +112,7 @@ mod tests {
     use geometry::random::random;
 
     fn range(grade: &Grade, region: &Region) -> [f64; 2] {
-        let ends = grade.ends(region);
+        let ends = grade.extremes(region);
         assert!(ends.len() == 2 && ends.iter().all(|p| region.value(*p) <= 1e-8), "{ends:?}");
         let mut v = [0.0; 2];
         grade.values(&ends, &mut v);

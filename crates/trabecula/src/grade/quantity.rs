@@ -62,7 +62,7 @@ impl<'a> Quantity<'a> {
         let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
         let mut corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
         corners.retain(|c| region.value(*c) <= 1e-9);
-        let points = [grade.points(environment), corners.clone()].concat();
+        let points = [grade.check_points(environment), corners.clone()].concat();
         let corners = corners.len();
         let mut values = vec![0.0; points.len()];
         grade.values(&points, &mut values);

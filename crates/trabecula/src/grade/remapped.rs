@@ -56,7 +56,7 @@ impl Varying for Remapped {
         self.of.varies()
     }
 
-    fn likely(&self, b: &Aabb) -> Vec3 {
-        self.of.likely(b)
+    fn likely_extreme(&self, b: &Aabb) -> Vec3 {
+        self.of.likely_extreme(b)
     }
 }

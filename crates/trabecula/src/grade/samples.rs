@@ -131,7 +131,7 @@ impl Samples {
 
     /// The least and the greatest number in a box that at most one plane of nodes crosses along each axis; none of others. Trilinear numbers
     /// have their ends in the corners of the boxes that the planes cut it into.
-    fn ends_in(&self, b: &Aabb) -> Option<[f64; 2]> {
+    fn range_in(&self, b: &Aabb) -> Option<[f64; 2]> {
         let mut corners = [([(0, 0.0); 3], 0); 3];
         for (a, (at, count)) in corners.iter_mut().enumerate() {
             let ((i, x, _), (j, y, _)) = (self.interval(b.min[a], a), self.interval(b.max[a], a));
@@ -336,13 +336,13 @@ impl Field for Samples {
         }
         // Rounded by the greatest number of the cells, however small those in the box are.
         let slack = 8.0 * f64::EPSILON * all[0].abs().max(all[1].abs());
-        let [least, most] = self.ends_in(b).unwrap_or(all);
+        let [least, most] = self.range_in(b).unwrap_or(all);
         Interval::new(least - slack, most + slack)
     }
 }
 
 impl Varying for Samples {
-    fn likely(&self, b: &Aabb) -> Vec3 {
+    fn likely_extreme(&self, b: &Aabb) -> Vec3 {
         // The node next to the middle, if the box holds it.
         let middle = b.center();
         let node: Vec3 = core::array::from_fn(|a| {
