@@ -10,10 +10,10 @@ use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::grade::{Quantity, key_of};
-use crate::kind::DesignError;
-use crate::region::{FaceSet, HalfSpace, Intersection, Notes, OpenSurface, Region};
+use crate::kind::{DesignError, Warning};
+use crate::region::{FaceSet, HalfSpace, Intersection, Notes, OpenSurface, Region, joint};
 use crate::skin::{outside, skin};
-use geometry::fault::number;
+use geometry::fault::{number, position};
 use geometry::math::Vec3;
 
 /// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `region`.
@@ -100,6 +100,15 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         places.push(path);
     }
     let width = Varied::of_grade(&thickness, environment);
+    if let Some(p) = joint(region, points, width.max) {
+        let message = format!(
+            "the skin is a wall at {}, inside the region, where parts of a union only touch: faces that two have in common count as surface; \
+             let the parts overlap by {} mm, or make them one mesh",
+            position(p),
+            number(2.0 * width.max)
+        );
+        environment.notes.borrow_mut().warnings.push(Warning { path: path.into(), message });
+    }
     let deepest = || {
         let mut depth = vec![0.0; points.len()];
         region.values(points, &mut depth);
