@@ -78,11 +78,12 @@ impl<K: TiffKind> Pages<'_, K> {
         page.write_tag(Tag::SamplesPerPixel, 1u16)?;
         page.write_tag(Tag::RowsPerStrip, height as u32)?;
         page.write_tag(Tag::StripByteCounts, K::convert_slice(&[K::convert_offset(bytes.len() as u64)?]))?;
-        // Pixels in a centimetre, to six digits after the point.
-        let density = || Rational { n: (1e7 / pixel).round().min(f64::from(u32::MAX)) as u32, d: 1_000_000 };
+        // Pixels in the unit of the description, a millimetre, to six digits after the point: ImageJ takes the number as it is and
+        // the unit of the description for that of the tag, and writes no unit but inch and cm into the tag itself.
+        let density = || Rational { n: (1e6 / pixel).round().min(f64::from(u32::MAX)) as u32, d: 1_000_000 };
         page.write_tag(Tag::XResolution, density())?;
         page.write_tag(Tag::YResolution, density())?;
-        page.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter)?;
+        page.write_tag(Tag::ResolutionUnit, ResolutionUnit::None)?;
         if self.page == 0 {
             let (count, heights) = (self.stack.layers(), &self.stack.heights);
             // Layers are of one thickness, but for the last one.
