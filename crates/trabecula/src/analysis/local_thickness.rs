@@ -34,6 +34,9 @@ pub const BYTES_PER_VOXEL: f64 = 16.0;
 /// The error of a mean, in steps, where walls are two and a half steps or more: the most that gyroids showed
 /// against limits extrapolated from finer steps.
 const ACCURACY: f64 = 0.2;
+/// The share of a step to which a centre is on the region's boundary, and bounds are a whole number of steps: more than what coordinates in
+/// files of single precision are rounded by.
+const ON: f64 = 1e-3;
 /// The most voxels.
 const MOST: f64 = (1u64 << 33) as f64;
 /// Steps in the mean wall, 2 V / A, if nothing is asked for.
@@ -165,7 +168,7 @@ pub fn voxels_for(surface: &SurfaceMesh, region: Option<&Region>, step: f64) -> 
             "{step} mm makes {count:.2e} voxels; at most 8.6e9 are possible: use a step above {better:.3} mm"
         ));
     }
-    Ok(size.map(|s| (s / step - 1e-9).ceil().max(1.0) as usize))
+    Ok(size.map(|s| (s / step - ON).ceil().max(1.0) as usize))
 }
 
 /// Local thickness of the solid that a closed mesh bounds and, if a region is given, of the pores: what the solid leaves
@@ -328,7 +331,8 @@ fn pores(grid: &Grid, region: &Region) -> Bits {
         |values, (z, (layer, solid))| {
             let block = Block { axes: [&axes[0], &axes[1], &axes[2][z..=z]] };
             region.fill(&block, values);
-            for (i, _) in values.iter().enumerate().filter(|(_, v)| **v <= 0.0) {
+            // A layer of centres in a face of the region would count with balls of no size.
+            for (i, _) in values.iter().enumerate().filter(|(_, v)| f64::from(**v) < -ON * grid.step) {
                 layer[i / nx * stride + i % nx / 64] |= 1 << (i % nx % 64);
             }
             layer.iter_mut().zip(solid).for_each(|(p, s)| *p &= !s);
