@@ -11,8 +11,8 @@ const BATCH: usize = 4096;
 /// Corners on the surface stand off it by rounding and by what balances the volume of curved triangles: less than this
 /// share of the mesh's mean edge.
 const STAND_OFF: f64 = 0.05;
-/// Over an arc of 45 degrees a chord stands off by this share of its length. A triangle that stands off farther in its
-/// middle runs from one side of an edge of the region to the other.
+/// Over an arc of 45 degrees a chord stands off by this share of its length, and so do corners that balance it, as over the facets of
+/// a mesh. A triangle that stands off farther runs from one face at an edge of the region to the other.
 const CHORD: f64 = 0.1;
 /// A triangle on the surface faces as it does, give or take 45 degrees; if it is no higher than its corners may stand
 /// off, give or take 72.
@@ -42,8 +42,9 @@ pub fn cut_triangles(mesh: &Mesh, region: &dyn Field) -> Vec<bool> {
             let normal = cross(sub(b, a), sub(c, a));
             let longest = norm(sub(b, a)).max(norm(sub(c, a))).max(norm(sub(c, b)));
             let sliver = norm(normal) < near * longest;
-            *cut = t.iter().all(|v| off[*v as usize].abs() <= near)
-                && distance[i].abs() <= near.max(CHORD * longest)
+            let reach = near.max(CHORD * longest);
+            *cut = t.iter().all(|v| off[*v as usize].abs() <= reach)
+                && distance[i].abs() <= reach
                 && dot(unit(normal), unit(gradient[i])) >= FACING[usize::from(sliver)];
         }
     });
