@@ -7,7 +7,7 @@ use crate::field::Field;
 use crate::region::Region;
 use geometry::fault::Fault;
 use geometry::fe_mesh::{FeMesh, FeSet};
-use geometry::math::{Aabb, Vec3, add, norm, scale};
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
 /// Nodes nearer to a bounding plane than this part of the region's size are on it.
@@ -81,25 +81,27 @@ pub(super) fn add_sets(
     }
 }
 
-/// Adds the faces within each region, by its name: those whose corners' mean is inside it or within a millionth of the mesh's size, so that
-/// a region may end where a flat face is. Gives what to say of the first one that is empty.
+/// Faces on a curved region have to face as it does, or away from it, to within 25 degrees.
+const FACING: f64 = 0.9;
+
+/// Adds the faces within each region, by its name: those whose corners' mean is inside it, or within a millionth of the mesh's size, so that
+/// a region may end where a flat face is, or that are chords of its surface where that is curved. Gives what to say of the first one that
+/// is empty.
 pub(super) fn add_regions(
     mesh: &mut FeMesh,
     faces: &[((u32, u8), SurfaceSet, bool)],
     sets: &[(String, Region)],
 ) -> Option<Fault> {
-    let mean = |f: (u32, u8)| {
-        let [a, b, c] = mesh.face(f).map(|n| mesh.nodes[n as usize]);
-        scale(add(add(a, b), c), 1.0 / 3.0)
-    };
-    let points: Vec<Vec3> = faces.iter().map(|f| mean(f.0)).collect();
+    let corners: Vec<[Vec3; 3]> = faces.iter().map(|f| mesh.face(f.0).map(|n| mesh.nodes[n as usize])).collect();
+    let points: Vec<Vec3> = corners.iter().map(|[a, b, c]| scale(add(add(*a, *b), *c), 1.0 / 3.0)).collect();
     let bounds = mesh.nodes.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
     let near = FLAT * norm(bounds.size());
     let mut empty = None;
     for (name, region) in sets {
         let mut depth = vec![0.0; points.len()];
         depth.par_chunks_mut(1024).zip(points.par_chunks(1024)).for_each(|(d, p)| region.values(p, d));
-        let of: Vec<(u32, u8)> = faces.iter().zip(&depth).filter(|(_, d)| **d <= near).map(|(f, _)| f.0).collect();
+        let within = |i: &usize| depth[*i] <= near || is_chord(&corners[*i], region, depth[*i]);
+        let of: Vec<(u32, u8)> = (0..faces.len()).into_par_iter().filter(within).map(|i| faces[i].0).collect();
         if of.is_empty() && empty.is_none() {
             let nearest = depth.iter().fold(f64::INFINITY, |m, d| m.min(*d));
             let message = format!(
@@ -111,6 +113,22 @@ pub(super) fn add_regions(
         push(mesh, name.clone(), of);
     }
     empty
+}
+
+/// Whether a triangle whose middle is `depth` outside a region follows its surface: no farther from it than the height of an arc with
+/// the triangle's longest edge as chord, L |Δn| / 8 where normals at the ends differ by Δn.
+fn is_chord(corners: &[Vec3; 3], region: &Region, depth: f64) -> bool {
+    let [a, b, c] = *corners;
+    let longest = [sub(b, a), sub(c, b), sub(a, c)].into_iter().map(norm).fold(0.0, f64::max);
+    // Normals differ by no more than √2 over an arc that a triangle may stand for.
+    if depth > longest * 2f64.sqrt() / 8.0 {
+        return false;
+    }
+    let (mut values, mut normals) = ([0.0; 3], [[0.0; 3]; 3]);
+    region.gradients(corners, &mut values, &mut normals);
+    let turn = (0..3).map(|i| norm(sub(normals[i], normals[(i + 1) % 3]))).fold(0.0, f64::max);
+    let own = unit(cross(sub(b, a), sub(c, a)));
+    depth <= longest * turn / 8.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
 }
 
 /// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
