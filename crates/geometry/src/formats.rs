@@ -42,7 +42,7 @@ pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, 
 pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
-pub use text::column;
+pub use text::{column, heading};
 pub use threemf::{BeamLattice, Cap, CompanionMeshes, Frustum, object_names, read_object, write_beam_lattice};
 pub use vti::{pvti, vti_frame, write_vti};
 pub use vtk::{Array, Data, Shape, read_vtk};

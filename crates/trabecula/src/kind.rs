@@ -150,7 +150,7 @@ impl Key {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         let finite = if v.is_finite() { None } else { Some("finite".to_string()) };
         let allowed = finite.into_iter().chain(self.allowed()).collect::<Vec<_>>().join(" and ");
-        let share = (self.above, self.below) == (0.0, 1.0) && v > 1.0 && v <= 100.0;
+        let share = (self.above, self.below) == (0.0, 1.0) && (2.0..=100.0).contains(&v);
         let hint =
             if share { format!(" (for {} per cent write {})", number(v), number(v / 100.0)) } else { String::new() };
         let message = format!("{name} is {}{unit}{position}; it must be {allowed}{hint}", number(v));

@@ -114,7 +114,7 @@ fn no_face(i: usize, cut: &OpenSurface) -> Fault {
     let [p, n] = [cut.point(), cut.normal()].map(|v| v.map(number).join(", "));
     let message = format!(
         "the region has no flat face on the plane through ({p}) mm that faces ({n}); open names flat faces of the region, \
-         so cut it there with a half-space"
+         so cut it there with a half-space, or name where the skin ends: open = [{{ region = … }}]"
     );
     Fault::new(format!("open[{i}]"), message)
 }

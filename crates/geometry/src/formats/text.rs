@@ -43,9 +43,15 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The place of the column of a table whose heading is a name, letter case not counted.
+/// The place of the column of a table whose heading is a name, perhaps with a unit behind it; letter case is not counted.
 pub fn column<T: AsRef<str>>(headings: &[T], name: &str) -> Option<usize> {
-    headings.iter().position(|h| h.as_ref().eq_ignore_ascii_case(name))
+    headings.iter().position(|h| heading(h.as_ref()).0.eq_ignore_ascii_case(name))
+}
+
+/// The name and the unit of a heading such as "x [mm]" or "x (mm)"; "" if there is no unit.
+pub fn heading(text: &str) -> (&str, &str) {
+    let (name, unit) = text.split_once(['[', '(']).unwrap_or((text, ""));
+    (name.trim(), unit.trim().trim_end_matches([']', ')']).trim())
 }
 
 /// The words of a line: what lies between spaces (and joining backslashes).

@@ -142,7 +142,7 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
 pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> {
     let fault = |why: &str| {
         let message =
-            format!("a STEP file has the exact surface of beams alone, and {why}; write a mesh (3mf, stl) instead");
+            format!("write a mesh (3mf, stl) instead: a STEP file has the exact surface of beams alone, and {why}");
         Fault::new("", message)
     };
     let (quadors, whole) = apart(built, &fault)?;

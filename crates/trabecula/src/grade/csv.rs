@@ -1,11 +1,41 @@
 //! Tables of positions and values.
 
+use crate::kind::Unit;
 use geometry::fault::Fault;
-use geometry::formats::column;
+use geometry::formats::{column, heading};
+
+/// Rows of positions (mm) and values: of the columns `names`, or of all if none are named, as many as one of `widths`. A heading of a
+/// coordinate that has a unit has to mean `unit`.
+pub(super) fn table(
+    text: &str,
+    names: Option<&[String]>,
+    widths: &[usize],
+    unit: Unit,
+) -> Result<Vec<Vec<f64>>, Fault> {
+    let mut rows = match names {
+        Some(names) => named(text, names, unit),
+        None => unnamed(text, widths, unit),
+    }?;
+    rows.iter_mut().for_each(|row| row[..3].iter_mut().for_each(|c| *c *= unit.in_mm()));
+    Ok(rows)
+}
+
+/// Refuses headings of coordinates that have another unit.
+fn check_units<'a>(headings: impl IntoIterator<Item = &'a String>, unit: Unit) -> Result<(), Fault> {
+    let names = unit.names();
+    let other = |said: &str| !said.is_empty() && !names.iter().any(|name| name.eq_ignore_ascii_case(said));
+    match headings.into_iter().find(|h| other(heading(h).1)) {
+        Some(h) => Err(Fault::new(
+            "",
+            format!("the heading \"{h}\" has another unit than {}, in which positions are read", names[0]),
+        )),
+        None => Ok(()),
+    }
+}
 
 /// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width. Where a
 /// header line names x, y and z, they are taken from there.
-pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
+fn unnamed(text: &str, widths: &[usize], unit: Unit) -> Result<Vec<Vec<f64>>, Fault> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut order: Vec<usize> = Vec::new();
     let what = match widths {
@@ -21,9 +51,15 @@ pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault
         }
         let words: Vec<&str> = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty()).collect();
         let row: Vec<Option<f64>> = words.iter().map(|w| w.trim_matches('"').parse().ok()).collect();
-        if rows.is_empty() && row.iter().all(Option::is_none) {
-            order = places(&split(line, separator(line)));
-            continue;
+        // Headings may be numbers too: the components 11, 22.
+        if rows.is_empty() && row.iter().any(Option::is_none) {
+            let headings = split(line, separator(line));
+            let named = places(&headings);
+            if !named.is_empty() || row.iter().all(Option::is_none) {
+                order = named;
+                check_units(order.iter().take(3).map(|i| &headings[*i]), unit)?;
+                continue;
+            }
         }
         let wide = rows.first().map_or(row.len(), Vec::len);
         let numbers: Option<Vec<f64>> = row.into_iter().collect();
@@ -59,18 +95,19 @@ fn split(line: &str, separator: char) -> Vec<String> {
     all.filter(|w| separator != ' ' || !w.is_empty()).collect()
 }
 
-/// The places of x, y, z and of what else there is, in this order, by the first line; none if it does not name these three.
+/// The places of x, y, z and of the six components of a tensor, or of what else there is, in this order, by the first line; none if it does
+/// not name these three.
 fn places(names: &[String]) -> Vec<usize> {
-    let Some(mut found) = ["x", "y", "z"].iter().map(|n| column(names, n)).collect::<Option<Vec<usize>>>() else {
-        return Vec::new();
-    };
-    let others = (0..names.len()).filter(|i| !found.contains(i));
-    found.extend(others.collect::<Vec<usize>>());
+    let of = |wanted: &[&str]| wanted.iter().map(|n| column(names, n)).collect::<Option<Vec<usize>>>();
+    let Some(mut found) = of(&["x", "y", "z"]) else { return Vec::new() };
+    let others = || (0..names.len()).filter(|i| !found.contains(i)).collect();
+    let others = of(&["11", "22", "33", "23", "13", "12"]).unwrap_or_else(others);
+    found.extend(others);
     found
 }
 
 /// The columns that the first line names so, in this order. Other columns may hold anything.
-pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault> {
+fn named(text: &str, names: &[String], unit: Unit) -> Result<Vec<Vec<f64>>, Fault> {
     let fault = |n: usize, message: String| Fault::new("", format!("line {}: {message}", n + 1));
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines.map(|(n, l)| (n, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
@@ -84,6 +121,7 @@ pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault
         })
     };
     let places = names.iter().map(place).collect::<Result<Vec<usize>, Fault>>()?;
+    check_units(&names[..3], unit)?;
     let rows = lines.map(|(n, line)| {
         let row = split(line, separator);
         let read = |(place, name): (&usize, &String)| {
@@ -95,4 +133,34 @@ pub(super) fn named(text: &str, names: &[String]) -> Result<Vec<Vec<f64>>, Fault
     });
     let rows = rows.collect::<Result<Vec<_>, Fault>>()?;
     if rows.is_empty() { Err(Fault::new("", "the file has names of columns, but no rows")) } else { Ok(rows) }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_name_columns_and_units() {
+        let row = |heading: &str, unit| {
+            table(&format!("{heading}\n1,2,3,0.5\n"), None, &[4], unit).map(|rows| rows[0].clone())
+        };
+        assert_eq!(row("Y [mm],X (mm),z,t", Unit::Mm).unwrap(), [2.0, 1.0, 3.0, 0.5]);
+        assert_eq!(row("t,x,y,z", Unit::Cm).unwrap(), [20.0, 30.0, 5.0, 1.0]);
+        assert_eq!(row("x (Metre),y [m],z,t [K]", Unit::M).unwrap(), [1000.0, 2000.0, 3000.0, 0.5]);
+        assert_eq!(row("a,b,c,d", Unit::Inch).unwrap(), [25.4, 50.8, 3.0 * 25.4, 0.5]);
+        let other = row("x,y [m],z,t", Unit::Mm).unwrap_err().message;
+        assert_eq!(other, "the heading \"y [m]\" has another unit than mm, in which positions are read");
+
+        let tensors = "x,y,z,11,12,13,22,23,33\n1,2,3,0.1,0.6,0.5,0.2,0.4,0.3\n";
+        assert_eq!(table(tensors, None, &[9], Unit::Mm).unwrap(), [[1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]);
+
+        let text = "node,X Location (m),Y Location (m),Z Location (m),Stress (Pa)\n7,1,2,3,5e6\n";
+        let names = ["X Location (m)", "Y Location (m)", "Z Location (m)", "Stress (Pa)"].map(String::from);
+        assert_eq!(table(text, Some(&names), &[4], Unit::M).unwrap(), [[1000.0, 2000.0, 3000.0, 5e6]]);
+        assert!(table(text, Some(&names), &[4], Unit::Mm).is_err());
+        for unit in [Unit::Mm, Unit::Micron, Unit::Cm, Unit::M, Unit::Inch, Unit::Foot] {
+            assert_eq!(unit.names()[0].parse::<Unit>().unwrap(), unit);
+        }
+    }
 }

@@ -26,7 +26,7 @@ impl BuildGrade for FormulaKind {
         let parse = |text: &str| Formula::parse(text).map_err(|f| DesignError::fault(&of.path, f).found(&self.0));
         let made = parse(&self.0)?;
         let made = if of.complement { parse(&format!("1 - ({})", self.0))? } else { made };
-        if of.key.allowed().is_some() { of.checked(made) } else { Ok(made.into()) }
+        of.checked(made)
     }
 }
 
@@ -343,6 +343,12 @@ mod tests {
             ("sinn(x)", "column 1: found 'sinn'; did you mean sin? Known words: x, y, z, pi"),
             ("0.3 + COS(x)", "column 7: found 'COS'; did you mean cos?"),
             ("2 x", "column 3: found 'x'; expected an operator"),
+            ("(2 x", "column 4: found 'x'; expected an operator (+ - * / ^) or )"),
+            (
+                "0.2*(x > 3)",
+                "column 8: found '>'; there are no comparisons; step(edge, v) is 1 where v is at least edge",
+            ),
+            ("if(x, 1, 2)", "column 1: found 'if'; step(edge, v) is 1"),
             ("x(2)", "column 2: found '('; x is not a function"),
             ("(x", "column 3: the formula ends; expected an operator or )"),
             ("x)", "column 2: found ')'; this bracket was never opened"),

@@ -1,6 +1,6 @@
 //! Numbers at scattered points, from a table.
 
-use super::csv::{named, table};
+use super::csv::table;
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::Environment;
@@ -14,15 +14,17 @@ const COVERED: f64 = 0.5;
 /// The same for numbers, of which a few may do: the region has to hold some of them, or lie between them.
 const TOUCHED: f64 = 0.0;
 
-/// Refuses points that reach over less than a share of the bounds along an axis, but for one along which they do not vary.
-fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64) -> Result<(), Fault> {
+/// Refuses points that reach over less than a share of the bounds along an axis, but for one along which they do not vary. `unit` is
+/// the one given for them.
+fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64, unit: Option<Unit>) -> Result<(), Fault> {
     let all = positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
     let (size, met) = (bounds.size(), all.intersection(*bounds).size());
     if (0..3).all(|a| all.size()[a] == 0.0 || met[a] >= least * size[a]) {
         return Ok(());
     }
+    let hint = if unit.is_none() { "; are they in mm? give their unit, such as unit = \"m\"" } else { "" };
     let message = format!(
-        "the points reach from {:?} to {:?} mm, the region from {:?} to {:?}",
+        "the points reach from {:?} to {:?} mm, the region from {:?} to {:?}{hint}",
         all.min, all.max, bounds.min, bounds.max
     );
     Err(Fault::new("", message))
@@ -31,8 +33,8 @@ fn check_reach(positions: &[Vec3], bounds: &Aabb, least: f64) -> Result<(), Faul
 /// The share of the region along every axis over which points have to reach at least not to be doubted.
 const TINY: f64 = 0.1;
 
-/// Units that positions may be in by mistake, with their mm.
-const UNITS: [(&str, f64); 2] = [("metres", 1000.0), ("inches", 25.4)];
+/// Units that positions may be in by mistake.
+const UNITS: [(&str, Unit); 2] = [("metres", Unit::M), ("inches", Unit::Inch)];
 
 /// Doubts points that lie close together in the region: they may be in another unit.
 fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
@@ -41,13 +43,13 @@ fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
     if all.size() == [0.0; 3] || (0..3).any(|a| all.size()[a] > TINY * size[a]) {
         return None;
     }
-    let covers = |unit: f64| {
-        let scaled = Aabb { min: scale(all.min, unit), max: scale(all.max, unit) };
+    let covers = |unit: Unit| {
+        let scaled = Aabb { min: scale(all.min, unit.in_mm()), max: scale(all.max, unit.in_mm()) };
         let met = scaled.intersection(*bounds).size();
         (0..3).all(|a| met[a] >= COVERED * size[a].max(scaled.size()[a]))
     };
     let why = match UNITS.iter().find(|(_, unit)| covers(*unit)) {
-        Some((name, unit)) => format!("in {name} they would cover it: multiply them by {unit} if they are"),
+        Some((name, unit)) => format!("in {name} they would cover it: give unit = \"{}\" if they are", unit.names()[0]),
         None => "are they in mm?".into(),
     };
     Some(format!(
@@ -60,8 +62,12 @@ fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Points", noun = "a grade at points")]
 pub struct PointsKind {
-    /// Path of a table (csv) of x, y, z (mm), value, relative to the design file.
+    /// Path of a table (csv) of x, y, z, value, relative to the design file.
     path: String,
+    /// The names, in the table's first line, of x, y, z and the value; unless given, the table has these four columns alone.
+    columns: Option<[String; 4]>,
+    /// Unit of the coordinates (mm unless given).
+    unit: Option<Unit>,
     /// Number of nearest points that count.
     #[kind(default = 8, min = 1.0, max = 64.0)]
     neighbours: u32,
@@ -74,12 +80,12 @@ impl BuildGrade for PointsKind {
         let (environment, at) = (of.environment, format!("{}.path", of.path));
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
-        let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
+        let (columns, unit) = (self.columns.as_ref().map(<[_; 4]>::as_slice), self.unit.unwrap_or(Unit::Mm));
+        let rows = table(&String::from_utf8_lossy(&file), columns, &[4], unit).map_err(wrong)?;
         let (positions, values): (Vec<Vec3>, Vec<[f64; 1]>) = rows.iter().map(|r| ([r[0], r[1], r[2]], [r[3]])).unzip();
         let bounds = environment.region.bounds();
-        check_reach(&positions, &bounds, TOUCHED)
-            .map_err(|f| wrong(Fault::new("", f.message + "; are they in mm?")))?;
-        if let Some(message) = doubt(&positions, &bounds) {
+        check_reach(&positions, &bounds, TOUCHED, self.unit).map_err(wrong)?;
+        if let Some(message) = self.unit.is_none().then(|| doubt(&positions, &bounds)).flatten() {
             let message = format!("{}: {message}", self.path);
             environment.notes.borrow_mut().warnings.push(Warning { path: at.clone(), message });
         }
@@ -110,19 +116,12 @@ impl TableKind {
         let at = format!("{path}.path");
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
-        let text = String::from_utf8_lossy(&file);
-        let rows = match &self.columns {
-            Some(names) => named(&text, names),
-            None => table(&text, &[9]),
-        };
-        let unit = self.unit.map_or(1.0, Unit::in_mm);
-        let of = |r: &Vec<f64>| (scale([r[0], r[1], r[2]], unit), [r[3], r[4], r[5], r[6], r[7], r[8]]);
-        let (positions, values): (Vec<Vec3>, Vec<[f64; 6]>) = rows.map_err(wrong)?.iter().map(of).unzip();
+        let (columns, unit) = (self.columns.as_ref().map(<[_; 9]>::as_slice), self.unit.unwrap_or(Unit::Mm));
+        let rows = table(&String::from_utf8_lossy(&file), columns, &[9], unit).map_err(wrong)?;
+        let of = |r: &Vec<f64>| ([r[0], r[1], r[2]], [r[3], r[4], r[5], r[6], r[7], r[8]]);
+        let (positions, values): (Vec<Vec3>, Vec<[f64; 6]>) = rows.iter().map(of).unzip();
         let bounds = environment.region.bounds();
-        check_reach(&positions, &bounds, COVERED).map_err(|f| {
-            let unit = if self.unit.is_none() { "; are they in mm? give their unit, such as unit = \"m\"" } else { "" };
-            wrong(Fault::new("", f.message + unit))
-        })?;
+        check_reach(&positions, &bounds, COVERED, self.unit).map_err(wrong)?;
         let made = Samples::scattered(&positions, &values, self.neighbours as usize, &bounds).map_err(wrong)?;
         Ok(made.map(Grade::from))
     }

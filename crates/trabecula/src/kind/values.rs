@@ -376,6 +376,18 @@ impl Unit {
             Unit::Foot => 304.8,
         }
     }
+
+    /// Its names in headings of tables, that of designs first.
+    pub fn names(self) -> &'static [&'static str] {
+        match self {
+            Unit::Micron => &["micron", "um", "µm", "μm"],
+            Unit::Mm => &["mm", "millimetre", "millimeter"],
+            Unit::Cm => &["cm", "centimetre", "centimeter"],
+            Unit::M => &["m", "metre", "meter"],
+            Unit::Inch => &["inch", "in"],
+            Unit::Foot => &["foot", "ft"],
+        }
+    }
 }
 
 impl core::str::FromStr for Unit {

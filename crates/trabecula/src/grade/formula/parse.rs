@@ -38,9 +38,13 @@ pub(super) fn parse(text: &str, names: &[&str]) -> Result<Vec<Instruction>, Faul
         None => Ok(p.program),
         Some('*') => Err(p.fault("write a power as ^, not **")),
         Some(')') => Err(p.fault("this bracket was never opened")),
-        Some(_) => Err(p.fault("expected an operator (+ - * / ^) or the end")),
+        Some(c) => Err(p.unexpected(c, "the end")),
     }
 }
+
+/// What to write where other languages compare.
+const STEP: &str =
+    "step(edge, v) is 1 where v is at least edge, 0 elsewhere: v1 + (v2 - v1)*step(3, x) is v2 from x = 3 on";
 
 struct Parser<'a> {
     text: &'a str,
@@ -165,6 +169,9 @@ impl<'a> Parser<'a> {
 
     fn call(&mut self, word: &str) -> Result<(), Fault> {
         let Some(&(_, op)) = FUNCTIONS.iter().find(|f| f.0 == word) else {
+            if ["if", "where", "heaviside"].contains(&word) {
+                return Err(self.fault(STEP));
+            }
             let known = reserved().map(|word| -> &'a str { word });
             let names = known.clone().take(AXES.len()).chain(self.names.iter().copied()).chain(known.skip(AXES.len()));
             let meant = nearest(word, names.clone());
@@ -205,7 +212,16 @@ impl<'a> Parser<'a> {
             self.at += 1;
             return Ok(());
         }
-        Err(self.fault(&format!("expected an operator or {c}")))
+        let Some(found) = self.peek() else { return Err(self.fault(&format!("expected an operator or {c}"))) };
+        Err(self.unexpected(found, &c.to_string()))
+    }
+
+    /// What to say of a character that stands where an operator or something else should.
+    fn unexpected(&mut self, found: char, otherwise: &str) -> Fault {
+        match found {
+            '<' | '>' | '=' | '!' => self.fault(&format!("there are no comparisons; {STEP}")),
+            _ => self.fault(&format!("expected an operator (+ - * / ^) or {otherwise}")),
+        }
     }
 
     /// The next character that is not whitespace.
