@@ -125,8 +125,8 @@ $(WASM): $(STUDIO_SOURCES)
 	  --manifest-path crates/trabecula-wasm/Cargo.toml --target wasm32-unknown-unknown --target-dir target/wasm
 	@touch $@
 
-build/studio/index.html: $(WASM) scripts/studio_page.py $(wildcard studio/*) python/trabecula/viewer.js python/trabecula/viewer.css
-	@$(PYTHON) scripts/studio_page.py $(WASM) python/trabecula/studio.html $@
+build/studio/index.html: $(WASM) scripts/studio_page.py $(wildcard studio/*) python/trabecula/pictures/viewer.js python/trabecula/pictures/viewer.css
+	@$(PYTHON) scripts/studio_page.py $(WASM) python/trabecula/command/studio.html $@
 
 # The pages of docs/ as a site in build/site: search needs a server, such as `python -m http.server -d build/site`.
 site: $(VENV)/.site

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes the Python builders of kinds, python/trabecula/region.py and its like, and the words of a design as types,
-python/trabecula/names.py, from schema/design.json.
+python/trabecula/base/names.py, from schema/design.json.
 
 Keys, types, units, ranges, defaults and texts are declared once, in the core. What a signature adds to them is here: how values
 that Python has other forms for are converted, by the type that the schema names.
@@ -177,13 +177,13 @@ def module(definition, text):
     used += [f"from collections.abc import {generic}"] * bool(generic)
     used += ["from typing import Literal"] * ("Literal[" in body)
     given = ["named", *(n for n in ("control", "pairs", "settings") if f"{n}(" in body)]
-    used_here = ["from . import memory"] * ("memory." in body)
-    lines += [*used, "", *used_here, f"from .given import {', '.join(sorted(given))}", ""]
+    used_here = ["from .base import memory"] * ("memory." in body)
+    lines += [*used, "", *used_here, f"from .base.given import {', '.join(sorted(given))}", ""]
     hinted = [n for n in ("MeshLike", "Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
     lines += ["TYPE_CHECKING = False  # as type checkers know it, without the import", "if TYPE_CHECKING:"]
     arrays = [n for n in ("ArrayLike", "NDArray") if n in body]
     lines += [f"    from numpy.typing import {', '.join(arrays)}", ""] * bool(arrays)
-    lines += [f"    from .given import {', '.join(hinted)}", ""]
+    lines += [f"    from .base.given import {', '.join(hinted)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")
     for _, function in parts:
         lines += ["", "", "@named", *function]
@@ -221,7 +221,7 @@ def names():
 def main():
     """Write the modules, or with --check say which are stale."""
     stale = []
-    modules = {name: module(*family) for name, family in FAMILIES.items()} | {"names": names()}
+    modules = {name: module(*family) for name, family in FAMILIES.items()} | {"base/names": names()}
     for name, made in modules.items():
         path = ROOT / "python" / "trabecula" / f"{name}.py"
         if "--check" in sys.argv[1:]:

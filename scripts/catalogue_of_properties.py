@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import trabecula as lt
 from trabecula import _core
-from trabecula.curves import Curve, Panel, panels
 from trabecula.laws import monotone
+from trabecula.pictures.curves import Curve, Panel, panels
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "docs" / "generated" / "properties.json"

@@ -16,7 +16,7 @@ HEAD = '''"""Reports: figures with their units, one class each. Made by scripts/
 
 from __future__ import annotations
 
-from .record import Report
+from .base.record import Report
 
 # ruff: noqa: RUF012  the parts of a class are declared by its base
 '''

@@ -26,7 +26,7 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
-from trabecula import cad
+from trabecula.io import cad
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -11,7 +11,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STUDIO, PACKAGE = ROOT / "studio", ROOT / "python" / "trabecula"
 #: In the order in which they are run.
-SCRIPTS = (PACKAGE / "viewer.js", STUDIO / "rays.js", STUDIO / "core.js", STUDIO / "controls.js", STUDIO / "studio.js")
+SCRIPTS = (
+    PACKAGE / "pictures" / "viewer.js",
+    STUDIO / "rays.js",
+    STUDIO / "core.js",
+    STUDIO / "controls.js",
+    STUDIO / "studio.js",
+)
 AXES = "".join(
     f'<g data-part="{name}"><line stroke="{colour}" stroke-width="2"/><text text-anchor="middle" dy=".35em" '
     f'fill="currentColor">{name}</text></g>'
@@ -26,7 +32,7 @@ def text(path: Path) -> str:
 def page(core: bytes) -> str:
     """The page."""
     parts = {
-        "style": text(PACKAGE / "viewer.css") + text(STUDIO / "studio.css"),
+        "style": text(PACKAGE / "pictures" / "viewer.css") + text(STUDIO / "studio.css"),
         "axes": AXES,
         "worker": text(STUDIO / "worker.js"),
         "script": "\n".join(map(text, SCRIPTS)),

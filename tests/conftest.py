@@ -10,7 +10,7 @@ import warnings
 import pytest
 import trabecula as lt
 from finite_elements import solid
-from trabecula import cli
+from trabecula.command import cli
 
 # What runs in the background may begin with interrupts ignored, and so would the programs that tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)

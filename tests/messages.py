@@ -289,7 +289,7 @@ def said(row):
 
 def of_command(words):
     """The exit status of a command and what it writes on stderr, without times."""
-    from trabecula import cli
+    from trabecula.command import cli
 
     err, out = io.StringIO(), io.StringIO()
     with contextlib.redirect_stderr(err), contextlib.redirect_stdout(out):

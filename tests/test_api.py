@@ -564,7 +564,7 @@ def test_memory_of_control_groups(tmp_path):
 @pytest.mark.parametrize("name", ["a.stl", "a.3mf", "a.ply", "a.obj", "a.npy", "a.vti"])
 def test_a_disk_without_room(tmp_path, monkeypatch, name):
     """Every format is refused before it is written."""
-    from trabecula import machine
+    from trabecula.base import machine
 
     monkeypatch.setattr(machine, "free_disk", lambda folder: 5000.0)
     voxels = name.endswith(("npy", "vti"))
@@ -575,7 +575,7 @@ def test_a_disk_without_room(tmp_path, monkeypatch, name):
 
 
 def test_a_disk_without_room_is_known_before_the_work(tmp_path, monkeypatch):
-    from trabecula import machine
+    from trabecula.base import machine
 
     (tmp_path / "cube.toml").write_text(
         'schema = 1\nregion.box.size = [8, 8, 8]\n[lattice.a]\ncell = "gyroid"\npart = "sheet"\n'
@@ -595,7 +595,7 @@ def test_a_disk_without_room_is_known_before_the_work(tmp_path, monkeypatch):
 @pytest.mark.parametrize("kind", ["stl", "3mf", "ply", "obj"])
 def test_sizes_of_files(tmp_path, kind):
     """The estimate is right to a third, and seldom too small."""
-    from trabecula.machine import file_size
+    from trabecula.base.machine import file_size
 
     mesh = SOLID.mesh(edge=0.2)
     mesh.write(tmp_path / f"a.{kind}")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trabecula as lt
 from conftest import in_process
-from trabecula import cad
+from trabecula.io import cad
 
 pytest.importorskip("OCP")
 ROOT = Path(__file__).resolve().parent.parent

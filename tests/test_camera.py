@@ -9,8 +9,8 @@ import trabecula as lt
 from conftest import in_process
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trabecula.camera import VIEWS, section_plane, towards
-from trabecula.turntable import SIGNATURE, animated
+from trabecula.pictures.camera import VIEWS, section_plane, towards
+from trabecula.pictures.turntable import SIGNATURE, animated
 
 
 def read(png, channels=3):

@@ -4,7 +4,7 @@ import math
 from xml.etree import ElementTree
 
 import pytest
-from trabecula.chart import Chart, svg, ticks
+from trabecula.pictures.chart import Chart, svg, ticks
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -30,7 +30,7 @@ def names(folder):
 
 def test_help_is_light(tmp_path):
     """Help starts without numpy."""
-    code = "import sys, trabecula.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
+    code = "import sys, trabecula.command.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
     code += "assert 'numpy' not in sys.modules, sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     for command in ("new", "check", "mesh", "voxels", "measure", "cells", "render"):
@@ -251,7 +251,7 @@ def test_a_folder_that_cannot_be_written(tmp_path, cube):
 def test_a_full_disk(tmp_path, cube):
     """An error of the system while writing is one line."""
     code = (
-        "import os, sys, trabecula.files as o, trabecula.cli as c, contextlib\n"
+        "import os, sys, trabecula.base.files as o, trabecula.command.cli as c, contextlib\n"
         "@contextlib.contextmanager\n"
         "def full(path):\n    yield '/dev/full'\n"
         "import trabecula.solid as m; m.whole_file = full\n"
@@ -346,7 +346,7 @@ def test_interrupted_while_it_starts(tmp_path, cube):
 def test_interrupted_after_the_file_is_whole(tmp_path, cube):
     """Then it is said to be there."""
     code = (
-        "import sys, os, signal, trabecula.files as o, trabecula.cli as c\n"
+        "import sys, os, signal, trabecula.base.files as o, trabecula.command.cli as c\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "usual = os.replace\n"
         "def replace(*names):\n    usual(*names); os.kill(os.getpid(), signal.SIGINT)\n"

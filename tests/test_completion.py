@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 from trabecula import beams, cell
-from trabecula.cli import COMMANDS, main
-from trabecula.islands import ISLANDS
+from trabecula.base.islands import ISLANDS
+from trabecula.command.cli import COMMANDS, main
 
 BASH = """
 source {script}

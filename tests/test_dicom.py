@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trabecula as lt
-from trabecula import dicom
+from trabecula.io import dicom
 
 pydicom = pytest.importorskip("pydicom")
 

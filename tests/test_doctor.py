@@ -4,7 +4,7 @@ import json
 
 import trabecula as lt
 from conftest import in_process
-from trabecula.doctor import extras, state, words
+from trabecula.command.doctor import extras, state, words
 
 
 def test_it_names_the_version_and_every_extra_with_what_is_missing():

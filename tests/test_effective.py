@@ -8,8 +8,8 @@ import pytest
 import trabecula as lt
 from conftest import command, in_process
 from trabecula import level, map, region
-from trabecula.cards import abaqus, ansys, nastran
-from trabecula.moduli import modulus, sphere, surface
+from trabecula.command.moduli import modulus, sphere, surface
+from trabecula.io.cards import abaqus, ansys, nastran
 
 #: Homogenised at E = 1, nu = 0.3 by an independent program: C11, C12, C44.
 TABLE = [

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 import trabecula as lt
-from trabecula import _core, cli, formats
+from trabecula import _core
+from trabecula.base import formats
+from trabecula.command import cli
 
 READS = ", ".join(formats.MESH_READS)
 ROOT = Path(__file__).parent.parent

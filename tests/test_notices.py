@@ -114,7 +114,7 @@ def test_a_design_on_standard_input(tmp_path, cube):
 @pytest.mark.parametrize("start", [0.0, 3.0, 30.0])
 def test_what_comes_before_the_first_step_does_not_count_in_the_time_left(monkeypatch, start):
     """Steps of equal length after a start of some seconds: from the second on, half of what is done tells their length."""
-    from trabecula import terminal
+    from trabecula.base import terminal
 
     now = 0.0
     monkeypatch.setattr(sys, "stderr", screen := io.StringIO())
@@ -132,7 +132,7 @@ def test_a_warning_has_a_line_of_its_own(monkeypatch):
     """On a terminal the progress line is taken away before a message."""
     from itertools import count
 
-    from trabecula import terminal
+    from trabecula.base import terminal
 
     class Terminal(io.StringIO):
         def isatty(self):

@@ -14,7 +14,7 @@ import numpy as np
 import parts
 import pytest
 import trabecula as lt
-from trabecula.formats import MESH_READS, kind_of
+from trabecula.base.formats import MESH_READS, kind_of
 
 EVERYTHING = "TRABECULA_CAMPAIGN" in os.environ
 WAVELENGTH = 3.6

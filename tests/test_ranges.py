@@ -22,10 +22,11 @@ import pytest
 import trabecula as lt
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trabecula import cli, clusters, ranges, shared_file, unfinished
+from trabecula.command import cli
 from trabecula.errors import Refused
-from trabecula.shared_file import Written
-from trabecula.unfinished import Unfinished
+from trabecula.jobs import clusters, ranges, shared_file, unfinished
+from trabecula.jobs.shared_file import Written
+from trabecula.jobs.unfinished import Unfinished
 
 CORPUS = Path(__file__).parents[1] / "corpus" / "designs"
 
@@ -191,7 +192,7 @@ KILLED = """
 import sys, warnings
 warnings.simplefilter("ignore")
 import trabecula as lt
-from trabecula import ranges, unfinished
+from trabecula.jobs import ranges, unfinished
 unfinished.CHUNK = 1_000_000  # many lines
 design = lt.load(sys.argv[1]).build()
 print("built", flush=True)
@@ -716,12 +717,12 @@ def changed(cluster, code: str):
     from distributed import Client
 
     with Client(cluster.scheduler_address) as client:
-        client.run(exec, f"import trabecula.shared_file as it\nit.before = dict(vars(it))\n{code}", {})
+        client.run(exec, f"import trabecula.jobs.shared_file as it\nit.before = dict(vars(it))\n{code}", {})
         try:
             yield
         finally:  # a worker that was started in between is as it was
             restored = "before = vars(it).get('before', dict(vars(it)))\nvars(it).clear()\nvars(it).update(before)"
-            client.run(exec, f"import trabecula.shared_file as it\n{restored}", {}, on_error="ignore")
+            client.run(exec, f"import trabecula.jobs.shared_file as it\n{restored}", {}, on_error="ignore")
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 import trabecula as lt
-from trabecula import gmsh, results
+from trabecula.io import gmsh, results
 
 #: A cube of 8 mm as six tetrahedra, and two triangles of its surface.
 CORNERS = np.array([[x, y, z] for z in (0.0, 8.0) for y in (0.0, 8.0) for x in (0.0, 8.0)])

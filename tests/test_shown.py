@@ -9,12 +9,12 @@ import trabecula as lt
 from conftest import in_process
 from hypothesis import strategies as st
 from test_viewer import unpacked
-from trabecula.camera import towards
-from trabecula.cli import parser
-from trabecula.drawing import resolution
-from trabecula.drawn import _paper
-from trabecula.shown import SHOWN, look
-from trabecula.trajectories import trajectories
+from trabecula.command.cli import parser
+from trabecula.command.drawing import resolution
+from trabecula.pictures.camera import towards
+from trabecula.pictures.drawn import _paper
+from trabecula.pictures.shown import SHOWN, look
+from trabecula.pictures.trajectories import trajectories
 
 EYE = (30, 40)
 BOX_FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])

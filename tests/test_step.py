@@ -169,7 +169,7 @@ def test_patches_are_as_near_as_the_report_says(tmp_path):
 
 
 def test_the_command_writes_files(tmp_path, capsys):
-    from trabecula.cli import main
+    from trabecula.command.cli import main
 
     design, path = tmp_path / "ring.toml", tmp_path / "ring.STP"
     beams = lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8, fillet="auto")
@@ -187,7 +187,7 @@ def test_the_command_writes_files(tmp_path, capsys):
 
 
 def test_both_protocols_have_the_same_solids(tmp_path, capsys):
-    from trabecula.cli import main
+    from trabecula.command.cli import main
 
     design, path, mesh = (tmp_path / name for name in ("ring.toml", "ring.step", "ring.stl"))
     design.write_text(lt.Design(region=ROOM, beams=lt.Beams(nodes=NODES, struts=STRUTS, radius=0.8)).to_toml())

@@ -12,7 +12,7 @@ import pytest
 import trabecula as lt
 from conftest import in_process
 from test_viewer import chromium
-from trabecula import studio
+from trabecula.command import studio
 from trabecula.errors import Refused
 
 #: Small, with what a control of each kind is for.

@@ -23,14 +23,16 @@ import pytest
 import trabecula as lt
 from hypothesis import given
 from hypothesis import strategies as st
-from trabecula import cli, clusters, workers
-from trabecula.conditions import condition
-from trabecula.rows import PROPERTIES, Job, columns_of_job, row_of
-from trabecula.sampling import DIMENSIONS, latin, sobol
-from trabecula.scatter import front_of, scatter
-from trabecula.sent import digests
-from trabecula.study import Study
-from trabecula.sweeps import Journal
+from trabecula.command import cli
+from trabecula.jobs import clusters
+from trabecula.jobs.sent import digests
+from trabecula.sweeps import workers
+from trabecula.sweeps.conditions import condition
+from trabecula.sweeps.rows import PROPERTIES, Job, columns_of_job, row_of
+from trabecula.sweeps.sampling import DIMENSIONS, latin, sobol
+from trabecula.sweeps.scatter import front_of, scatter
+from trabecula.sweeps.study import Study
+from trabecula.sweeps.table import Journal
 
 BASE = """
 schema = 1
@@ -532,7 +534,7 @@ FULL = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
-from trabecula import cli
+from trabecula.command import cli
 sys.exit(cli.main(sys.argv[2:]))
 """
 

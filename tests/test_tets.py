@@ -13,7 +13,7 @@ import warnings
 import numpy as np
 import pytest
 import trabecula as lt
-from trabecula import children, elements, meshers
+from trabecula.io import children, elements, meshers
 
 BALL = {"region": {"sphere": {"radius": 5.0}}, "lattice": {"core": {"map": lt.map.tets(size=1.5)}}}
 
@@ -358,7 +358,7 @@ def test_an_interrupt_ends_the_reader(tmp_path):
                     line = file.read()
             except OSError:
                 continue
-            if b"trabecula.elements" in line and os.fsencode(path) in line:
+            if b"trabecula.io.elements" in line and os.fsencode(path) in line:
                 found.append(entry)
         return found
 

@@ -15,7 +15,7 @@ from conftest import in_process
 from hypothesis import given
 from hypothesis import strategies as st
 from trabecula.design import parsed
-from trabecula.nearest_vertex import OTHER_SIDE, _normals, nearest_vertices
+from trabecula.pictures.nearest_vertex import OTHER_SIDE, _normals, nearest_vertices
 
 BOX = """schema = 1
 region.box = { min = [0, 0, 0], max = [12, 10, 8] }
@@ -162,7 +162,7 @@ def test_vertices_without_a_value_are_marked_in_the_page(mesh):
 
 
 def test_a_page_is_whole_and_asks_for_nothing_outside(mesh, tmp_path, monkeypatch):
-    monkeypatch.setattr("trabecula.viewer.has_widgets", lambda: False)
+    monkeypatch.setattr("trabecula.pictures.viewer.has_widgets", lambda: False)
     mesh.view().save(tmp_path / "part.html", title='<"A & B">')
     text = (tmp_path / "part.html").read_text()
     page = Balance()

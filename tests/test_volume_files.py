@@ -12,9 +12,9 @@ import pytest
 import trabecula as lt
 from conftest import in_process
 from finite_elements import area_of, faces_of, solid
-from trabecula.file_sets import of_vtu
-from trabecula.local_fields import FIELDS, fields_at
-from trabecula.quadratic import curved
+from trabecula.io.file_sets import of_vtu
+from trabecula.io.quadratic import curved
+from trabecula.pictures.local_fields import FIELDS, fields_at
 
 
 def slab(**more):

@@ -7,7 +7,7 @@ import pytest
 import trabecula as lt
 from test_viewer import box, chromium
 from trabecula.design import parsed
-from trabecula.viewer import NAMES
+from trabecula.pictures.viewer import NAMES
 
 anywidget = pytest.importorskip("anywidget")
 
@@ -61,7 +61,7 @@ def test_notebooks_show_the_widget_or_else_a_page(mesh, monkeypatch):
     format_of = pytest.importorskip("IPython.core.formatters").DisplayFormatter().format
     assert "application/vnd.jupyter.widget-view+json" in format_of(mesh.view())[0]
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    monkeypatch.delitem(sys.modules, "trabecula.widget", raising=False)
+    monkeypatch.delitem(sys.modules, "trabecula.pictures.widget", raising=False)
     assert set(format_of(mesh.view())[0]) == {"text/plain", "text/html"}
     with pytest.raises(ImportError, match=r"pip install 'trabecula\[notebook\]'"):
         _ = mesh.view().widget

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from .levels import fraction, iso
     from .mesh import Mesh
     from .parts import write_parts
+    from .pictures.viewer import View, view
     from .quadors import Quadors, Slice
     from .solid import Solid
-    from .sweeps import objective, sweep
+    from .sweeps.table import objective, sweep
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
-    from .viewer import View, view
     from .volumes import BeamMesh, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
     from .voxels import Voxels
 
@@ -108,11 +108,11 @@ _HOMES = {
     "VoxelElements": "volumes",
     "VolumeSet": "volumes",
     "Voxels": "voxels",
-    "objective": "sweeps",
+    "objective": "sweeps.table",
     "spartan": "design",
-    "sweep": "sweeps",
-    "View": "viewer",
-    "view": "viewer",
+    "sweep": "sweeps.table",
+    "View": "pictures.viewer",
+    "view": "pictures.viewer",
     "write_parts": "parts",
     "iso": "levels",
     "fraction": "levels",

@@ -2,13 +2,13 @@
 
 import sys
 
-from . import terminal
+from .base import terminal
 
 
 def main() -> int:
     """Runs the command; gives its exit status."""
     terminal.interrupts_leave()
-    from .cli import main as run
+    from .command.cli import main as run
 
     return run()
 

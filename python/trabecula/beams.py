@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .names import BeamName
+    from .base.names import BeamName
 
 __all__ = ["cell", "cells", "names", "read"]
 
@@ -65,8 +65,8 @@ def read(path: str | os.PathLike[str]) -> dict[str, NDArray]:
     import os
 
     from . import _core
-    from .files import extension
-    from .formats import BEAM_READS
+    from .base.files import extension
+    from .base.formats import BEAM_READS
 
     kind = extension(path, BEAM_READS)
     try:

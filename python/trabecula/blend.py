@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .given import named
+from .base.given import named
 
 __all__ = ["between", "of"]
 

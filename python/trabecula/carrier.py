@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 
 from . import _core
-from .files import extension
-from .formats import VOLUME_WRITES
-from .given import fixed, poisson, positive, thread_count, whole
+from .base.files import extension
+from .base.formats import VOLUME_WRITES
+from .base.given import fixed, poisson, positive, thread_count, whole
 from .volumes import VolumeMesh, check_order
 
 TYPE_CHECKING = False  # as type checkers know it, without the import

@@ -12,15 +12,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from . import memory
-from .given import named, plain, settings
+from .base import memory
+from .base.given import named, plain, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from .given import Vector
-    from .names import CellName, Component, TetName
+    from .base.given import Vector
+    from .base.names import CellName, Component, TetName
 
 __all__ = ["file", "group", "names", "series", "term", "tet", "tet_facts", "tet_names"]
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
+from .base.files import extension, read_text, write_bytes, write_text
+from .base.given import copied, named, settings, three
+from .base.memory import IN_MEMORY, InMemory, content, file_name
 from .errors import DesignError, warn_caller
-from .files import extension, read_text, write_bytes, write_text
-from .given import copied, named, settings, three
-from .memory import IN_MEMORY, InMemory, content, file_name
 
 if TYPE_CHECKING:
-    from .given import Vector
-    from .names import BeamName, CellName, Dangling, Fit, PartName, Side, Trim, Unit
+    from .base.given import Vector
+    from .base.names import BeamName, CellName, Dangling, Fit, PartName, Side, Trim, Unit
     from .solid import Solid
 
 #: Keys whose text names a file.
@@ -245,13 +245,13 @@ def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
     except DesignError as error:
         if not error.path.startswith("sweep."):
             raise
-        from .keys import plain_of
-        from .varying import explained
+        from .base.keys import plain_of
+        from .base.varying import explained
 
         raise explained(error, plain_of(text, is_json), name) from None
     data: dict[str, Any] = json.loads(read.to_json())
     if "sweep" in data:
-        from .varying import check_values
+        from .base.varying import check_values
 
         check_values(data["sweep"], text, name)
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None

@@ -6,14 +6,14 @@ from __future__ import annotations
 import os
 from typing import Literal
 
-from . import memory
-from .given import control, named, pairs, settings
+from .base import memory
+from .base.given import control, named, pairs, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from .given import Points, Stops, Vector
+    from .base.given import Points, Stops, Vector
 
 __all__ = [
     "combined",

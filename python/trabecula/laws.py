@@ -14,12 +14,12 @@ import numpy as np
 
 from . import _core
 from . import beams as unit_cells
+from .base.files import extension, write_text
+from .base.formats import LAW_WRITES
+from .base.given import fixed, number, poisson, positive, thread_count, whole
 from .cell import tet_facts, tet_names
 from .design import Design
 from .errors import DesignError, DesignWarning
-from .files import extension, write_text
-from .formats import LAW_WRITES
-from .given import fixed, number, poisson, positive, thread_count, whole
 from .map import affine, tets
 from .region import box
 
@@ -152,7 +152,7 @@ class Law:
 
     def svg(self) -> str:
         """Its plots as SVG."""
-        from .curves import law_plots
+        from .pictures.curves import law_plots
 
         return law_plots(self)
 

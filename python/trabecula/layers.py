@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from . import _core
-from .files import check_place, extension, special, whole_file, write_svg
-from .formats import LAYER_WRITES, LAYERS
-from .given import number, positive, whole
-from .machine import fits
-from .outlines import outlines_svg
-from .reproducible import Reproducible
+from .base.files import check_place, extension, special, whole_file, write_svg
+from .base.formats import LAYER_WRITES, LAYERS
+from .base.given import number, positive, whole
+from .base.machine import fits
+from .base.reproducible import Reproducible
+from .pictures.outlines import outlines_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ class Layers(Reproducible, Sequence["Layer"]):
             self._check_room(kind, path, raster[1], raster[0])
         file: LayerFile = {"suffix": kind, "title": title, "binary": binary, "pixel": raster, "exposure": times}
         if resume or cluster or new:
-            from . import ranges
+            from .jobs import ranges
 
             return ranges.save_layers(self, os.fsdecode(path), file, self._threads, progress, cluster, new)
         with whole_file(path) as temporary:

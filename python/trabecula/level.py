@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .given import named
+from .base.given import named
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from .given import Vector
-    from .names import Fit, Of
+    from .base.given import Vector
+    from .base.names import Fit, Of
 
 __all__ = ["fraction", "iso", "permeability", "pore", "porosity", "stiffness", "thickness"]
 

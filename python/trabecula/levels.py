@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, overload
 
 from . import _core
-from .given import number
+from .base.given import number
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from .given import Vector
-    from .names import PartName
+    from .base.given import Vector
+    from .base.names import PartName
 
 __all__ = ["fraction", "iso"]
 

@@ -7,11 +7,11 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from .given import control, named, settings
+from .base.given import control, named, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from .given import Points, Vector
+    from .base.given import Points, Vector
 
 __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 

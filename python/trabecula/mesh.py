@@ -7,15 +7,15 @@ import os
 from functools import cached_property
 
 from . import _core
-from .drawn import Drawn
+from .base.files import extension, read_text, whole_file
+from .base.formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
+from .base.given import fixed, positive, thread_count, whole
+from .base.machine import file_size, fits
+from .base.reproducible import Unchanging
+from .base.transforms import Transformed, determinant
 from .errors import warn_caller
-from .files import extension, read_text, whole_file
-from .formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
-from .given import fixed, positive, thread_count, whole
-from .machine import file_size, fits
-from .reproducible import Unchanging
+from .pictures.drawn import Drawn
 from .thickness import Thickness
-from .transforms import Transformed, determinant
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Mesh(Drawn, Transformed, Unchanging):
         import numpy as np
 
         if triangles is None:
-            from .bridges import parts_of
+            from .io.bridges import parts_of
 
             vertices, triangles = parts_of(vertices)
         places, corners = np.asarray(vertices, dtype=np.float64), np.asarray(triangles)
@@ -108,7 +108,7 @@ class Mesh(Drawn, Transformed, Unchanging):
         name = os.fsdecode(path)
         kind = extension(name, PART_READS)
         if kind in CAD_READS:
-            from .cad import read
+            from .io.cad import read
 
             part = read(name, chord, angle, solid)
             return Mesh.of(part.points, part.triangles)
@@ -127,7 +127,7 @@ class Mesh(Drawn, Transformed, Unchanging):
         """The mesh as a ``trimesh.Trimesh``: the same vertices and triangles, not processed, with ``cut`` as an attribute of
         faces. An ImportError without trimesh.
         """
-        from .bridges import package
+        from .io.bridges import package
 
         attributes = {"cut": self.cut.copy()}
         return package("trimesh").Trimesh(
@@ -138,7 +138,7 @@ class Mesh(Drawn, Transformed, Unchanging):
         """The mesh as a ``pyvista.PolyData``, with ``cut`` as data of cells. An ImportError without pyvista."""
         import numpy as np
 
-        from .bridges import package
+        from .io.bridges import package
 
         corners = np.insert(self.triangles.astype(np.int64), 0, 3, axis=1)
         made = package("pyvista").PolyData(self.vertices.copy(), corners.ravel())
@@ -149,7 +149,7 @@ class Mesh(Drawn, Transformed, Unchanging):
         """The mesh as a ``meshio.Mesh`` of triangles, with ``cut`` as data of cells (0 or 1). An ImportError without meshio."""
         import numpy as np
 
-        from .bridges import package
+        from .io.bridges import package
 
         cells = [("triangle", self.triangles.astype(np.int64))]
         return package("meshio").Mesh(self.vertices.copy(), cells, cell_data={"cut": [self.cut.astype(np.uint8)]})

@@ -6,10 +6,10 @@ import os
 from collections.abc import Mapping, Sequence
 
 from . import _core
+from .base.files import check_place, extension, whole_file
+from .base.formats import MESH_WRITES
+from .base.machine import file_size, fits
 from .errors import IslandsWarning, warn_caller
-from .files import check_place, extension, whole_file
-from .formats import MESH_WRITES
-from .machine import file_size, fits
 
 __all__ = ["PARTS", "check_parts", "part_files", "warn_pieces", "write_parts"]
 

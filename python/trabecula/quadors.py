@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from . import _core
-from .files import write_svg
-from .given import number, positive, three, whole
-from .outlines import outlines_svg
-from .reproducible import Reproducible
+from .base.files import write_svg
+from .base.given import number, positive, three, whole
+from .base.reproducible import Reproducible
+from .pictures.outlines import outlines_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .resolution import Resolution
+    from .base.resolution import Resolution
 
 __all__ = ["Quadors", "Slice"]
 

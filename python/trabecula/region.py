@@ -7,14 +7,14 @@ import os
 from collections.abc import Sequence
 from typing import Literal
 
-from . import memory
-from .given import named, settings
+from .base import memory
+from .base.given import named, settings
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .given import MeshLike, Vector
+    from .base.given import MeshLike, Vector
 
 __all__ = [
     "box",

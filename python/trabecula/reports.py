@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .record import Report
+from .base.record import Report
 
 # ruff: noqa: RUF012  the parts of a class are declared by its base
 

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from functools import cached_property
 
 from . import _core
+from .base.given import flag, number, poisson, positive, thread_count, whole
+from .base.machine import fits, rounded_down
+from .base.resolution import Resolution, sample_error
 from .carrier import Carrier
 from .errors import warn_caller
-from .given import flag, number, poisson, positive, thread_count, whole
-from .machine import fits, rounded_down
-from .resolution import Resolution, sample_error
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
 
 TYPE_CHECKING = False  # as type checkers know it, without the import

@@ -9,20 +9,20 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
-from .beam_files import save_beams
+from .base.files import check_place, extension, special, whole_file
+from .base.formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
+from .base.given import flag, number, positions, positive, shard_bytes, thread_count
+from .base.islands import check_islands, warn_islands
+from .base.machine import file_size, fits, rounded_up
+from .base.reproducible import Unchanging
 from .errors import warn_caller
-from .files import check_place, extension, special, whole_file
-from .formats import MESH_WRITES, STEP_WRITES, VOXEL_WRITES
-from .given import flag, number, positions, positive, shard_bytes, thread_count
-from .implicit import save_implicit
-from .islands import check_islands, warn_islands
+from .io.beam_files import save_beams
+from .io.implicit import save_implicit
 from .layers import Layers
-from .machine import file_size, fits, rounded_up
 from .mesh import TITLE, Mesh
 from .parts import PARTS, check_parts, warn_pieces
+from .pictures.seen import Seen
 from .quadors import Quadors
-from .reproducible import Unchanging
-from .seen import Seen
 from .simulated import Simulated
 from .thickness import Thickness
 from .transition import Transitions
@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .islands import Islands
-    from .memory import InMemory
+    from .base.islands import Islands
+    from .base.memory import InMemory
+    from .pictures.viewer import View
     from .reports import (
         BeamsFileReport,
         DanglingReport,
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
         StepReport,
         SurfaceReport,
     )
-    from .viewer import View
 
     Progress = Callable[[int, int], Any]
 
@@ -341,7 +341,7 @@ class Solid(Seen, Simulated, Unchanging):
         if apart is None:
             made, quality, islands = self._core.measure(spacing, volume, thread_count(threads), progress)
         else:
-            from . import ranges
+            from .jobs import ranges
 
             made, quality, islands = ranges.measure(self, spacing, volume, threads, progress, **apart)
         self._warn_coarse(made.volume + islands.dropped_volume, spacing, pieces=islands.found + 1)
@@ -591,7 +591,7 @@ class Solid(Seen, Simulated, Unchanging):
         accept: Callable[[SurfaceReport], Any],
         apart: dict[str, Any],
     ) -> SurfaceReport:
-        from . import ranges
+        from .jobs import ranges
 
         name = os.fsdecode(path)
         if extension(path, MESH_WRITES) != "stl" or special(name):
@@ -668,7 +668,7 @@ class Solid(Seen, Simulated, Unchanging):
         apart: dict[str, Any],
         settle: Callable[[], Any] = lambda: None,
     ) -> dict[str, Any]:
-        from . import ranges
+        from .jobs import ranges
 
         name, kind = os.fsdecode(path), extension(path, VOXEL_WRITES)
         check_place(path)
@@ -754,7 +754,7 @@ class Solid(Seen, Simulated, Unchanging):
         """The solid to turn, meshed at a spacing as for ``mesh``: see ``Mesh.view``. ``values`` may also be what ``render``
         shows as a number: ``"fraction"``, ``"stiffness"``, ``"angle"``, ``"spacing"`` or ``"density"``.
         """
-        from .viewer import view
+        from .pictures.viewer import view
 
         return view(self, values, label, edge, per_cell, **look)
 

@@ -8,16 +8,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
+from .base.files import extension, read_text, whole_file
+from .base.formats import TET_READS, TET_WRITES
+from .base.given import fixed, thread_count
+from .base.reproducible import Unchanging
+from .base.transforms import Transformed
 from .design import Design
-from .drawn import Picture
-from .element_mesh import ElementMesh
 from .errors import DesignError, warn_caller
-from .files import extension, read_text, whole_file
-from .formats import TET_READS, TET_WRITES
-from .given import fixed, thread_count
+from .io.element_mesh import ElementMesh
 from .mesh import Mesh
-from .reproducible import Unchanging
-from .transforms import Transformed
+from .pictures.drawn import Picture
 
 if TYPE_CHECKING:
     from typing import Any
@@ -158,7 +158,7 @@ class TetMesh(Picture, Transformed, Unchanging, ElementMesh):
         groups, where a name is that of one number). In .inp, and in .med if it is not negative, the number n is the name ZONE_n
         of a set. Warns of names that are lost.
         """
-        from . import elements
+        from .io import elements
 
         kind = extension(path, TET_WRITES)
         names = elements.kept_names(kind, self._core.zone_names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from .files import write_svg
+from .base.files import write_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Thickness:
 
     def svg(self) -> str:
         """The histograms as the text of an SVG file, the share of the volume over the thickness."""
-        from .chart import Chart, svg
+        from .pictures.chart import Chart, svg
 
         def chart(title: str, of: str, it: ThicknessSpread) -> Chart:
             # Toward sharp edges local thickness falls to zero, which is no wall: the least one may be above the percentile.

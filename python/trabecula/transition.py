@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 
-from .files import extension, write_svg
+from .base.files import extension, write_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Transitions(Sequence["TransitionReport"]):
 
     def svg(self) -> str:
         """The fraction found along each transition as bars, what was asked for as a line across each: an SVG file's text."""
-        from .chart import Chart, svg
+        from .pictures.chart import Chart, svg
 
         return svg([Chart(**_chart(it)) for it in self])
 

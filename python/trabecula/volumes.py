@@ -15,14 +15,14 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 from . import _core
-from .element_mesh import LINES, TRIANGLES, ElementMesh
+from .base.files import check_place, extension, whole_file
+from .base.formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
+from .base.given import fixed, number, poisson, positive
+from .base.reproducible import Reproducible
+from .base.texts import counted
 from .errors import warn_caller
-from .files import check_place, extension, whole_file
-from .formats import BEAM_ELEMENT_WRITES, SHELL_WRITES, VOLUME_WRITES, VOXEL_ELEMENT_WRITES
-from .given import fixed, number, poisson, positive
+from .io.element_mesh import LINES, TRIANGLES, ElementMesh
 from .mesh import Mesh
-from .reproducible import Reproducible
-from .texts import counted
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .record import Report
+    from .base.record import Report
+    from .base.resolution import Resolution
     from .reports import BeamMeshReport, ShellReport, VolumeReport, VoxelElementsReport
-    from .resolution import Resolution
 
     Progress = Callable[[int, int], Any]
 
@@ -168,7 +168,7 @@ class FiniteElements(Reproducible, ElementMesh):
                 if values[0].size not in GMSH:
                     raise ValueError(f"{name} has {values[0].size} numbers each; fields of .msh have 1, 3 or 9: write .vtu")
         if kind == "xdmf":
-            from .xdmf import write
+            from .io.xdmf import write
 
             return write(os.fsdecode(path), self, further)
         count = self._figures.nodes

@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
-from .files import extension, whole_file
-from .formats import VOXEL_WRITES
-from .given import fixed, positive
-from .machine import fits
-from .reproducible import Reproducible
-from .transforms import factor_of, vector_of
+from .base.files import extension, whole_file
+from .base.formats import VOXEL_WRITES
+from .base.given import fixed, positive
+from .base.machine import fits
+from .base.reproducible import Reproducible
+from .base.transforms import factor_of, vector_of
 
 if TYPE_CHECKING:
     from typing import Any

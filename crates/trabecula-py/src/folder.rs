@@ -88,7 +88,7 @@ type ReadResult<'py> = (
 fn in_memory(name: &str) -> Result<Vec<u8>, String> {
     Python::attach(|py| {
         let read = || -> PyResult<Vec<u8>> {
-            let found = py.import("trabecula.memory")?.getattr("content")?.call1((name,))?;
+            let found = py.import("trabecula.base.memory")?.getattr("content")?.call1((name,))?;
             Ok(found.cast::<PyBytes>()?.as_bytes().to_vec())
         };
         read().map_err(|e| words(py, &e))
@@ -104,7 +104,7 @@ fn words(py: Python<'_>, e: &PyErr) -> String {
 fn elements(path: &str) -> Result<ZonedElements, String> {
     Python::attach(|py| {
         let read = || -> PyResult<ZonedElements> {
-            let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
+            let read = py.import("trabecula.io.elements")?.getattr("read")?.call1((path,))?;
             let (points, connectivity, ends, kinds, zones, names): Read<'_> = read.extract()?;
             let elements = made(&points, &connectivity, &ends, &kinds);
             Ok(ZonedElements { elements, zones: zones.as_array().to_vec(), names })
@@ -131,7 +131,7 @@ fn made(
 fn result(path: &str, array: &str) -> Result<Data, String> {
     let data = Python::attach(|py| {
         let read = || -> PyResult<Data> {
-            let read = py.import("trabecula.results")?.getattr("read")?.call1((path, array))?;
+            let read = py.import("trabecula.io.results")?.getattr("read")?.call1((path, array))?;
             let (points, connectivity, ends, kinds, names, chosen, values): ReadResult<'_> = read.extract()?;
             let mut arrays: Vec<Array> = names
                 .into_iter()
@@ -152,7 +152,7 @@ fn result(path: &str, array: &str) -> Result<Data, String> {
 fn scan(path: &str) -> Result<Scan, String> {
     Python::attach(|py| {
         let read = || -> PyResult<Scan> {
-            let read = py.import("trabecula.dicom")?.getattr("read")?.call1((path,))?;
+            let read = py.import("trabecula.io.dicom")?.getattr("read")?.call1((path,))?;
             let (shape, origin, step, values): ([usize; 3], [f64; 3], [f64; 3], PyReadonlyArray1<'_, f64>) =
                 read.extract()?;
             Ok(Scan { shape, values: values.as_array().to_vec(), placed: Some([origin, step]) })
@@ -165,7 +165,7 @@ fn scan(path: &str) -> Result<Scan, String> {
 fn cad(name: &str, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
     Python::attach(|py| {
         let read = || -> PyResult<CadMesh> {
-            let read = py.import("trabecula.cad")?.getattr("read")?;
+            let read = py.import("trabecula.io.cad")?.getattr("read")?;
             let part = read.call1((path, how.chord, how.angle, how.solid.as_deref()))?;
             let points: PyReadonlyArray2<'_, f64> = part.getattr("points")?.extract()?;
             let triangles: PyReadonlyArray2<'_, u32> = part.getattr("triangles")?.extract()?;
@@ -195,7 +195,7 @@ fn tetrahedra(name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMe
         let make = || -> PyResult<TetMesh> {
             let points = table(py, surface.vertices.clone())?;
             let triangles = table(py, surface.triangles.clone())?;
-            let call = py.import("trabecula.meshers")?.getattr("tetrahedra")?;
+            let call = py.import("trabecula.io.meshers")?.getattr("tetrahedra")?;
             let made = call.call1((name, points, triangles, size, limit))?;
             let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) = made.extract()?;
             let tets = tets.as_array();

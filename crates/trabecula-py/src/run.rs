@@ -35,7 +35,7 @@ impl Progress for Shared {
 
 /// Ends the processes that the work waits for: those of readers and meshers of other packages.
 fn stop_children(py: Python<'_>) {
-    let stop = || py.import("trabecula.children")?.call_method0("stop");
+    let stop = || py.import("trabecula.io.children")?.call_method0("stop");
     drop(stop()); // the interrupt itself is what is raised
 }
 

@@ -1,0 +1,1 @@
+"""What the command ``trabecula`` is made of, over the public names."""

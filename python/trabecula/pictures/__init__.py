@@ -1,0 +1,1 @@
+"""Pictures, drawings and viewers: of meshes and solids, of curves and distributions."""
