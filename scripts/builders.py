@@ -90,9 +90,9 @@ CONTROL = {
 
 #: Kinds whose file may be given as data in memory: their type, what makes a file of them, and how they are given.
 IN_MEMORY = {
-    "grid": ("ArrayLike", "grid", "Or the numbers themselves, an array (nx, ny, nz), with origin and step."),
-    "points": ("ArrayLike", "cloud", "Or the rows themselves, an array (n, 4) or a data frame."),
-    "mesh": ("MeshLike", "mesh", "Or a mesh in memory: ours, of trimesh, pyvista or meshio, or (vertices, triangles)."),
+    "grid": ("ArrayLike", "memory.grid", "Or the numbers themselves, an array (nx, ny, nz), with origin and step."),
+    "points": ("ArrayLike", "memory.cloud", "Or the rows themselves, an array (n, 4) or a data frame."),
+    "mesh": ("MeshLike", "in_memory", "Or a mesh in memory: ours, of trimesh, pyvista or meshio, or (vertices, triangles)."),
 }
 
 
@@ -109,7 +109,7 @@ def converted(name, schema, required, kind_of_table):
         return f"Mapping[int, {annotation(of['additionalProperties'])}]{optional}", f"{name}={name}"
     if name == "path" and kind_of_table in IN_MEMORY:
         hint, maker, _ = IN_MEMORY[kind_of_table]
-        return f"{PATH} | {hint}{optional}", f"path=memory.path_of(path, memory.{maker})"
+        return f"{PATH} | {hint}{optional}", f"path=memory.path_of(path, {maker})"
     if name == "path":
         form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
         return f"{PATH}{optional}", f"path={form}"
@@ -178,7 +178,8 @@ def module(definition, text):
     used += ["from typing import Literal"] * ("Literal[" in body)
     given = ["named", *(n for n in ("control", "pairs", "settings") if f"{n}(" in body)]
     used_here = ["from .base import memory"] * ("memory." in body)
-    lines += [*used, "", *used_here, f"from .base.given import {', '.join(sorted(given))}", ""]
+    mesh_here = ["from .mesh import in_memory"] * ("in_memory)" in body)
+    lines += [*used, "", *used_here, f"from .base.given import {', '.join(sorted(given))}", *mesh_here, ""]
     hinted = [n for n in ("MeshLike", "Points", "Stops", "Vector") if re.search(rf"\b{n}\b", re.sub(r'"[^"]*"', "", body))]
     lines += ["TYPE_CHECKING = False  # as type checkers know it, without the import", "if TYPE_CHECKING:"]
     arrays = [n for n in ("ArrayLike", "NDArray") if n in body]

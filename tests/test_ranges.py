@@ -22,6 +22,7 @@ import pytest
 import trabecula as lt
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from trabecula.base.paths import files_in
 from trabecula.command import cli
 from trabecula.errors import Refused
 from trabecula.jobs import clusters, ranges, shared_file, unfinished
@@ -311,7 +312,7 @@ def test_another_run_is_not_mixed_in(tmp_path: Path, whole):
 def test_a_changed_file_of_the_design_is_told_by_its_name(tmp_path: Path):
     text = (CORPUS / "mesh_bracket.toml").read_text()
     design = lt.design.parsed(text, False, "design", str(CORPUS))
-    name = lt.design.files_in(design.to_dict())[0]
+    name = files_in(design.to_dict())[0]
     (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
     content = (CORPUS / name).read_bytes()
     (tmp_path / name).write_bytes(content)

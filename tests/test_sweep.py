@@ -28,6 +28,7 @@ from trabecula.jobs import clusters
 from trabecula.jobs.sent import digests
 from trabecula.sweeps import workers
 from trabecula.sweeps.conditions import condition
+from trabecula.sweeps.remote import rows_by_cluster
 from trabecula.sweeps.rows import PROPERTIES, Job, columns_of_job, row_of
 from trabecula.sweeps.sampling import DIMENSIONS, latin, sobol
 from trabecula.sweeps.scatter import front_of, scatter
@@ -493,7 +494,7 @@ def test_files_of_a_design_go_with_it_to_the_workers_of_a_cluster(tmp_path: Path
         with pytest.MonkeyPatch.context() as monkey:
             monkey.setattr(type(client), "submit", sent)
             monkey.setattr(clusters, "connected", lambda name: contextlib.nullcontext(client))
-            rows = sorted(clusters.rows_by_cluster(job, points, "local:2"), key=lambda row: row["design"])
+            rows = sorted(rows_by_cluster(job, points, "local:2"), key=lambda row: row["design"])
     assert [row | {"seconds": 0} for row in rows] == [row | {"seconds": 0} for row in plain]
 
 
@@ -563,7 +564,7 @@ def test_rows_of_a_worker_of_another_version_are_not_taken(tmp_path: Path):
         job, points = Job(lt.load(study), per_cell=8.0), list(enumerate(Study(lt.load(study)).points()))
         said = r"a worker of version 9\.9\.9 has joined, here it is .*; its rows are not taken"
         with distributed.Client(address) as client, pytest.raises(ValueError, match=said):
-            for row in clusters.rows_by_cluster(job, points, address):
+            for row in rows_by_cluster(job, points, address):
                 rows.append(row)
                 # The worker goes, and one with another version comes.
                 client.run(exec, "import trabecula._core as it; it.__version__ = '9.9.9'", {})
@@ -577,7 +578,7 @@ def test_workers_of_a_cluster_that_are_killed_all_at_once_cost_no_row(tmp_path: 
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
         address = made.scheduler_address
         with distributed.Client(address) as client:
-            for row in clusters.rows_by_cluster(job, points, address):
+            for row in rows_by_cluster(job, points, address):
                 rows.append(row)
                 if len(rows) == 2:
                     for process in client.run(os.getpid).values():
@@ -590,9 +591,7 @@ def test_a_sweep_whose_cluster_loses_all_workers_ends(tmp_path: Path, monkeypatc
     monkeypatch.setattr(clusters, "PATIENCE", 3)
     design = lt.load(written(tmp_path, '"lattice.a.level.fraction" = { from = 0.1, to = 0.6, count = 12 }'))
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as made:
-        rows = clusters.rows_by_cluster(
-            Job(design, per_cell=8.0), list(enumerate(Study(design).points())), made.scheduler_address
-        )
+        rows = rows_by_cluster(Job(design, per_cell=8.0), list(enumerate(Study(design).points())), made.scheduler_address)
         next(rows)
         made.scale(0)
         with pytest.raises(ValueError, match="the cluster has had no workers for 3 s"):

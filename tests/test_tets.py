@@ -318,10 +318,10 @@ def test_ftetwild_takes_a_soup(tmp_path):
 
 
 def test_paths_of_tetrahedra_go_with_their_design():
-    from trabecula.design import _moved
+    from trabecula.base.paths import moved
 
     data = lt.Design(lt.region.sphere(radius=1), {"core": {"map": lt.map.tets(path="part.vtu")}}).to_dict()
-    assert _moved(data, lambda path: "../" + path)["lattice"]["core"]["map"]["tets"]["path"] == "../part.vtu"
+    assert moved(data, lambda path: "../" + path)["lattice"]["core"]["map"]["tets"]["path"] == "../part.vtu"
 
 
 #: A section of an ANSYS file whose bracket never closes: its reader looks for the end beyond the end of the file.

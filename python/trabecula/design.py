@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from .base.files import extension, read_text, write_bytes, write_text
 from .base.given import copied, named, settings, three
-from .base.memory import IN_MEMORY, InMemory, content, file_name
+from .base.memory import IN_MEMORY, content, file_name
+from .base.paths import files_in, in_memory_in, moved
 from .errors import DesignError, warn_caller
 
 if TYPE_CHECKING:
     from .base.given import Vector
     from .base.names import BeamName, CellName, Dangling, Fit, PartName, Side, Trim, Unit
     from .solid import Solid
-
-#: Keys whose text names a file.
-PATHS = ("path", "nodes", "struts")
 
 __all__ = ["Beams", "Design", "Lattice", "load", "skin", "spartan"]
 
@@ -156,7 +154,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data = _moved(data, lambda path: path if path.startswith(IN_MEMORY) else os.path.abspath(os.path.join(folder, path)))
+        data = moved(data, lambda path: path if path.startswith(IN_MEMORY) else os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -199,12 +197,12 @@ class Design:
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data = _moved(data, lambda path: path if path.startswith(IN_MEMORY) else _relative(os.path.join(old, path), new))
+        data = moved(data, lambda path: path if path.startswith(IN_MEMORY) else _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
         for name in {name for name in files_in(data) if name.startswith(IN_MEMORY)}:
             write_bytes(os.path.join(new, file_name(name)), content(name))
-        checked = _core.Design.from_data(_moved(data, file_name))
+        checked = _core.Design.from_data(moved(data, file_name))
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
         write_text(path, text)
 
@@ -294,42 +292,6 @@ def spartan(
     )
     box = {"box": {"size": [4 * w for w in waves]}} if region is None else region
     return Design(region=box, lattice={name: lattice})
-
-
-def in_memory_in(data: Any) -> list[InMemory]:
-    """The data in memory that plain data name."""
-    return [name for name in files_in(data) if isinstance(name, InMemory)]
-
-
-def files_in(data: Any) -> list[str]:
-    """The files that plain data names: what stands under ``path``, or as a table of beams; in a sweep every value of it."""
-    found: list[str] = []
-
-    def noted(name: str) -> str:
-        found.append(name)
-        return name
-
-    _moved(data, noted)
-    return found
-
-
-def _moved(data: Any, turn: Callable[[str], str]) -> Any:
-    """The data with every relative path of a file turned: what stands under ``path``, or as a table of beams."""
-    if isinstance(data, list):
-        return [_moved(item, turn) for item in data]
-    if not isinstance(data, dict):
-        return data
-    out: dict[str, Any] = {}
-    for key, item in data.items():
-        # In a sweep a key is the path of one, and its values are a list.
-        names = key.rpartition(".")[2] in PATHS
-        if names and isinstance(item, str):
-            out[key] = turn(item)
-        elif names and isinstance(item, list):
-            out[key] = [turn(one) if isinstance(one, str) else _moved(one, turn) for one in item]
-        else:
-            out[key] = _moved(item, turn)
-    return out
 
 
 def _relative(path: str, folder: str) -> str:

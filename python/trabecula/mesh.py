@@ -9,8 +9,9 @@ from functools import cached_property
 from . import _core
 from .base.files import extension, read_text, whole_file
 from .base.formats import CAD_READS, DESIGNS, MESH_WRITES, PART_READS
-from .base.given import fixed, positive, thread_count, whole
+from .base.given import check_data, fixed, positive, thread_count, whole
 from .base.machine import file_size, fits
+from .base.memory import InMemory
 from .base.reproducible import Unchanging
 from .base.transforms import Transformed, determinant
 from .errors import warn_caller
@@ -461,3 +462,21 @@ def region_of_file(name: str) -> _core.Region:
     if kind in PART_READS:
         return _core.Region.from_data({"region": {"mesh": {"path": os.path.abspath(name)}}}, folder)
     return _core.Region.from_text(read_text(name), kind == "json", name, folder)
+
+
+def in_memory(given: Any) -> InMemory:
+    """A mesh, (vertices, triangles) or one of another package, as a .ply in double precision."""
+    import numpy as np
+
+    check_data(given)
+    pair = isinstance(given, (tuple, list)) and len(given) == 2
+    made = given if isinstance(given, Mesh) else Mesh.of(*given) if pair else Mesh.of(given)
+    vertices, triangles = made.counts
+    faces = np.empty(triangles, dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, made.triangles
+    head = (
+        f"ply\nformat binary_little_endian 1.0\ncomment lengths in mm\nelement vertex {vertices}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    return InMemory.of(head.encode() + made.vertices.astype("<f8").tobytes() + faces.tobytes(), "ply")

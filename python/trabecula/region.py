@@ -9,6 +9,7 @@ from typing import Literal
 
 from .base import memory
 from .base.given import named, settings
+from .mesh import in_memory
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def mesh(
     solid: Of a STEP or IGES file: name of the solid that is read (all of them unless given). [optional]
     """
     given = settings(
-        path=memory.path_of(path, memory.mesh),
+        path=memory.path_of(path, in_memory),
         unit=unit,
         scale=scale,
         repair=repair,

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from .base.islands import Islands
     from .base.memory import InMemory
+    from .laws import Law
     from .pictures.viewer import View
     from .reports import (
         BeamsFileReport,
@@ -757,6 +758,12 @@ class Solid(Seen, Simulated, Unchanging):
         from .pictures.viewer import view
 
         return view(self, values, label, edge, per_cell, **look)
+
+    @staticmethod
+    def _law(*given: Any, **more: Any) -> Law:
+        from .laws import law
+
+        return law(*given, **more)
 
     def _picture(self) -> Mesh:
         low, high = self.bounds

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 
 from .base.files import extension, write_svg
+from .base.texts import off
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -98,9 +99,3 @@ def _chart(it: TransitionReport) -> dict:
         "asked": asked,
         "marks": [("equal shares", 0.5)],
     }
-
-
-def off(transition: TransitionReport) -> float | None:
-    """The greatest difference between the fraction found and the one asked for; None where that is not known."""
-    each = [r.found - r.asked for r in transition.fractions if r.asked is not None]
-    return max(each, key=abs, default=None)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["IN_MEMORY", "InMemory", "cloud", "content", "file_name", "grid", "mesh", "path_of"]
+__all__ = ["IN_MEMORY", "InMemory", "cloud", "content", "file_name", "grid", "path_of"]
 
 #: How the names begin; the core knows it.
 IN_MEMORY = "memory:"
@@ -83,26 +83,6 @@ def cloud(given: Any) -> InMemory:
     names = [str(name) for name in getattr(given, "columns", ())]
     head = [",".join(names)] if {"x", "y", "z"} <= {name.lower() for name in names} else []
     return InMemory.of("\n".join([*head, *(",".join(map(repr, row)) for row in rows), ""]).encode(), "csv")
-
-
-def mesh(given: Any) -> InMemory:
-    """A mesh, (vertices, triangles) or one of another package, as a .ply in double precision."""
-    import numpy as np
-
-    from ..mesh import Mesh
-
-    check_data(given)
-    pair = isinstance(given, (tuple, list)) and len(given) == 2
-    made = given if isinstance(given, Mesh) else Mesh.of(*given) if pair else Mesh.of(given)
-    vertices, triangles = made.counts
-    faces = np.empty(triangles, dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, made.triangles
-    head = (
-        f"ply\nformat binary_little_endian 1.0\ncomment lengths in mm\nelement vertex {vertices}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    return InMemory.of(head.encode() + made.vertices.astype("<f8").tobytes() + faces.tobytes(), "ply")
 
 
 def _numbers(what: str, given: Any, dimensions: int) -> NDArray[np.float64]:

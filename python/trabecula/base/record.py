@@ -17,6 +17,11 @@ class Report(dict):
     _parts: ClassVar[dict[str, str]] = {}
     #: The figures that are dictionaries of reports by name.
     _by_name: ClassVar[frozenset[str]] = frozenset()
+    #: All classes of reports by their names.
+    _classes: ClassVar[dict[str, type[Report]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        Report._classes.setdefault(cls.__name__, cls)
 
     def __init__(self, data: dict[str, Any]):
         super().__init__({key: self._part(key, value) for key, value in data.items()})
@@ -25,9 +30,7 @@ class Report(dict):
         name = self._parts.get(key)
         if name is None or value is None:
             return value
-        from .. import reports
-
-        made = getattr(reports, name)
+        made = self._classes[name]
         if isinstance(value, list):
             return [made(item) for item in value]
         return {k: made(item) for k, item in value.items()} if key in self._by_name else made(value)

@@ -240,9 +240,13 @@ def _blend(it: BlendReport) -> Iterator[str]:
         yield f"  {f.path}: {f.points} points, delta {figure(f.delta)} mm, condition {f.condition:.2g}"
 
 
-def _transition(it: TransitionReport) -> Iterator[str]:
-    from ..transition import off
+def off(transition: TransitionReport) -> float | None:
+    """The greatest difference between the fraction found and the one asked for; None where that is not known."""
+    each = [r.found - r.asked for r in transition.fractions if r.asked is not None]
+    return max(each, key=abs, default=None)
 
+
+def _transition(it: TransitionReport) -> Iterator[str]:
     yield f"transition {it.between[0]} to {it.between[1]}: {figure(it.volume)} mm³"
     worst = off(it)
     error = "" if worst is None else f", off by {worst:+.4f} at most"

@@ -882,9 +882,9 @@ def serve(argv: list[str] | None) -> int:
     known_command(top, words)
     args = top.parse_args(words)
     if args.version:
-        from .. import __version__
+        from .. import _core
 
-        print(f"trabecula {__version__}")
+        print(f"trabecula {_core.__version__}")
         return 0
     if args.command == "completion":
         from .. import beams, cell

@@ -15,6 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 from .. import _core
 from ..base.files import extension, whole_file
+from ..base.paths import data_of
 from .beam_files import region_mesh
 
 __all__ = ["Expressions", "save_implicit"]
@@ -137,10 +138,8 @@ class Expressions:
 
 def save_implicit(solid: Solid, path: str | os.PathLike[str]) -> dict[str, Any]:
     """As ``Solid.save_implicit``."""
-    from ..design import parsed
-
     extension(path, ("3mf",))
-    design = parsed(solid._core.design, False, "the design", "").to_dict()
+    design = data_of(solid._core.design)
     for key, what in [("blend", "a blend"), ("skin", "a skin"), ("keep", "keep zones"), ("beams", "beams")]:
         if design.get(key):
             more = "" if key != "beams" else ": save_beams writes them as such"

@@ -7,23 +7,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
-import tempfile
-import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from typing import Any
 
 from .. import _core
 from ..base.given import QUEUES, cluster_name
-from ..sweeps.rows import Job, row_of
-from .sent import contents, put_files
 
-__all__ = ["PATIENCE", "connected", "in_order", "rows_by_cluster"]
+__all__ = ["PATIENCE", "TRIES", "WAITING", "connected", "in_order", "lost", "result", "same", "waited"]
 
 #: Seconds that a cluster has to answer, and to have a worker again when it has lost the last one.
 PATIENCE = 30
@@ -155,80 +150,6 @@ def version() -> str:
     return _core.__version__
 
 
-def rows_by_cluster(job: Job, tasks: Iterable[tuple[int, dict[str, Any]]], cluster: str) -> Generator[dict[str, Any]]:
-    """The rows of numbered points of a sweep as they are done. Files that the design reads go by their content once to each
-    worker.
-
-    A row whose worker dies is made by another. Raises ValueError as ``connected``, for a worker of another version that has
-    joined since, and for a cluster that has lost its workers for longer than ``PATIENCE``.
-    """
-    with connected(cluster) as client:
-        files = contents(job.design.to_dict(), job.design.folder or os.getcwd())
-        data = job.to_dict() | {"threads": 1, "files": files, "key": os.urandom(16)}
-        given = client.submit(_same, data, pure=False)
-        waiting = iter(tasks)
-        #: The task of each row that is asked for, and how often it has been.
-        asked: dict[Any, tuple[tuple[int, dict[str, Any]], int]] = {}
-
-        def ask(task: tuple[int, dict[str, Any]], tries: int = 1) -> None:
-            asked[client.submit(_row, given, *task, pure=False)] = task, tries
-
-        for task in islice(waiting, WAITING * max(sum(client.nthreads().values()), 1)):
-            ask(task)
-        while asked:
-            for future in _waited(client, lambda: _done(asked)):
-                task, tries = asked.pop(future)
-                try:
-                    row = _result(client, future)
-                except _lost():
-                    if tries < TRIES:
-                        given = client.submit(_same, data, pure=False)
-                        ask(task, tries + 1)
-                        continue
-                    error = f"its worker died {TRIES} times; out of memory?"
-                    row = {"design": task[0], **task[1], "error": error, "version": _core.__version__}
-                if row["version"] != _core.__version__:  # workers may have joined since they were asked
-                    raise ValueError(
-                        f"cluster {cluster}: a worker of version {row['version']} has joined, here it is {_core.__version__}; "
-                        "its rows are not taken. End it, and the same command goes on"
-                    )
-                for task in islice(waiting, 1):
-                    ask(task)
-                yield row
-
-
-def _done(asked: Iterable[Any]) -> list[Any]:
-    """Futures that are done, at least one. Raises TimeoutError where there is none for some seconds."""
-    from distributed import wait
-
-    futures = list(asked)
-    with suppress(*_lost()):
-        wait(futures, timeout=5, return_when="FIRST_COMPLETED")
-    return [future for future in futures if future.done()]
-
-
-#: The last job of this process, by its key.
-_last: tuple[bytes, Job] | None = None
-_lock = threading.Lock()
-
-
-def _row(data: dict[str, Any], number: int, values: dict[str, Any]) -> dict[str, Any]:
-    """A row, where a worker makes it."""
-    global _last
-    with _lock:
-        if _last is None or _last[0] != data["key"]:
-            from distributed import get_worker
-
-            given = {key: value for key, value in data.items() if key not in ("key", "files")}
-            if data["files"]:
-                # In a folder that goes with the worker.
-                folder = tempfile.mkdtemp(prefix="trabecula-", dir=get_worker().local_directory)
-                given["sent"] = folder, put_files(data["files"], folder)
-            _last = data["key"], Job.of(given)
-        job = _last[1]
-    return row_of(job, number, values)
-
-
 def in_order(
     client: Any,
     work: Callable,
@@ -246,7 +167,7 @@ def in_order(
     ``inputs``, plain data, goes once to each worker. Raises what the functions do, and ValueError for a cluster that has lost
     its workers for longer than ``PATIENCE``.
     """
-    given = client.submit(_same, inputs, pure=False)
+    given = client.submit(same, inputs, pure=False)
     waiting = iter(tasks)
     asked: deque[list] = deque()
     wanted: deque[list] = deque()
@@ -266,11 +187,11 @@ def in_order(
         task, _, question, future = begun
         for attempt in range(TRIES):
             try:
-                return _result(client, future)
-            except _lost() as error:
+                return result(client, future)
+            except lost() as error:
                 if attempt + 1 == TRIES:
                     raise ValueError(f"a task of the cluster ended {TRIES} workers; are they out of memory? {error}") from None
-                given = client.submit(_same, inputs, pure=False)
+                given = client.submit(same, inputs, pure=False)
                 begun[1] = client.submit(work, given, *task, pure=False)
                 begun[3] = future = ask(begun[1], question)
 
@@ -287,7 +208,7 @@ def in_order(
             yield made
 
 
-def _lost() -> tuple[type[BaseException], ...]:
+def lost() -> tuple[type[BaseException], ...]:
     """What is raised for tasks that ended with their workers."""
     from concurrent.futures import CancelledError
 
@@ -297,12 +218,12 @@ def _lost() -> tuple[type[BaseException], ...]:
     return scheduler.KilledWorker, CancelledError, FutureCancelledError
 
 
-def _result(client: Any, future: Any) -> Any:
+def result(client: Any, future: Any) -> Any:
     """The result of a task, waited for as long as there are workers, or may be again soon."""
-    return _waited(client, lambda: future.result(timeout=5))
+    return waited(client, lambda: future.result(timeout=5))
 
 
-def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
+def waited(client: Any, attempt: Callable[[], Any]) -> Any:
     """What an attempt gives that may raise TimeoutError, made as long as there are workers, or may be again soon."""
     last, patience = time.monotonic(), getattr(client, "patience", PATIENCE)
     while True:
@@ -316,5 +237,6 @@ def _waited(client: Any, attempt: Callable[[], Any]) -> Any:
                 raise ValueError(f"the cluster has had no workers for {patience} s") from None
 
 
-def _same(inputs: dict[str, Any]) -> dict[str, Any]:
+def same(inputs: dict[str, Any]) -> dict[str, Any]:
+    """Plain data, which goes once to each worker as the result of a task."""
     return inputs

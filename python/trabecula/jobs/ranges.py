@@ -20,7 +20,7 @@ from .. import _core
 from ..base import terminal
 from ..base.files import whole_file
 from ..base.given import thread_count
-from ..design import _moved, parsed
+from ..base.paths import data_of, moved
 from .clusters import connected, in_order
 from .sent import digest_of, files_of, put_files
 from .shared_file import Written, write_at
@@ -376,7 +376,7 @@ def _ranges_of(job: dict[str, Any]) -> Any:
         if _last is None or _last[0] != job["key"]:
             with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
                 places = put_files(job["files"], folder)
-                data = parsed(job["design"], False, "<design>", folder).to_dict()
-                built = _core.Design.from_data(_moved(data, lambda name: places.get(name, name))).build(folder)
+                data = moved(data_of(job["design"]), lambda name: places.get(name, name))
+                built = _core.Design.from_data(data).build(folder)
             _last = job["key"], KINDS[job["of"]](built, **job["settings"])
         return _last[1]

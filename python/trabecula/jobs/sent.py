@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Iterator
 
 from ..base import memory
-from ..design import files_in, parsed
+from ..base.paths import data_of, files_in
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ __all__ = ["contents", "digest_of", "digests", "files_of", "put_files"]
 
 def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
     """The files of a solid's design, as ``contents`` gives them."""
-    return contents(parsed(solid._core.design, False, "<design>", solid._folder).to_dict(), solid._folder)
+    return contents(data_of(solid._core.design), solid._folder)
 
 
 def contents(data: Any, folder: str) -> dict[str, dict[str, bytes]]:

@@ -118,8 +118,6 @@ class Unfinished:
                     raise OSError(f"{self.folder}: {os.strerror(error.errno)}; {again}") from error
 
     def _same(self, old: dict[str, Any]) -> None:
-        from ..sweeps.table import differences
-
         changed = differences(old, self.head)
         if len(changed) > 1:
             changed = [name for name in changed if name != "count"]  # of ranges: it follows from the others
@@ -349,3 +347,11 @@ def alone(file: Any, place: str) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         raise Refused(f"another process works in {place}; wait for it, or end it") from None
+
+
+def differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """Paths at which two trees of plain data differ."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = sorted({*old, *new})
+        return [d for k in keys for d in differences(old.get(k), new.get(k), f"{path}.{k}" if path else k)]
+    return [] if old == new else [path.removeprefix("design.")]

@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from .. import __version__
+from .. import _core
 from ..base.terminal import figure
 from ..base.texts import UNITS
-from ..mesh import Mesh
-from ..solid import Solid
-from ..thickness import Thickness
 from .viewer import View, page
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from ..mesh import Mesh
+    from ..solid import Solid
+    from ..thickness import Thickness
 
 __all__ = ["part_page"]
 
@@ -50,7 +53,7 @@ def part_page(
     """
     body = [
         f"<main>\n<h1>{escape(title)}</h1>",
-        f'<p class="under">{_extent(solid)} · {mesh.counts[1]:,} triangles · trabecula {escape(__version__)}</p>',
+        f'<p class="under">{_extent(solid)} · {mesh.counts[1]:,} triangles · trabecula {escape(_core.__version__)}</p>',
         View(mesh, progress=progress).figure(),
         f'<ul class="verdict">{"".join(_verdicts(mesh))}</ul>',
     ]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Unpack
 
+    from ..laws import Law
     from ..mesh import Mesh
     from .drawn import Look
 
@@ -28,6 +29,8 @@ class Seen(Picture, Resolution):
     """Solids that say what they are at points, and show it."""
 
     mesh: Callable[..., Mesh]
+    #: As `law` of the package.
+    _law: Callable[..., Law]
 
     def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
         """Deviation of a solved map (``map.phase``) from the one asked for, at points (n, 3) in mm; arrays (n,).

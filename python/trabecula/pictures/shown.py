@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from ..base.paths import data_of
 from ..errors import warn_caller
 from .local_fields import fields_at
 from .trajectories import trajectories
@@ -59,14 +60,11 @@ def _stiffness(solid: Seen, threads: int | None = None) -> Look:
     """Young's modulus by the law of the cell: of cubes, told by their fraction alone."""
     import numpy as np
 
-    from ..design import parsed
-    from ..laws import law
-
     names = _lattices_of(solid, "stiffness")
     if len(names) > 1:
         raise ValueError(f"stiffness is that of one lattice; the design has {', '.join(names)}")
     (name,) = names
-    given = parsed(solid._core.design, False, "the design", solid._folder).to_dict()["lattice"][name]
+    given = data_of(solid._core.design)["lattice"][name]
     if not isinstance(given["cell"], str):
         raise ValueError(f"stiffness is by the law of a cell with a name; lattice.{name}.cell has none")
     _check_cubes(solid, name)
@@ -74,7 +72,7 @@ def _stiffness(solid: Seen, threads: int | None = None) -> Look:
     # Fractions a twentieth apart: between them the law is a monotone cubic. One alone has another close by.
     start, stop = (float(low), float(high)) if high > 1.01 * low else (0.99 * float(low), min(1.01 * float(high), 0.999))
     count = 2 + int(20 * (stop - start))
-    found = law(given["cell"], given["part"], start, stop, count, VOXELS, properties=["stiffness"], threads=threads)
+    found = solid._law(given["cell"], given["part"], start, stop, count, VOXELS, properties=["stiffness"], threads=threads)
     found.at("E", start)  # a ValueError where it falls apart
     error = 100 * float(np.nanmax(found.columns["E_error"]))
     for fraction, (said, *_) in list(found.notes.items())[:1]:

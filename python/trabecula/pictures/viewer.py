@@ -13,7 +13,7 @@ from importlib.resources import files
 from ..base.files import extension, write_text
 from ..base.given import number
 from .camera import towards
-from .drawn import NO_VALUE, WALL, numbers, scale_of
+from .drawn import NO_VALUE, WALL, Drawn, numbers, scale_of
 from .nearest_vertex import nearest_vertices
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -72,7 +72,6 @@ def view(
 
     Raises TypeError for anything else, ValueError for values that are not one number for each vertex.
     """
-    from ..mesh import Mesh
     from .seen import Seen
 
     solid = None
@@ -82,7 +81,7 @@ def view(
             values, label = _of_solid(solid, shape, values, label)
     elif edge is not None or per_cell is not None:
         raise ValueError("edge and per_cell are for a solid, which is meshed; this is a mesh")
-    if not isinstance(shape, Mesh):
+    if not isinstance(shape, Drawn):
         raise TypeError(f"view takes a Mesh or a Solid, found {type(shape).__name__}")
     made = View(shape, values, label, **look)
     made._solid = solid

@@ -15,7 +15,8 @@ from typing import Any
 from .. import _core
 from ..base.keys import listless, missing, unit_of
 from ..base.memory import InMemory
-from ..design import Design, _moved, in_memory_in
+from ..base.paths import in_memory_in, moved
+from ..design import Design
 from ..errors import DesignWarning
 from ..solid import Solid
 
@@ -80,7 +81,7 @@ class Job:
             name: InMemory.of(base64.b64decode(content), name.rpartition(".")[2])
             for name, content in data.get("memory", {}).items()
         }
-        design = _moved(data["design"], lambda name: memory.get(name, name))
+        design = moved(data["design"], lambda name: memory.get(name, name))
         return Job(Design(**design, folder=data["folder"]), **settings)
 
 
@@ -118,7 +119,7 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     figures: dict[str, Any] = {"sha256": hashlib.sha256(core.to_toml().encode()).hexdigest()}
     if job.sent:
         folder, places = job.sent
-        core = _core.Design.from_data(_moved(json.loads(core.to_json()), lambda name: places.get(name, name)))
+        core = _core.Design.from_data(moved(json.loads(core.to_json()), lambda name: places.get(name, name)))
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", DesignWarning)
         solid = Solid(core.build(folder), folder)

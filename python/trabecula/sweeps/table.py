@@ -21,10 +21,10 @@ from ..base.varying import overlapping
 from ..design import Design, load
 from ..errors import Refused
 from ..io.bridges import package
-from ..jobs.clusters import rows_by_cluster
 from ..jobs.sent import digests
-from ..jobs.unfinished import alone
+from ..jobs.unfinished import alone, differences
 from ..simulated import Simulated
+from .remote import rows_by_cluster
 from .rows import LAST, PROPERTIES, TEXTS, Job, check_paths, columns_of_job, is_made, named, row_of, unit_of_column
 from .study import Study
 from .workers import rows_by_processes, rows_here
@@ -277,14 +277,6 @@ class Journal:
     def end(self) -> None:
         """Lets the file go: its rows stand in the output, or are good for nothing."""
         self.ended = True
-
-
-def differences(old: Any, new: Any, path: str = "") -> list[str]:
-    """Paths at which two trees of plain data differ."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        keys = sorted({*old, *new})
-        return [d for k in keys for d in differences(old.get(k), new.get(k), f"{path}.{k}" if path else k)]
-    return [] if old == new else [path.removeprefix("design.")]
 
 
 def write_table(path: str, columns: dict[str, list]) -> None:
