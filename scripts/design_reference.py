@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import trabecula
-from trabecula.command.cli import COMMANDS
+from trabecula.command.syntax import COMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated"

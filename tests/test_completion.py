@@ -6,7 +6,8 @@ import subprocess
 import pytest
 from trabecula import beams, cell
 from trabecula.base.islands import ISLANDS
-from trabecula.command.cli import COMMANDS, main
+from trabecula.command.cli import main
+from trabecula.command.syntax import COMMANDS
 
 BASH = """
 source {script}

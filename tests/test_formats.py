@@ -7,7 +7,7 @@ import pytest
 import trabecula as lt
 from trabecula import _core
 from trabecula.base import formats
-from trabecula.command import cli
+from trabecula.command.parser import parser
 
 READS = ", ".join(formats.MESH_READS)
 ROOT = Path(__file__).parent.parent
@@ -20,7 +20,7 @@ def test_texts_name_the_formats_of_the_table():
     assert f"({READS.upper()})" in (ROOT / "docs/reference/features.md").read_text(encoding="utf-8")
     assert f"({READS.upper()};" in (ROOT / "crates/geometry/src/lib.rs").read_text(encoding="utf-8")
     assert re.findall(r"\.(\w+) ", lt.Mesh.write.__doc__.replace(",", " ")) == list(formats.MESH_WRITES)
-    assert f"({formats.dotted(formats.TET_WRITES)})" in cli.parser()._subparsers._group_actions[0].choices["tets"].format_help()
+    assert f"({formats.dotted(formats.TET_WRITES)})" in parser()._subparsers._group_actions[0].choices["tets"].format_help()
 
 
 @pytest.mark.parametrize("suffix", formats.MESH_WRITES)

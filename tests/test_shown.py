@@ -9,8 +9,8 @@ import trabecula as lt
 from conftest import in_process
 from hypothesis import strategies as st
 from test_viewer import unpacked
-from trabecula.command.cli import parser
 from trabecula.command.drawing import resolution
+from trabecula.command.parser import parser
 from trabecula.pictures.camera import towards
 from trabecula.pictures.drawn import _paper
 from trabecula.pictures.shown import SHOWN, look

@@ -23,7 +23,7 @@ import pytest
 import trabecula as lt
 from hypothesis import given
 from hypothesis import strategies as st
-from trabecula.command import cli
+from trabecula.command import arguments, cli
 from trabecula.jobs import clusters
 from trabecula.jobs.sent import digests
 from trabecula.sweeps import workers
@@ -796,7 +796,7 @@ def test_options_that_are_none_are_wrong_usage(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_the_command_knows_the_properties_that_there_are():
-    assert tuple(PROPERTIES) == cli.PROPERTIES
+    assert tuple(PROPERTIES) == arguments.PROPERTIES
 
 
 @pytest.mark.parametrize(
