@@ -254,7 +254,7 @@ def test_a_full_disk(tmp_path, cube):
         "import os, sys, trabecula.base.files as o, trabecula.command.cli as c, contextlib\n"
         "@contextlib.contextmanager\n"
         "def full(path):\n    yield '/dev/full'\n"
-        "import trabecula.solid as m; m.whole_file = full\n"
+        "import trabecula.saved as m; m.whole_file = full\n"
         f"sys.exit(c.main(['mesh', {str(cube)!r}, '-o', 'a.ply', '--edge', '0.5']))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)

@@ -19,7 +19,7 @@ beams blend cell grade layers level levels map quadors thickness transition voxe
 mesh
 parts region volumes
 carrier
-simulated
+saved simulated
 solid
 design
 laws tets

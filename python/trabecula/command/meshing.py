@@ -16,7 +16,8 @@ from ..base.texts import counted, voids
 from ..errors import Refused, WrongUsage
 from ..mesh import Mesh
 from ..parts import part_files, write_parts
-from ..solid import OPEN_IN_RANGES, Solid
+from ..saved import OPEN_IN_RANGES
+from ..solid import Solid
 from .inputs import build, closes, design_of, keep_inputs, resolution, same_file
 
 TYPE_CHECKING = False  # as type checkers know it, without the import

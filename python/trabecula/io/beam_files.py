@@ -13,8 +13,8 @@ __all__ = ["save_beams"]
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from ..base.resolution import Resolution
     from ..reports import BeamsFileReport
-    from ..solid import Solid
 
 #: Most triangles of the mesh that stands for beams in programs that cannot show them.
 MOST_SHOWN = 300_000
@@ -27,7 +27,7 @@ CLIP_STEPS, CLIP_ERROR = 64, 2e-5
 
 
 def save_beams(
-    solid: Solid, path: str | os.PathLike[str], chord: float | None, mesh: bool, threads: int | None
+    solid: Resolution, path: str | os.PathLike[str], chord: float | None, mesh: bool, threads: int | None
 ) -> BeamsFileReport:
     """As ``Solid.save_beams``."""
     kind = extension(path, BEAM_WRITES)

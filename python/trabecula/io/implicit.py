@@ -24,7 +24,7 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..solid import Solid
+    from ..base.resolution import Resolution
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 VOLUMETRIC = "http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01"
@@ -136,7 +136,7 @@ class Expressions:
         )
 
 
-def save_implicit(solid: Solid, path: str | os.PathLike[str]) -> dict[str, Any]:
+def save_implicit(solid: Resolution, path: str | os.PathLike[str]) -> dict[str, Any]:
     """As ``Solid.save_implicit``."""
     extension(path, ("3mf",))
     design = data_of(solid._core.design)
@@ -162,7 +162,7 @@ def save_implicit(solid: Solid, path: str | os.PathLike[str]) -> dict[str, Any]:
     return {"nodes": len(write.nodes), "triangles": len(triangles), "bytes": os.path.getsize(path)}
 
 
-def lattice_value(write: Expressions, solid: Solid, name: str, lattice: dict) -> str:
+def lattice_value(write: Expressions, solid: Resolution, name: str, lattice: dict) -> str:
     """The lattice's own field: negative in it."""
     (kind,) = lattice["map"]
     if kind == "tets":

@@ -29,9 +29,9 @@ from .unfinished import Shards, Unfinished
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from ..base.islands import Islands
+    from ..base.resolution import Resolution
     from ..layers import LayerFile, Layers
     from ..reports import IslandsReport, LayersReport, MeshReport, QualityReport, SurfaceReport
-    from ..solid import Solid
 
     Progress = Callable[[int, int], Any]
 
@@ -59,7 +59,7 @@ KINDS: dict[str, Callable[..., Any]] = {
 
 
 def save(
-    solid: Solid,
+    solid: Resolution,
     path: str,
     spacing: float,
     islands: Islands,
@@ -96,7 +96,7 @@ def save(
 
 
 def measure(
-    solid: Solid,
+    solid: Resolution,
     spacing: float,
     region: float,
     threads: int | None = None,
@@ -124,7 +124,7 @@ def measure(
 
 
 def save_voxels(
-    solid: Solid,
+    solid: Resolution,
     path: str,
     kind: str,
     step: float,
@@ -196,7 +196,7 @@ def save_layers(
     return made
 
 
-def _tiles_at_once(solid: Solid, spacing: float, most: int | None = None) -> int:
+def _tiles_at_once(solid: Resolution, spacing: float, most: int | None = None) -> int:
     """The number of tiles whose triangles take about as many bytes as are wanted, and no more than ``most``."""
     made = solid._core.estimate(spacing, spacing)
     tiles = 1.0
@@ -213,7 +213,7 @@ class _Work:
     def __init__(
         self,
         kind: str,
-        solid: Solid,
+        solid: Resolution,
         settings: dict[str, Any],
         output: str,
         first: int,

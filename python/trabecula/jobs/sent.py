@@ -14,12 +14,12 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from ..solid import Solid
+    from ..base.resolution import Resolution
 
 __all__ = ["contents", "digest_of", "digests", "files_of", "put_files"]
 
 
-def files_of(solid: Solid) -> dict[str, dict[str, bytes]]:
+def files_of(solid: Resolution) -> dict[str, dict[str, bytes]]:
     """The files of a solid's design, as ``contents`` gives them."""
     return contents(data_of(solid._core.design), solid._folder)
 
