@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 
-from ..base.paths import data_of
 from ..errors import warn_caller
 from .local_fields import fields_at
 from .trajectories import trajectories
@@ -59,6 +58,8 @@ def _fraction(solid: Seen) -> Look:
 def _stiffness(solid: Seen, threads: int | None = None) -> Look:
     """Young's modulus by the law of the cell: of cubes, told by their fraction alone."""
     import numpy as np
+
+    from ..base.paths import data_of
 
     names = _lattices_of(solid, "stiffness")
     if len(names) > 1:
