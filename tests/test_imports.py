@@ -1,6 +1,8 @@
 """Imports between the parts of the package go one way, those within functions too; what is for type checkers alone is free."""
 
 import ast
+import importlib
+import re
 from pathlib import Path
 
 import pytest
@@ -108,3 +110,16 @@ def test_what_goes_up_is_found():
     """Imports of a higher layer, of a neighbour, and of what has no layer."""
     given = {("io", "base"), ("base", "io"), ("cell", "map"), ("solid", "other")}
     assert wrong(given, layers()) == given - {("io", "base")}
+
+
+#: In the core's sources: a module of the package, and a name of it where that is written out.
+CALLED = re.compile(r'py\.import\("(trabecula[^"]*)"\)\?(?:\.(?:getattr|call_method0)\("(\w+)"\))?')
+
+
+def test_what_the_core_calls_is_there():
+    """The compiled module calls functions of the package by their names."""
+    sources = PACKAGE.parent.parent / "crates" / "trabecula-py" / "src"
+    called = {found for path in sources.glob("*.rs") for found in CALLED.findall(path.read_text(encoding="utf-8"))}
+    assert ("trabecula.io.children", "stop") in called and len(called) >= 9
+    for module, name in called:
+        assert hasattr(importlib.import_module(module), name or "__name__"), f"{module}.{name}"
