@@ -1,6 +1,7 @@
 """Volume meshes and voxels in solvers: sets of a design, loads, files read by other programs."""
 
 import json
+import math
 import os
 import re
 import shutil
@@ -70,9 +71,40 @@ def test_forces_at_nodes_have_the_resultant_and_act_at_the_centroid(order):
     np.testing.assert_allclose(forces[:, 0] @ mesh.nodes[nodes] / 3, centroid, atol=1e-12)
 
 
+def test_a_pressure_all_round_is_in_equilibrium_with_a_uniform_stress():
+    """−p ∮ Nᵢ n dA = −p ∫ ∇Nᵢ dV: what a stress of −p in all directions does to the nodes, whatever the mesh."""
+    mesh = slab().volume_mesh(edge=0.5)
+    pushed = np.zeros_like(mesh.nodes)
+    for name in ("CUT", "LATTICE"):
+        nodes, forces = mesh.forces(name, 2.5)
+        pushed[nodes] += forces
+    corners = mesh.nodes[mesh.elements]
+    edges = corners[:, 1:] - corners[:, :1]
+    slopes = np.linalg.inv(edges).transpose(0, 2, 1)
+    slopes = np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1)
+    stressed = np.zeros_like(mesh.nodes)
+    np.add.at(stressed, mesh.elements, -2.5 * (np.linalg.det(edges) / 6)[:, None, None] * slopes)
+    np.testing.assert_allclose(pushed, stressed, atol=1e-12)
+
+
+def test_a_pressure_is_written_as_forces_at_nodes(tmp_path):
+    mesh = slab().volume_mesh(edge=0.5)
+    mesh.write(tmp_path / "a.inp", hold=["X0"], load={"X1": 3})
+    text = (tmp_path / "a.inp").read_text()
+    assert "** on X1: a pressure of 3.0 MPa\n" in text
+    rows = text.split("*CLOAD\n")[1].split("*")[0].splitlines()
+    along = [float(row.split(",")[2]) for row in rows if row.split(",")[1].strip() == "1"]
+    corners = mesh.nodes[faces_of(mesh, mesh.sets["X1"].faces)]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    # A number has nine digits in the file.
+    assert sum(along) == pytest.approx(-3 * area, rel=1e-7)
+
+
 @pytest.mark.parametrize(
     "given, words",
     [
+        ({"hold": ["X0"], "load": {"X1": 0}}, "a pressure is a finite number, not 0"),
+        ({"hold": ["X0"], "load": {"X1": math.nan}}, "a pressure is a finite number, not 0"),
         ({"load": {"X1": (0, 0, 1)}}, "both hold and load"),
         ({"hold": ["X0"]}, "both hold and load"),
         ({"hold": ["X0"], "load": {"X1": (0, 0, 0)}}, "not all 0"),

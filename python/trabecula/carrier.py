@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 
 from . import _core
 from .base.files import extension
 from .base.formats import VOLUME_WRITES
 from .base.given import fixed, poisson, positive, thread_count, whole
-from .volumes import VolumeMesh, check_order
+from .volumes import Load, VolumeMesh, check_order
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Carrier(VolumeMesh):
         E: float = 1.0,
         nu: float = 0.3,
         hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
+        load: Mapping[str, Load] | None = None,
         fields: Mapping[str, ArrayLike] | None = None,
         oriented: bool = False,
     ) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Union
 
 from . import _core
 from .base.files import check_place, extension, whole_file
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 __all__ = ["BeamMesh", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
+#: A load on a set: the resultant of a uniform traction (three numbers, N), or a pressure against its faces (one, MPa).
+Load = Union[Sequence[float], float]
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
 #: Dihedral angles (degrees) outside of which tetrahedra are warned of.
@@ -69,6 +71,8 @@ class FiniteElements(Reproducible, ElementMesh):
 
     #: What a set needs that is held or loaded.
     _of_sets = "faces on the boundary"
+    #: Whether that has a normal for a pressure to act along.
+    _has_normals = True
     #: The formats of its files.
     _writes: ClassVar[tuple[str, ...]]
     #: Those with fields.
@@ -105,13 +109,29 @@ class FiniteElements(Reproducible, ElementMesh):
         found = {name: self._core.set(name) for name in self._core.sets}
         return MappingProxyType({name: VolumeSet(*map(fixed, arrays)) for name, arrays in found.items() if arrays})
 
-    def forces(self, name: str, force: Sequence[float]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
-        """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (N)
-        does to the finite elements, force · ∫ Nᵢ dA / ∫ dA with their shape functions Nᵢ.
+    def forces(self, name: str, force: Load) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+        """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (three
+        numbers, N) does to the finite elements, force · ∫ Nᵢ dA / ∫ dA with their shape functions Nᵢ; or a pressure (one number, MPa,
+        against the faces), −p ∫ Nᵢ n dA. Raises ValueError for a set that is not there, and a pressure on edges or ends.
         """
-        found = self._core.forces(self._with_faces("name", name), _resultant(f"the force on {name}", force))
+        found = self._core.forces(self._with_faces("name", name), self._load(name, force))
         assert found is not None  # the set was found
         return found
+
+    def _load(self, name: str, value: Load) -> list[float] | float:
+        """The load on a set: a resultant of three finite numbers, not all 0, or a pressure."""
+        what = f"the load on {name}"
+        if isinstance(value, Iterable):
+            found = [number(what, v) for v in value]
+            if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
+                raise ValueError(f"{what} is {tuple(found)}; it must be three finite numbers, not all 0 (N), or a pressure (MPa)")
+            return found
+        pressure = number(what, value)
+        if not math.isfinite(pressure) or pressure == 0:
+            raise ValueError(f"{what} is {pressure:g}; a pressure is a finite number, not 0 (MPa)")
+        if not self._has_normals:
+            raise ValueError(f"{what} is a pressure, which acts on faces, not on {self._of_sets}; give a force (N)")
+        return pressure
 
     def _with_faces(self, what: str, name: str) -> str:
         """A name of a set with faces."""
@@ -127,7 +147,7 @@ class FiniteElements(Reproducible, ElementMesh):
         E: float = 1.0,
         nu: float = 0.3,
         hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
+        load: Mapping[str, Load] | None = None,
         fields: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """Writes a file of one of the formats of its kind, with its sets: material ``E`` (MPa) and ``nu``, steps ``hold`` and
@@ -141,7 +161,7 @@ class FiniteElements(Reproducible, ElementMesh):
         path: str | os.PathLike[str],
         kind: str,
         elastic: tuple[float, float],
-        steps: tuple[Iterable[str], Mapping[str, Sequence[float]] | None],
+        steps: tuple[Iterable[str], Mapping[str, Load] | None],
         fields: Mapping[str, ArrayLike] | None,
         *more: Any,
     ) -> None:
@@ -155,7 +175,7 @@ class FiniteElements(Reproducible, ElementMesh):
                 raise ValueError(
                     f"{name} is held and loaded: a force on what does not move does nothing; hold or load another set"
                 )
-        loads = [(self._with_faces("load", k), _resultant(f"the force on {k}", v)) for k, v in (load or {}).items()]
+        loads = [(self._with_faces("load", k), self._load(k, v)) for k, v in (load or {}).items()]
         if held or loads:
             self._check_loads()
             self._check_held(held, loads)
@@ -178,7 +198,7 @@ class FiniteElements(Reproducible, ElementMesh):
         with whole_file(path) as temporary:
             self._core.write((temporary, kind, title), moduli, held, loads, arrays, *more)
 
-    def _check_held(self, held: Sequence[str], loads: Sequence[tuple[str, list[float]]]) -> None:
+    def _check_held(self, held: Sequence[str], loads: Sequence[tuple[str, list[float] | float]]) -> None:
         """Refuses a force on nodes all of which are held by other sets."""
         import numpy as np
 
@@ -287,7 +307,7 @@ class VolumeMesh(FiniteElements):
         E: float = 1.0,
         nu: float = 0.3,
         hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
+        load: Mapping[str, Load] | None = None,
         fields: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """Writes .inp (Abaqus, CalculiX), .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .vtu (VTK), .xdmf (with
@@ -299,8 +319,9 @@ class VolumeMesh(FiniteElements):
         In .foam, .msh2 and .mesh, where a face can belong to one patch or group only, it belongs to the smallest of its sets.
 
         ``E`` (MPa) and ``nu`` are Young's modulus and Poisson's ratio of the material in .bdf, and in an .inp that runs as it
-        is: that of a periodic mesh, with equations, boundary conditions and six steps, and one with ``load``: resultants (N) of
-        uniform tractions by the names of sets, {"X1": (0, 0, -100)}, while the nodes of the sets ``hold`` do not move.
+        is: that of a periodic mesh, with equations, boundary conditions and six steps, and one with ``load``: by the names of
+        sets resultants (N) of uniform tractions, {"X1": (0, 0, -100)}, or pressures (MPa) against their faces, {"BORE": 5}, while the
+        nodes of the sets ``hold`` do not move.
 
         ``fields`` are numbers by name, (n,) or (n, k) at nodes or in elements, for .vtu, .xdmf and, with k of 1, 3 or 9, .msh:
         {"depth": solid.field(mesh.nodes)}.
@@ -407,6 +428,7 @@ class ShellMesh(FiniteElements):
     _writes = SHELL_WRITES
     _kinds = TRIANGLES
     _of_sets = "edges on the border"
+    _has_normals = False
     _core: _core.Shells
 
     def __repr__(self) -> str:
@@ -451,6 +473,7 @@ class BeamMesh(FiniteElements):
 
     _make = staticmethod(_core.BeamElements.make)
     _of_sets = "ends of elements"
+    _has_normals = False
     _kinds = LINES
     _core: _core.BeamElements
 
@@ -494,7 +517,7 @@ class BeamMesh(FiniteElements):
         E: float = 1.0,
         nu: float = 0.3,
         hold: Iterable[str] = (),
-        load: Mapping[str, Sequence[float]] | None = None,
+        load: Mapping[str, Load] | None = None,
         fields: Mapping[str, ArrayLike] | None = None,
         solver: str = "calculix",
     ) -> None:
@@ -535,22 +558,14 @@ def check_case(path: str | os.PathLike[str]) -> None:
     check_place(path if os.path.isdir(folder) else folder)
 
 
-def check_steps(kind: str, hold: Sequence[str], load: Mapping[str, Sequence[float]] | None) -> None:
+def check_steps(kind: str, hold: Sequence[str], load: Mapping[str, Load] | None) -> None:
     """Whether what is held and loaded makes a step in a file."""
     if not hold and not load:
         return
     if kind != "inp":
-        raise ValueError(f"hold and load are written to .inp, not .{kind}; the method forces has them at nodes")
+        raise ValueError(f"hold and load are written to .inp, not .{kind}; in Python mesh.forces(set, load) has forces at nodes")
     if not hold or not load:
         raise ValueError("give both hold and load: a step needs sets that do not move and forces on others")
-
-
-def _resultant(name: str, value: Sequence[float]) -> list[float]:
-    """A force as three finite numbers, not all 0."""
-    found = [number(name, v) for v in value]
-    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
-        raise ValueError(f"{name} is {tuple(found)}; it must be three finite numbers, not all 0 (N)")
-    return found
 
 
 def warn_sharp(made: ShellMesh) -> None:

@@ -17,6 +17,7 @@ pub use fraction_classes::fraction_classes;
 pub use hex_mesh::{HEX_FACES, HexMesh};
 pub use poly_faces::{Patch, PolyFaces};
 pub use shell_mesh::ShellMesh;
+pub use surface_load::Load;
 
 /// A mesh for finite elements.
 #[derive(Clone, Debug, Default, PartialEq)]

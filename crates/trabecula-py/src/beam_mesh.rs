@@ -10,7 +10,7 @@ use trabecula::report::BeamMeshReport;
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -83,13 +83,13 @@ impl BeamElements {
         report(py, "BeamMeshReport", &BeamMeshReport::from(&self.made))
     }
 
-    /// Nodes of a set's ends and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
-    fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
-        self.made.mesh.set(name).map(|set| forces(py, self.made.mesh.nodal_forces(set, force))).transpose()
+    /// Nodes of a set's ends and the forces (N) at them, (n, 3), of a load; None without the set.
+    fn forces<'py>(&self, py: Python<'py>, name: &str, load: LoadArgument) -> PyResult<Option<Forces<'py>>> {
+        self.made.mesh.set(name).map(|set| forces(py, self.made.mesh.nodal_forces(set, load.into()))).transpose()
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio of the solid; sets that are held, sets
-    /// with the resultants (N) of their loads, and fields; whether it is for Abaqus where CalculiX differs.
+    /// with their loads, and fields; whether it is for Abaqus where CalculiX differs.
     #[allow(clippy::too_many_arguments)] // The pieces of a file.
     fn write(
         &self,
@@ -97,12 +97,12 @@ impl BeamElements {
         file: (PathBuf, String, String),
         elastic: Vec<[f64; 2]>,
         held: Vec<String>,
-        loads: Vec<(String, [f64; 3])>,
+        loads: Vec<(String, LoadArgument)>,
         fields: Vec<Field>,
         abaqus: bool,
     ) -> PyResult<()> {
         let fields = fields.into_iter().map(field).collect();
-        let text = FeText { elastic, held, loads, fields, abaqus, ..FeText::default() };
+        let text = FeText { elastic, held, loads: fe_loads(loads), fields, abaqus, ..FeText::default() };
         write_as(py, &self.made.mesh, &BEAM_FORMATS, file, text)
     }
 }

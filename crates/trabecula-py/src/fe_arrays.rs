@@ -3,8 +3,7 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use geometry::fe_mesh::FeField;
-use geometry::fe_mesh::FeSet;
+use geometry::fe_mesh::{FeField, FeSet, Load};
 use geometry::formats::FeText;
 use geometry::math::Vec3;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -23,6 +22,29 @@ pub type Forces<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
 
 /// A field of a file: its name, numbers for each node or element, whether it is at nodes, the numbers.
 pub type Field = (String, usize, bool, Vec<f64>);
+
+/// A load on a set as Python gives it.
+#[derive(FromPyObject)]
+pub enum LoadArgument {
+    /// The resultant of a uniform traction, N.
+    Traction([f64; 3]),
+    /// A pressure, MPa.
+    Pressure(f64),
+}
+
+impl From<LoadArgument> for Load {
+    fn from(of: LoadArgument) -> Load {
+        match of {
+            LoadArgument::Traction(force) => Load::Traction(force),
+            LoadArgument::Pressure(p) => Load::Pressure(p),
+        }
+    }
+}
+
+/// Names of sets and loads as the core takes them.
+pub fn loads(of: Vec<(String, LoadArgument)>) -> Vec<(String, Load)> {
+    of.into_iter().map(|(name, load)| (name, load.into())).collect()
+}
 
 /// A set as arrays.
 pub fn members<'py>(py: Python<'py>, set: &FeSet) -> PyResult<Members<'py>> {

@@ -15,7 +15,7 @@ use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, Members, field, forces, members, to_file};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, to_file};
 use crate::file;
 use crate::mesh::Mesh;
 use crate::report::report;
@@ -160,13 +160,13 @@ impl VolumeMesh {
         Ok(Mesh::new(SurfaceMesh { mesh, cut }, String::new()))
     }
 
-    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
-    fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
-        self.mesh().set(name).map(|set| forces(py, self.mesh().nodal_forces(set, force))).transpose()
+    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a load; None without the set.
+    fn forces<'py>(&self, py: Python<'py>, name: &str, load: LoadArgument) -> PyResult<Option<Forces<'py>>> {
+        self.mesh().set(name).map(|set| forces(py, self.mesh().nodal_forces(set, load.into()))).transpose()
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio, of all domains or of each, for formats
-    /// with materials; sets that are held, sets with the resultants (N) of their loads, and fields; C11, C12 and C44 (MPa) of each domain along
+    /// with materials; sets that are held, sets with their loads, and fields; C11, C12 and C44 (MPa) of each domain along
     /// the axes of its elements, in place of isotropic materials.
     #[allow(clippy::too_many_arguments)] // The pieces of a file.
     fn write(
@@ -175,7 +175,7 @@ impl VolumeMesh {
         file: (PathBuf, String, String),
         elastic: Vec<[f64; 2]>,
         held: Vec<String>,
-        loads: Vec<(String, [f64; 3])>,
+        loads: Vec<(String, LoadArgument)>,
         fields: Vec<Field>,
         cubic: Vec<[f64; 3]>,
     ) -> PyResult<()> {
@@ -184,7 +184,7 @@ impl VolumeMesh {
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
         let fields = fields.into_iter().map(field).collect();
-        let text = FeText { title, elastic, cubic, held, loads, fields, ..FeText::default() };
+        let text = FeText { title, elastic, cubic, held, loads: fe_loads(loads), fields, ..FeText::default() };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

@@ -10,7 +10,7 @@ use trabecula::report::VoxelElementsReport;
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, Members, field, forces, members, write_as};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -72,13 +72,13 @@ impl VoxelElements {
         report(py, "VoxelElementsReport", &VoxelElementsReport::from(&self.mesh))
     }
 
-    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a uniform traction with a resultant; None without the set.
-    fn forces<'py>(&self, py: Python<'py>, name: &str, force: [f64; 3]) -> PyResult<Option<Forces<'py>>> {
-        self.mesh.set(name).map(|set| forces(py, self.mesh.nodal_forces(set, force))).transpose()
+    /// Nodes of a set's faces and the forces (N) at them, (n, 3), of a load; None without the set.
+    fn forces<'py>(&self, py: Python<'py>, name: &str, load: LoadArgument) -> PyResult<Option<Forces<'py>>> {
+        self.mesh.set(name).map(|set| forces(py, self.mesh.nodal_forces(set, load.into()))).transpose()
     }
 
     /// Writes a file, given as path, suffix and title; Young's modulus (MPa) and Poisson's ratio of the solid; sets that are held, and sets
-    /// with the resultants (N) of their loads.
+    /// with their loads.
     #[allow(clippy::too_many_arguments)] // The pieces of a file.
     fn write(
         &self,
@@ -86,11 +86,16 @@ impl VoxelElements {
         file: (PathBuf, String, String),
         elastic: Vec<[f64; 2]>,
         held: Vec<String>,
-        loads: Vec<(String, [f64; 3])>,
+        loads: Vec<(String, LoadArgument)>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let text =
-            FeText { elastic, held, loads, fields: fields.into_iter().map(field).collect(), ..FeText::default() };
+        let text = FeText {
+            elastic,
+            held,
+            loads: fe_loads(loads),
+            fields: fields.into_iter().map(field).collect(),
+            ..FeText::default()
+        };
         write_as(py, &self.mesh, &HEX_FORMATS, file, text)
     }
 }

@@ -114,16 +114,18 @@ def parts(text: str) -> list[str]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def load(text: str) -> tuple[str, list[float]]:
-    """A set and a force: NAME=FX,FY,FZ."""
-    name, equals, force = text.partition("=")
+def load(text: str) -> tuple[str, list[float] | float]:
+    """A set and a force or a pressure: NAME=FX,FY,FZ or NAME=P."""
+    name, equals, given = text.partition("=")
     try:
-        found = [float(v) for v in force.split(",")]
+        found = [float(v) for v in given.split(",")]
     except ValueError:
         found = []
-    if not (name.strip() and equals and len(found) == 3 and all(map(math.isfinite, found))):
-        raise argparse.ArgumentTypeError(f"expected a set and a force in N, such as X1=0,0,-100, found {text!r}")
-    return name.strip(), found
+    if not (name.strip() and equals and len(found) in (1, 3) and all(map(math.isfinite, found))):
+        raise argparse.ArgumentTypeError(
+            f"expected a set and a force in N, such as X1=0,0,-100, or a pressure in MPa, such as BORE=5, found {text!r}"
+        )
+    return name.strip(), found if len(found) == 3 else found[0]
 
 
 def names(text: str) -> list[str]:

@@ -1,7 +1,7 @@
 //! Meshes of beams: linear or quadratic line elements with circular sections.
 
 use super::FeSet;
-use super::surface_load::shared;
+use super::surface_load::{Load, NodeShare};
 use crate::math::{Vec3, norm, sub, unit};
 
 /// A mesh of beams.
@@ -81,9 +81,9 @@ impl BeamMesh {
 
     /// The forces at the nodes of a set's ends, ascending by node, of a uniform traction on the sections there whose resultant is
     /// `force`: shares by their areas.
-    pub fn nodal_forces(&self, set: &FeSet, force: Vec3) -> Vec<(u32, Vec3)> {
+    pub fn nodal_forces(&self, set: &FeSet, load: Load) -> Vec<(u32, Vec3)> {
         let end = |(e, k): &(u32, u8)| (self.elements[*e as usize][*k as usize], self.area(*e as usize));
-        shared(force, set.faces.iter().map(end).collect())
+        load.at_nodes(set.faces.iter().map(end).map(NodeShare::bare).collect())
     }
 }
 
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn forces_are_shared_by_areas() {
         let ends = FeSet { faces: vec![(0, 1), (1, 0), (1, 1)], ..FeSet::default() };
-        let found = angle().nodal_forces(&ends, [6.0, 0.0, -3.0]);
+        let found = angle().nodal_forces(&ends, Load::Traction([6.0, 0.0, -3.0]));
         assert_eq!(found, [(1, [5.0, 0.0, -2.5]), (2, [1.0, 0.0, -0.5])]);
         let (length, volume) = angle().size();
         assert!(length == 7.0 && (volume - 4.0 * core::f64::consts::PI).abs() < 1e-14);

@@ -1,7 +1,7 @@
 //! Voxels as finite elements: hexahedra, each with the share of it that is solid, in one piece.
 
 use super::FeSet;
-use super::surface_load::shared;
+use super::surface_load::{Load, NodeShare};
 use crate::math::{Aabb, Vec3};
 use crate::union_find::{find, singles, unite};
 
@@ -128,13 +128,16 @@ impl HexMesh {
         self.sets.iter().find(|s| s.name == name)
     }
 
-    /// The work-equivalent forces at the nodes of a set's faces, ascending by node, of a uniform traction whose resultant is `force`.
-    pub fn nodal_forces(&self, set: &FeSet, force: Vec3) -> Vec<(u32, Vec3)> {
-        let area = |k: u8| {
-            let (axis, _) = FACING[k as usize];
-            self.step[(axis + 1) % 3] * self.step[(axis + 2) % 3]
+    /// The work-equivalent forces at the nodes of a set's faces, ascending by node.
+    pub fn nodal_forces(&self, set: &FeSet, load: Load) -> Vec<(u32, Vec3)> {
+        let shares = |f: &(u32, u8)| {
+            let (axis, upper) = FACING[f.1 as usize];
+            let area = self.step[(axis + 1) % 3] * self.step[(axis + 2) % 3] / 4.0;
+            let mut normal = [0.0; 3];
+            normal[axis] = if upper { area } else { -area };
+            self.face(*f).map(|node| NodeShare { node, area, normal })
         };
-        shared(force, set.faces.iter().flat_map(|f| self.face(*f).map(|n| (n, area(f.1)))).collect())
+        load.at_nodes(set.faces.iter().flat_map(shares).collect())
     }
 }
 
@@ -188,10 +191,13 @@ mod tests {
     #[test]
     fn forces_have_the_resultant() {
         let mesh = HexMesh::of(&Aabb { min: [0.0; 3], max: [2.0, 2.0, 1.0] }, [2, 2, 1], &[1.0; 4], 0.5);
-        let forces = mesh.set("X1").map(|s| mesh.nodal_forces(s, [8.0, 0.0, -8.0])).unwrap_or_default();
+        let forces = mesh.set("X1").map(|s| mesh.nodal_forces(s, Load::Traction([8.0, 0.0, -8.0]))).unwrap_or_default();
         // Two faces in a column: their common nodes carry twice the others' share.
         let mut along: Vec<f64> = forces.iter().map(|f| f.1[0]).collect();
         along.sort_by(f64::total_cmp);
         assert_eq!(along, [1.0, 1.0, 1.0, 1.0, 2.0, 2.0]);
+        // A pressure of 3 MPa on 2 × 1 mm, inwards.
+        let forces = mesh.set("X1").map(|s| mesh.nodal_forces(s, Load::Pressure(3.0))).unwrap_or_default();
+        assert!((forces.iter().map(|f| f.1[0]).sum::<f64>() + 6.0).abs() < 1e-14);
     }
 }

@@ -1,7 +1,7 @@
 //! Meshes of shells: linear or quadratic triangles on a mid-surface, with a thickness at each node.
 
 use super::FeSet;
-use super::surface_load::shared;
+use super::surface_load::{Load, NodeShare};
 use crate::math::{Vec3, cross, norm, sub};
 
 /// A mesh of shells.
@@ -52,9 +52,8 @@ impl ShellMesh {
         })
     }
 
-    /// The forces at the nodes of a set's edges, ascending by node, of a uniform traction on the faces of the wall there whose resultant
-    /// is `force`: force · ∫ Nᵢ t ds / ∫ t ds with the shape functions Nᵢ of the edges and the thickness t between their ends.
-    pub fn nodal_forces(&self, set: &FeSet, force: Vec3) -> Vec<(u32, Vec3)> {
+    /// The forces at the nodes of a set's edges, ascending by node, of a uniform traction on the faces of the wall there: force · ∫ Nᵢ t ds / ∫ t ds with the shape functions Nᵢ of the edges and the thickness t between their ends.
+    pub fn nodal_forces(&self, set: &FeSet, load: Load) -> Vec<(u32, Vec3)> {
         let mut shares: Vec<(u32, f64)> = Vec::with_capacity(3 * set.faces.len());
         for edge in &set.faces {
             let nodes: Vec<u32> = self.edge(*edge).collect();
@@ -69,7 +68,7 @@ impl ShellMesh {
                 }
             }
         }
-        shared(force, shares)
+        load.at_nodes(shares.into_iter().map(NodeShare::bare).collect())
     }
 }
 
@@ -90,7 +89,7 @@ mod tests {
         };
         assert_eq!(linear.size(), (1.5, 2.0));
         // Half of the length has two thirds of the section: ∫ N t = (2 + 2) / 6 and (1 + 4) / 6 of 3 / 2.
-        let found = linear.nodal_forces(&linear.sets[0], [0.0, 0.0, 9.0]);
+        let found = linear.nodal_forces(&linear.sets[0], Load::Traction([0.0, 0.0, 9.0]));
         assert_eq!(found, [(0, [0.0, 0.0, 4.0]), (2, [0.0, 0.0, 5.0])]);
         let quadratic = ShellMesh {
             nodes: [linear.nodes.clone(), vec![[0.5, 0.0, 0.0], [0.5, 1.5, 0.0], [0.0, 1.5, 0.0]]].concat(),
@@ -98,7 +97,7 @@ mod tests {
             thickness: vec![1.0, 1.0, 2.0, 1.0, 1.5, 1.5],
             ..linear
         };
-        let found = quadratic.nodal_forces(&quadratic.sets[0], [9.0, 0.0, 0.0]);
+        let found = quadratic.nodal_forces(&quadratic.sets[0], Load::Traction([9.0, 0.0, 0.0]));
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
         assert!(found.len() == 3 && near(found[0].1[0], 1.0) && near(found[1].1[0], 2.0) && near(found[2].1[0], 6.0));
     }

@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use rayon::prelude::*;
 
-use crate::fe_mesh::{FeField, FeMesh};
-use crate::math::Vec3;
+use crate::fe_mesh::{FeField, FeMesh, Load};
 
 mod abaqus;
 mod beam_elements;
@@ -35,8 +34,8 @@ pub struct FeText {
     pub cubic: Vec<[f64; 3]>,
     /// Names of sets whose nodes are held in all directions.
     pub held: Vec<String>,
-    /// Names of sets and the resultant (N) of a uniform traction on their faces.
-    pub loads: Vec<(String, Vec3)>,
+    /// Names of sets and the loads on their faces.
+    pub loads: Vec<(String, Load)>,
     /// Whether an `.inp` is for Abaqus where CalculiX takes the same words otherwise: sections of beams.
     pub abaqus: bool,
     /// Further numbers of nodes and elements, in formats that have them.

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::{FeText, lines, push, rows};
-use crate::fe_mesh::{FeMesh, FeSet, MIDDLES};
+use crate::fe_mesh::{FeMesh, FeSet, Load, MIDDLES};
 use crate::math::{Vec3, add};
 
 /// The number of a face by the corner opposite to it.
@@ -141,12 +141,12 @@ fn oriented(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()>
 fn loaded(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     materials(mesh, text, out)?;
     let names: Vec<&str> = mesh.domains.iter().map(String::as_str).collect();
-    let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
+    let forces = |name: &str, load| mesh.set(name).map(|s| mesh.nodal_forces(s, load));
     step(text, (&names, 3), &forces, out)
 }
 
 /// The forces at nodes of a load on a set.
-pub(super) type Forces<'a> = dyn Fn(&str, Vec3) -> Option<Vec<(u32, Vec3)>> + 'a;
+pub(super) type Forces<'a> = dyn Fn(&str, Load) -> Option<Vec<(u32, Vec3)>> + 'a;
 
 /// What is held, and one step with the loads, if there are any; results are displacements, stresses, reactions, and energies of the domains, with
 /// the number of degrees of freedom of their nodes.
@@ -163,10 +163,14 @@ pub(super) fn step(
     writeln!(out, "*STEP\n*STATIC")?;
     // A node of several sets has one line for each direction: what a second one means differs between programs.
     let mut forces = std::collections::BTreeMap::<u32, Vec3>::new();
-    for (name, force) in &text.loads {
-        let [x, y, z] = force;
-        writeln!(out, "** on {name}: {x:?}, {y:?}, {z:?} N in all, a uniform traction")?;
-        for (node, force) in of(name, *force).into_iter().flatten() {
+    for (name, load) in &text.loads {
+        match load {
+            Load::Traction([x, y, z]) => {
+                writeln!(out, "** on {name}: {x:?}, {y:?}, {z:?} N in all, a uniform traction")
+            }
+            Load::Pressure(p) => writeln!(out, "** on {name}: a pressure of {p:?} MPa"),
+        }?;
+        for (node, force) in of(name, *load).into_iter().flatten() {
             let sum = forces.entry(node).or_insert([0.0; 3]);
             *sum = add(*sum, force);
         }

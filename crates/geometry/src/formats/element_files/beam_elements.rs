@@ -43,7 +43,7 @@ fn write_inp(mesh: &BeamMesh, text: &FeText, out: &mut dyn Write) -> io::Result<
         writeln!(out, "*BEAM SECTION, ELSET=SECTION_{}, MATERIAL=SOLID, SECTION=CIRC", s + 1)?;
         writeln!(out, "{size:?}\n{x:?}, {y:?}, {z:?}")?;
     }
-    let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
+    let forces = |name: &str, load| mesh.set(name).map(|s| mesh.nodal_forces(s, load));
     abaqus::step(text, (&["BEAMS"], 6), &forces, out)
 }
 

@@ -34,7 +34,7 @@ fn write_inp(mesh: &ShellMesh, text: &FeText, out: &mut dyn Write) -> io::Result
         abaqus::decimal(text, mesh.thickness[i]);
         text.push('\n');
     })?;
-    let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
+    let forces = |name: &str, load| mesh.set(name).map(|s| mesh.nodal_forces(s, load));
     abaqus::step(text, (&["SHELL"], 6), &forces, out)
 }
 

@@ -39,7 +39,7 @@ fn write_inp(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
         writeln!(out, "*MATERIAL, NAME={name}\n*ELASTIC\n{:?}, {nu:?}", e * mean)?;
         writeln!(out, "*SOLID SECTION, ELSET={name}, MATERIAL={name}")?;
     }
-    let forces = |name: &str, force| mesh.set(name).map(|s| mesh.nodal_forces(s, force));
+    let forces = |name: &str, load| mesh.set(name).map(|s| mesh.nodal_forces(s, load));
     abaqus::step(text, (&["SOLID"], 3), &forces, out)
 }
 
@@ -105,6 +105,7 @@ fn write_vtu(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::fe_mesh::Load;
     use crate::math::Aabb;
 
     #[test]
@@ -112,7 +113,7 @@ mod tests {
         // Three round an empty one, whose faces are the surface within the grid.
         let bounds = Aabb { min: [0.0; 3], max: [2.0, 2.0, 1.0] };
         let mesh = HexMesh::of(&bounds, [2, 2, 1], &[1.0, 0.5, 0.51, 0.0], 0.1);
-        let loads = vec![("X1".to_string(), [1.0, 0.0, 0.0])];
+        let loads = vec![("X1".to_string(), Load::Traction([1.0, 0.0, 0.0]))];
         let text = FeText {
             title: "three".into(),
             elastic: vec![[10.0, 0.3]],
