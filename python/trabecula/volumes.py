@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple, Union
+from typing import ClassVar, NamedTuple
 
 from . import _core
 from .base.files import check_place, extension, whole_file
@@ -26,7 +26,7 @@ from .mesh import Mesh
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, TypeAlias
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["BeamMesh", "ShellMesh", "VolumeMesh", "VolumeSet", "VoxelElements"]
 
 #: A load on a set: the resultant of a uniform traction (three numbers, N), or a pressure against its faces (one, MPa).
-Load = Union[Sequence[float], float]
+Load: TypeAlias = "Sequence[float] | float"
 #: What can be meshed.
 OF = ("solid", "pore", "lower", "upper", "all")
 #: Dihedral angles (degrees) outside of which tetrahedra are warned of.
@@ -111,8 +111,9 @@ class FiniteElements(Reproducible, ElementMesh):
 
     def forces(self, name: str, force: Load) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Nodes of the faces of a set and forces (n, 3) at them, N: what a uniform traction with the resultant ``force`` (three
-        numbers, N) does to the finite elements, force · ∫ Nᵢ dA / ∫ dA with their shape functions Nᵢ; or a pressure (one number, MPa,
-        against the faces), −p ∫ Nᵢ n dA. Raises ValueError for a set that is not there, and a pressure on edges or ends.
+        numbers, N) does to the finite elements, force · ∫ Nᵢ dA / ∫ dA with their shape functions Nᵢ; or a pressure (one
+        number, MPa, against the faces), −p ∫ Nᵢ n dA. Raises ValueError for a set that is not there, and for a pressure on
+        edges or ends.
         """
         found = self._core.forces(self._with_faces("name", name), self._load(name, force))
         assert found is not None  # the set was found
@@ -124,7 +125,8 @@ class FiniteElements(Reproducible, ElementMesh):
         if isinstance(value, Iterable):
             found = [number(what, v) for v in value]
             if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
-                raise ValueError(f"{what} is {tuple(found)}; it must be three finite numbers, not all 0 (N), or a pressure (MPa)")
+                allowed = "it must be three finite numbers, not all 0 (N), or a pressure (MPa)"
+                raise ValueError(f"{what} is {tuple(found)}; {allowed}")
             return found
         pressure = number(what, value)
         if not math.isfinite(pressure) or pressure == 0:
@@ -320,8 +322,8 @@ class VolumeMesh(FiniteElements):
 
         ``E`` (MPa) and ``nu`` are Young's modulus and Poisson's ratio of the material in .bdf, and in an .inp that runs as it
         is: that of a periodic mesh, with equations, boundary conditions and six steps, and one with ``load``: by the names of
-        sets resultants (N) of uniform tractions, {"X1": (0, 0, -100)}, or pressures (MPa) against their faces, {"BORE": 5}, while the
-        nodes of the sets ``hold`` do not move.
+        sets resultants (N) of uniform tractions, {"X1": (0, 0, -100)}, or pressures (MPa) against their faces, {"BORE": 5},
+        while the nodes of the sets ``hold`` do not move.
 
         ``fields`` are numbers by name, (n,) or (n, k) at nodes or in elements, for .vtu, .xdmf and, with k of 1, 3 or 9, .msh:
         {"depth": solid.field(mesh.nodes)}.
@@ -563,7 +565,7 @@ def check_steps(kind: str, hold: Sequence[str], load: Mapping[str, Load] | None)
     if not hold and not load:
         return
     if kind != "inp":
-        raise ValueError(f"hold and load are written to .inp, not .{kind}; in Python mesh.forces(set, load) has forces at nodes")
+        raise ValueError(f"hold and load are written to .inp, not .{kind}; in Python mesh.forces(set, load) has them")
     if not hold or not load:
         raise ValueError("give both hold and load: a step needs sets that do not move and forces on others")
 

@@ -20,6 +20,8 @@ __all__ = ["Resolution", "sample_error"]
 BEYOND = 0.01
 #: Share of the volume of beams that chords may cost unwarned, and what the step that is advised leaves of it.
 CHORDS, SLIGHT = 0.05, 0.01
+#: Share of a step below which a wall is one that shrinks to nothing somewhere.
+NOTHING = 0.01
 #: Steps on the diameter of a beam from which on chords cost less.
 SURE = 3.0
 
@@ -82,9 +84,10 @@ class Resolution(ABC):
             )
         for name, thin in self._thinnest.items():
             if thin < 1.5 * spacing:
+                remedy = f"use {_a(word)} of {thin / 2:.2g} mm or less" if thin > NOTHING * spacing else "no grid resolves it"
                 warn_caller(
-                    f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
-                    f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
+                    f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of {spacing:g} mm and may break "
+                    f"up; {remedy}",
                     name,
                 )
         beams = [thin for name, thin in self._thinnest.items() if name.startswith("beams.")]

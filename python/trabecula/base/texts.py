@@ -105,7 +105,9 @@ def _lattice(it: LatticeReport) -> Iterator[str]:
     yield f"  thickness  {span(it.thickness)}{'' if it.thickness is None else f' mm ({neck})'}"
     if it.pore is not None:
         side = " on the narrower side" if it.part == "sheet" else ""
-        yield f"  pore       {span(it.pore)} mm (largest ball that passes{side})"
+        narrowest = it.pore if isinstance(it.pore, (int, float)) else min(it.pore)
+        closed = "" if narrowest else "; 0: closed in every cell"
+        yield f"  pore       {span(it.pore)} mm (largest ball that passes{side}{closed})"
     if not (it.tets and it.tets.zones):
         whole = intervals(it.connected_fraction)
         yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"

@@ -255,8 +255,8 @@ COMMANDS = {
             type=load,
             action="append",
             metavar="NAME=LOAD",
-            help="a load on a set, in .inp: FX,FY,FZ a uniform traction with this resultant, N; one number a pressure against its "
-            "faces, MPa; may be repeated",
+            help="a load on a set, in .inp: FX,FY,FZ a uniform traction with this resultant, N; one number a pressure against "
+            "its faces, MPa; may be repeated",
         ),
         option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid in the file (default: 1)"),
         option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
