@@ -58,6 +58,20 @@ def test_an_empty_set_is_refused_by_name_where_it_is_of_the_solid():
     assert "hole" not in made.volume_mesh(edge=0.5, of="pore").sets
 
 
+def test_a_bore_is_caught_by_its_own_cylinder():
+    """Faces are chords of the bore, with nodes moved off it so that they balance: their middles are inside and outside."""
+    bore = lt.region.cylinder(base=[0, 0, 0], radius=2, height=3)
+    ring = lt.region.cylinder(base=[0, 0, 0], radius=3, height=3)
+    plate = lt.region.difference(lt.region.box(min=[-5, -4, 0], max=[5, 4, 3]), lt.region.cylinder([0, 0, -1], 2, 5))
+    core = lt.Lattice(cell=lt.cell.gyroid(), part="sheet", map=lt.map.affine(wavelength=4), level=lt.level.fraction(0.4))
+    mesh = lt.Design(region=plate, lattice=core, keep={"ring": ring}, set={"bore": bore}).build().volume_mesh(edge=0.5)
+    faces = mesh.sets["CUT"].faces
+    corners = mesh.nodes[faces_of(mesh, faces)]
+    near = np.hypot(corners[..., 0], corners[..., 1]).max(axis=1) < 2.2
+    level = np.ptp(corners[..., 2], axis=1) < 1e-6
+    assert set(map(tuple, mesh.sets["bore"].faces)) == set(map(tuple, faces[near & ~level]))
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_forces_at_nodes_have_the_resultant_and_act_at_the_centroid(order):
     mesh = slab().volume_mesh(edge=0.5, order=order)

@@ -116,19 +116,23 @@ pub(super) fn add_regions(
 }
 
 /// Whether a triangle whose middle is `depth` outside a region follows its surface: no farther from it than the height of an arc with
-/// the triangle's longest edge as chord, L |Δn| / 8 where normals at the ends differ by Δn.
+/// the triangle's longest edge L as chord, κ L² / 8, where the curvature κ is how fast normals turn along the edges. Nodes that balance
+/// chords are off the surface by less.
 fn is_chord(corners: &[Vec3; 3], region: &Region, depth: f64) -> bool {
-    let [a, b, c] = *corners;
-    let longest = [sub(b, a), sub(c, b), sub(a, c)].into_iter().map(norm).fold(0.0, f64::max);
+    let ends = [[0, 1], [1, 2], [2, 0]];
+    let edges = ends.map(|[a, b]| norm(sub(corners[b], corners[a])));
+    let longest = edges.into_iter().fold(0.0, f64::max);
     // Normals differ by no more than √2 over an arc that a triangle may stand for.
     if depth > longest * 2f64.sqrt() / 8.0 {
         return false;
     }
     let (mut values, mut normals) = ([0.0; 3], [[0.0; 3]; 3]);
     region.gradients(corners, &mut values, &mut normals);
-    let turn = (0..3).map(|i| norm(sub(normals[i], normals[(i + 1) % 3]))).fold(0.0, f64::max);
+    let turns = ends.iter().zip(edges).map(|([a, b], edge)| norm(sub(normals[*a], normals[*b])) / edge);
+    let curvature = turns.fold(0.0, f64::max);
+    let [a, b, c] = *corners;
     let own = unit(cross(sub(b, a), sub(c, a)));
-    depth <= longest * turn / 8.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
+    depth <= curvature * longest.powi(2) / 8.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
 }
 
 /// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
