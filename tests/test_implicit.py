@@ -140,6 +140,8 @@ def test_a_mesh_region_is_a_node_of_its_mesh(tmp_path):
             "fraction that varies",
         ),
         ("[region.capsule]\nstart = [0, 0, 0]\nend = [9, 0, 0]\nradius = 5\n", PLAIN, "region.capsule"),
+        ("[region.moved]\nof.sphere.radius = 5\nby = [1, 0, 0]\n", PLAIN, "region.moved"),
+        ("[region.repeated]\nof.sphere.radius = 5\nalong = [{ by = [8, 0, 0], count = 2 }]\n", PLAIN, "region.repeated"),
         (
             BOX,
             PLAIN.replace("fraction = 0.3", "iso.radial = { center = [0, 0, 0], stops = [[0, 0.3], [5, 0.5]] }"),

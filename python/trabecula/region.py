@@ -26,7 +26,9 @@ __all__ = [
     "halfspace",
     "intersection",
     "mesh",
+    "moved",
     "offset",
+    "repeated",
     "sphere",
     "tetrahedron",
     "union",
@@ -182,3 +184,42 @@ def offset(of: dict, by: float) -> dict:
     by: Distance; positive grows. [mm]
     """
     return {"offset": settings(of=of, by=by)}
+
+
+@named
+def moved(
+    of: dict,
+    by: Vector | None = None,
+    rotate: Vector | None = None,
+    axis: Vector | None = None,
+    angle: float | None = None,
+    about: Vector | None = None,
+    mirror: str | Vector | None = None,
+    scale: float | None = None,
+) -> dict:
+    """A region that is mirrored, scaled and turned about a point and then moved, in this order.
+
+    of: The region.
+    by: Displacement, after all else. [mm, default [0.0, 0.0, 0.0]]
+    rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, from -1e+06 to 1e+06, default [0.0, 0.0,
+        0.0]]
+    axis: Direction about which it is turned by `angle`, in place of `rotate`; its length does not matter. [optional]
+    angle: Angle about `axis`, by the right-hand rule. [degrees, from -1e+06 to 1e+06, optional]
+    about: The point that stays where it is when the region is mirrored, scaled and turned. [mm, default [0.0, 0.0,
+        0.0]]
+    mirror: Normal of the plane through `about` in which it is mirrored: "x", "y", "z" or a direction. [optional]
+    scale: Factor on all lengths. [above 0, default 1.0]
+    """
+    return {"moved": settings(of=of, by=by, rotate=rotate, axis=axis, angle=angle, about=about, mirror=mirror, scale=scale)}
+
+
+@named
+def repeated(of: dict, along: Sequence[dict] | None = None, around: dict | None = None) -> dict:
+    """Copies of a region, in up to three rows or about an axis, or both: each copy about the axis is then repeated in
+    rows.
+
+    of: The region that is repeated: the first copy.
+    along: Rows, up to three, such as [{ by = [10, 0, 0], count = 5 }]: two make a grid. [default []]
+    around: About an axis, such as { count = 6 }. [optional]
+    """
+    return {"repeated": settings(of=of, along=along, around=around)}

@@ -59,6 +59,14 @@ impl MeshDistance {
         repair::combined(&of, &less, least).map(MeshDistance::within)
     }
 
+    /// The same boundary with its vertices at other positions, by a similarity transform; triangles are turned over if it `mirrors`.
+    pub fn image(&self, to: impl Fn(Vec3) -> Vec3, mirrors: bool) -> Self {
+        let mesh = self.mesh.with_vertices(self.mesh.vertices.iter().map(|p| to(*p)).collect(), mirrors);
+        // Rounding may let thin parts touch.
+        let pairs = if self.signed_by_normals() { repair::pairs(&mesh) } else { None };
+        MeshDistance::within(Boundary { mesh, pairs, done: self.repaired.clone() })
+    }
+
     fn within(Boundary { mesh, pairs, done }: Boundary) -> Self {
         let faces: Vec<Triangle> = (0..mesh.triangles.len()).map(|i| Triangle::new(mesh.corners(i))).collect();
         let tree = TriangleBvh::new(&faces);

@@ -273,9 +273,13 @@ pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
         return None;
     }
-    let pairs = validity::edges(&mesh).ok();
-    let pairs = pairs.filter(|_| self_intersections(&mesh, 1) == 0);
+    let pairs = pairs(&mesh);
     Some(Boundary { mesh, pairs, done: Repaired::default() })
+}
+
+/// The pairs of half-edges of a mesh that is closed and does not cross itself.
+pub fn pairs(mesh: &Mesh) -> Option<Pairs> {
+    validity::edges(mesh).ok().filter(|_| self_intersections(mesh, 1) == 0)
 }
 
 /// Refuses a surface with a gap beyond rounding: over a closed surface ∫ n dA is zero and ∫ x nᵀ dA is the

@@ -56,9 +56,13 @@ impl Mesh {
     /// The image of the mesh; triangles are turned over where the transform mirrors, so that a closed mesh stays oriented
     /// outwards.
     pub fn transformed(&self, by: &Transform) -> Result<Mesh, Fault> {
-        let vertices = by.points(&self.vertices)?;
-        let turned = |[a, b, c]: &[u32; 3]| if by.mirrors() { [*a, *c, *b] } else { [*a, *b, *c] };
-        Ok(Mesh { vertices, triangles: self.triangles.iter().map(turned).collect() })
+        Ok(self.with_vertices(by.points(&self.vertices)?, by.mirrors()))
+    }
+
+    /// The mesh with its vertices at other positions, its triangles turned over if `mirrors`.
+    pub fn with_vertices(&self, vertices: Vec<Vec3>, mirrors: bool) -> Mesh {
+        let turned = |[a, b, c]: &[u32; 3]| if mirrors { [*a, *c, *b] } else { [*a, *b, *c] };
+        Mesh { vertices, triangles: self.triangles.iter().map(turned).collect() }
     }
 }
 

@@ -10,6 +10,7 @@ use geometry::fault::Fault;
 use geometry::math::Aabb;
 use geometry::repair::Repaired;
 
+mod alike_bodies;
 mod bodies;
 mod cad;
 mod capsule;
@@ -25,8 +26,12 @@ mod hollowed;
 mod joints;
 mod mesh;
 mod meshes;
+mod moved;
+mod narrowed;
 mod offset;
 mod primitive;
+mod repeated;
+mod similarity;
 mod sphere;
 mod tetrahedron;
 mod tube;
@@ -43,6 +48,7 @@ pub use hollowed::Hollowed;
 pub use joints::joint;
 pub use mesh::MeshRegion;
 pub use offset::Offset;
+pub use similarity::Similarity;
 pub use sphere::Sphere;
 pub use tetrahedron::Tetrahedron;
 pub use tube::{OutsideTube, Tube, smoothed};
@@ -64,6 +70,8 @@ pub enum RegionKind {
     Intersection(csg::IntersectionKind),
     Difference(csg::DifferenceKind),
     Offset(offset::OffsetKind),
+    Moved(moved::MovedKind),
+    Repeated(repeated::RepeatedKind),
 }
 
 /// How far from the origin a region may reach, mm: a thousand kilometres.
@@ -205,6 +213,9 @@ pub trait Shape: Field {
     /// Adds to `out` the implicit surfaces of the shape offset outwards by `by` (mm; inwards if negative) and returns how
     /// they are combined. Surfaces are numbered by their index in `out`.
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree;
+
+    /// The image of the shape under a similarity transform. Errors if rounding leaves nothing of it.
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault>;
 
     /// Whether distances are searched for, rather than computed in closed form, so that a table of them pays.
     fn is_searched(&self) -> bool {

@@ -5,13 +5,20 @@ use super::{Context, Region};
 /// Boxes that are examined before two regions are taken to touch.
 const BOXES: usize = 2000;
 
-/// Warns of a part that is a union of bodies that do not touch.
-pub(super) fn warn(of: &[Region], context: &mut Context) {
+/// Warns of a part that is a union of bodies that do not touch; `what` are those.
+pub(super) fn warn(of: &[Region], what: &str, context: &mut Context) {
     let groups = if context.is_part() { groups(of) } else { 1 };
     if groups > 1 {
-        context
-            .warn(format!("these {} regions are {groups} bodies that do not touch: the part is in pieces", of.len()));
+        context.warn(format!("these {} {what} are {groups} bodies that do not touch: the part is in pieces", of.len()));
     }
+}
+
+/// The volume (mm³) of a union of regions that surely have no point in common, if that of each is known.
+pub(super) fn volume<'a>(of: impl Iterator<Item = &'a Region>) -> Option<f64> {
+    let of: Vec<&Region> = of.collect();
+    let each: Vec<f64> = of.iter().map(|r| r.volume()).collect::<Option<_>>()?;
+    let meets = |i: usize| of[..i].iter().any(|r| may_meet(r, of[i]));
+    (!(1..of.len()).any(meets)).then(|| each.iter().sum())
 }
 
 /// How many bodies regions surely are when united, at least.

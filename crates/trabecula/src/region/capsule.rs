@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -94,6 +94,13 @@ impl Shape for Capsule {
             return CsgTree::EMPTY;
         }
         one_surface(Arc::new(Capsule { radius, ..*self }), out)
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        let (start, end) = (by.point(self.start), by.point(self.end));
+        let made = Capsule { start, end, radius: self.radius * by.scale() };
+        made.valid()?;
+        Ok(Arc::new(made))
     }
 
     fn volume(&self) -> Option<f64> {

@@ -2,9 +2,13 @@
 
 use std::sync::Arc;
 
+use super::alike_bodies::{self, Body};
 use super::halfspace::polyhedron_bounds;
 use super::meshes::List;
-use super::{BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, bodies};
+use super::narrowed::{self, MANY};
+use super::{
+    BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, Similarity, bodies,
+};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -34,7 +38,7 @@ fn each(of: &[RegionKind], context: &mut Context) -> Result<Vec<Region>, Fault> 
 impl BuildRegion for UnionKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let of = each(&self.0, context)?;
-        bodies::warn(&of, context);
+        bodies::warn(&of, "regions", context);
         Ok(Arc::new(Union::new(of)?))
     }
 }
@@ -173,36 +177,79 @@ impl Join for Difference {
     }
 }
 
+/// What `Join` has by itself.
+trait Joined: Join {
+    /// The bound of operand `i`, by its complement if it enters so and negated if the greatest counts: the least decides.
+    fn rank(&self, i: usize, b: &Aabb) -> Interval {
+        let (r, negated) = &self.operands()[i];
+        let own = r.bound(b);
+        if *negated == Self::ALL { own } else { -own }
+    }
+
+    /// Values and, if `gradients` is not empty, gradients at points by some of the operands.
+    fn join(&self, of: &[usize], points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let sloped = !gradients.is_empty();
+        let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; gradients.len()]);
+        for (n, (r, negated)) in of.iter().map(|i| &self.operands()[*i]).enumerate() {
+            match sloped {
+                true => r.gradients(points, &mut v, &mut g),
+                false => r.values(points, &mut v),
+            }
+            let sign = if *negated { -1.0 } else { 1.0 };
+            for k in 0..points.len() {
+                if n == 0 || Self::takes(sign * v[k], values[k]) {
+                    values[k] = sign * v[k];
+                    if sloped {
+                        gradients[k] = g[k].map(|x| sign * x);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The same by all of them, of which most are ruled out where there are many.
+    fn join_all(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let count = self.operands().len();
+        if count <= MANY {
+            return self.join(&Vec::from_iter(0..count), points, values, gradients);
+        }
+        narrowed::divided(points, count, &|of, b| narrowed::least(of, |i| self.rank(i, b)), &mut |at, of| {
+            let points: Vec<Vec3> = at.iter().map(|i| points[*i]).collect();
+            let mut v = vec![0.0; points.len()];
+            let mut g = vec![[0.0; 3]; if gradients.is_empty() { 0 } else { points.len() }];
+            self.join(of, &points, &mut v, &mut g);
+            at.iter().zip(v).for_each(|(i, v)| values[*i] = v);
+            at.iter().zip(g).for_each(|(i, g)| gradients[*i] = g);
+        });
+    }
+}
+impl<J: Join> Joined for J {}
+
+/// Adds the complements of surfaces that `add` adds, and returns how they are combined.
+fn complement(out: &mut Vec<Surface>, add: impl FnOnce(&mut Vec<Surface>) -> CsgTree) -> CsgTree {
+    let first = out.len();
+    let tree = add(out).complement();
+    let turned = out.split_off(first);
+    out.extend(turned.into_iter().map(Surface::complement));
+    tree
+}
+
+/// A region grown by `by` mm, as a body of a union.
+fn body(of: &Region, by: f64) -> Body {
+    let mut surfaces = Vec::new();
+    let tree = of.clone().surfaces(by, &mut surfaces);
+    Body { bounds: of.bounds().grown(by.max(0.0)), surfaces, tree }
+}
+
 macro_rules! joined {
     ($($shape:ty),*) => {$(
         impl Field for $shape {
             fn values(&self, points: &[Vec3], out: &mut [f64]) {
-                self.operands()[0].0.values(points, out);
-                let mut other = vec![0.0; points.len()];
-                for (r, negated) in &self.operands()[1..] {
-                    r.values(points, &mut other);
-                    for (o, v) in out.iter_mut().zip(&other) {
-                        let v = if *negated { -v } else { *v };
-                        if Self::takes(v, *o) {
-                            *o = v;
-                        }
-                    }
-                }
+                self.join_all(points, out, &mut []);
             }
 
             fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-                self.operands()[0].0.gradients(points, values, gradients);
-                let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-                for (r, negated) in &self.operands()[1..] {
-                    r.gradients(points, &mut v, &mut g);
-                    let sign = if *negated { -1.0 } else { 1.0 };
-                    for k in 0..points.len() {
-                        if Self::takes(sign * v[k], values[k]) {
-                            values[k] = sign * v[k];
-                            gradients[k] = g[k].map(|x| sign * x);
-                        }
-                    }
-                }
+                self.join_all(points, values, gradients);
             }
 
             fn bound(&self, b: &Aabb) -> Interval {
@@ -232,13 +279,18 @@ macro_rules! joined {
 
             // Rounding keeps order, so joining rounded values gives the rounded join.
             fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-                self.operands()[0].0.fill_level(block, level, out);
+                if block.is_empty() {
+                    return;
+                }
+                let all = Vec::from_iter(0..self.operands().len());
+                let few = all.len() <= MANY;
+                let of = if few { all } else { narrowed::least(&all, |i| self.rank(i, &block.bounds())) };
                 let mut other = vec![0.0f32; out.len()];
-                for (r, negated) in &self.operands()[1..] {
+                for (n, (r, negated)) in of.iter().map(|i| &self.operands()[*i]).enumerate() {
                     let sign = if *negated { -1.0f32 } else { 1.0 };
                     r.fill_level(block, level * f64::from(sign), &mut other);
                     for (o, v) in out.iter_mut().zip(&other) {
-                        if Self::takes(f64::from(sign * v), f64::from(*o)) {
+                        if n == 0 || Self::takes(f64::from(sign * v), f64::from(*o)) {
                             *o = sign * v;
                         }
                     }
@@ -250,21 +302,26 @@ macro_rules! joined {
             }
 
             fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
-                let each = self.operands().iter().map(|(r, negated)| {
-                    if !negated {
-                        return r.clone().surfaces(by, out);
-                    }
-                    let first = out.len();
-                    let tree = r.clone().surfaces(-by, out).complement();
-                    let turned = out.split_off(first);
-                    out.extend(turned.into_iter().map(Surface::complement));
-                    tree
-                });
-                if Self::ALL {
-                    CsgTree::Intersection(each.collect())
-                } else {
-                    CsgTree::Union(each.collect())
+                let parts = self.operands().iter();
+                if self.operands().len() <= MANY {
+                    let each = parts.map(|(r, negated)| match negated {
+                        false => r.clone().surfaces(by, out),
+                        true => complement(out, |out| r.clone().surfaces(-by, out)),
+                    });
+                    let each = each.collect();
+                    return if Self::ALL { CsgTree::Intersection(each) } else { CsgTree::Union(each) };
                 }
+                let of = |wanted: bool| parts.clone().filter(move |(_, negated)| *negated == wanted).map(|(r, _)| r);
+                if !Self::ALL {
+                    return alike_bodies::union(of(false).map(|r| body(r, by)).collect(), out);
+                }
+                let mut each: Vec<CsgTree> = of(false).map(|r| r.clone().surfaces(by, out)).collect();
+                each.push(complement(out, |out| alike_bodies::union(of(true).map(|r| body(r, -by)).collect(), out)));
+                CsgTree::Intersection(each)
+            }
+
+            fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+                Ok(Arc::new(Self(self.list().moved(by)?)))
             }
 
             fn as_mesh(&self) -> Option<&MeshRegion> {
@@ -306,7 +363,8 @@ macro_rules! joined {
             fn volume(&self) -> Option<f64> {
                 match self.operands() {
                     [(only, _)] => only.volume(),
-                    _ => None,
+                    _ if Self::ALL => None,
+                    all => bodies::volume(all.iter().map(|(r, _)| r)),
                 }
             }
         }

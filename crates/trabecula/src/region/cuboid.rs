@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use super::halfspace::flat;
+use super::moved::{Moved, lost};
 use super::primitive::{field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::{Key, Kind};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Interval, Vec3, add, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, sub};
 
 /// An axis-aligned box, by its size and centre, or by two corners.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
@@ -39,10 +40,10 @@ pub struct BoxSize {
 pub struct Cuboid {
     /// Lower corner.
     #[kind(unit = "mm", keyword)]
-    min: Vec3,
+    pub(super) min: Vec3,
     /// Upper corner.
     #[kind(unit = "mm")]
-    max: Vec3,
+    pub(super) max: Vec3,
 }
 
 impl BuildRegion for BoxKind {
@@ -140,6 +141,16 @@ impl Shape for Cuboid {
         }
         let sides = (0..3).flat_map(|axis| [(axis, self.min[axis] - by, false), (axis, self.max[axis] + by, true)]);
         CsgTree::Intersection(sides.map(|s| flat(s, out)).collect())
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        if !by.keeps_axes() {
+            return Ok(Arc::new(Moved::new(self, by)));
+        }
+        let Aabb { min, max } = Aabb::EMPTY.with(by.point(self.min)).with(by.point(self.max));
+        let far = min.iter().chain(&max).fold(0.0f64, |m, x| m.max(x.abs()));
+        let made = Cuboid::new(min, max).map_err(|_| lost(far, norm(self.bounds().size()) * by.scale()))?;
+        Ok(Arc::new(made))
     }
 
     fn half_spaces(&self) -> Option<Vec<HalfSpace>> {

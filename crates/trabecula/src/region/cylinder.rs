@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::halfspace::flat;
 use super::primitive::{along, apart, coordinate_axis, direction, field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -182,6 +182,21 @@ impl Shape for Cylinder {
         let mut barrel = *self;
         barrel.radius += by;
         CsgTree::Intersection(vec![bottom, top, one_surface(Arc::new(Barrel(barrel)), out)])
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        let [radius, height] = [self.radius, self.height].map(|v| v * by.scale());
+        let mut made = Cylinder::new(by.point(self.base), by.direction(self.axis), radius, height)?;
+        // Caps that were exactly on a coordinate are exactly on its image.
+        if let (Some((from, ends)), Some((to, _))) = (self.aligned, made.aligned) {
+            let ends = ends.map(|at| {
+                let mut p = self.base;
+                p[from] = at;
+                by.point(p)[to]
+            });
+            made.aligned = Some((to, [ends[0].min(ends[1]), ends[0].max(ends[1])]));
+        }
+        Ok(Arc::new(made))
     }
 
     fn volume(&self) -> Option<f64> {

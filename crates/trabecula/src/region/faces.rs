@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, Context, Region, Shape, cad, halving, one_surface};
+use super::{BuildRegion, Context, Region, Shape, Similarity, cad, halving, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -46,10 +46,13 @@ impl FaceSet {
     /// # Errors
     /// A part from no file of a CAD system; a name of no face: `Fault::at` is its index, such as `[1]`.
     pub fn new(part: Option<&Region>, names: &[String]) -> Result<FaceSet, Fault> {
-        let corners = cad::faces(part, names)?;
+        Ok(FaceSet::of(names, cad::faces(part, names)?))
+    }
+
+    fn of(names: &[String], corners: Vec<[Vec3; 3]>) -> FaceSet {
         let bounds = corners.iter().flatten().fold(Aabb::EMPTY, |b, p| b.with(*p));
         let triangles: Vec<Triangle> = corners.into_iter().map(Triangle::new).collect();
-        Ok(FaceSet { names: names.to_vec(), tree: Arc::new(TriangleBvh::new(&triangles)), bounds })
+        FaceSet { names: names.to_vec(), tree: Arc::new(TriangleBvh::new(&triangles)), bounds }
     }
 
     /// The names that they go by.
@@ -131,6 +134,12 @@ impl Shape for NearFaces {
             return CsgTree::EMPTY;
         }
         one_surface(Arc::new(NearFaces { set: self.set.clone(), within }), out)
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        let corners = self.set.tree.triangles().iter().map(|f| f.corners.map(|p| by.point(p)));
+        let set = FaceSet::of(&self.set.names, corners.collect());
+        Ok(Arc::new(NearFaces { set, within: self.within * by.scale() }))
     }
 
     fn volume(&self) -> Option<f64> {

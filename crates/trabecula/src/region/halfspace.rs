@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, coordinate_axis, direction, field, fill_rows};
-use super::{BuildRegion, Context, FARTHEST, Region, Shape, one_surface};
+use super::{BuildRegion, Context, FARTHEST, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::{Plane, Surface};
@@ -58,6 +58,18 @@ impl HalfSpace {
     /// The unit normal of the plane; it points out of the solid.
     pub fn normal(&self) -> Vec3 {
         self.normal
+    }
+
+    /// The half-space that a plane normal to a coordinate axis bounds.
+    pub(super) fn of_plane(plane: Plane) -> HalfSpace {
+        let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
+        (point[plane.axis], normal[plane.axis]) = (plane.at, if plane.below { 1.0 } else { -1.0 });
+        HalfSpace { point, normal }
+    }
+
+    /// The image of the half-space.
+    pub(super) fn image(&self, by: &Similarity) -> HalfSpace {
+        HalfSpace { point: by.point(self.point), normal: by.direction(self.normal) }
     }
 
     /// The other side of the plane.
@@ -149,6 +161,10 @@ impl Shape for HalfSpace {
         }
     }
 
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        Ok(Arc::new(self.image(by)))
+    }
+
     fn half_spaces(&self) -> Option<Vec<HalfSpace>> {
         Some(vec![*self])
     }
@@ -162,10 +178,9 @@ field!(HalfSpace);
 
 /// The solid below (or above) a coordinate of an axis.
 pub(super) fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Surface>) -> CsgTree {
-    let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
-    (point[axis], normal[axis]) = (at, if below { 1.0 } else { -1.0 });
-    let mut face = Surface::distance(Arc::new(HalfSpace { point, normal }));
-    face.plane = Some(Plane { axis, at, below });
+    let plane = Plane { axis, at, below };
+    let mut face = Surface::distance(Arc::new(HalfSpace::of_plane(plane)));
+    face.plane = Some(plane);
     out.push(face);
     CsgTree::Leaf(out.len() - 1)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{CadMesh, Offset, OpenSurface, Region, Shape, one_surface};
+use super::{CadMesh, Offset, OpenSurface, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -162,6 +162,17 @@ impl Shape for MeshRegion {
 
     fn is_searched(&self) -> bool {
         true
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        let mut made = MeshRegion::of(self.distance.image(|p| by.point(p), by.mirrors()));
+        made.cad = self.cad.as_ref().map(|cad| {
+            let vertices = cad.mesh.vertices.iter().map(|p| by.point(*p)).collect();
+            let mesh = cad.mesh.with_vertices(vertices, by.mirrors());
+            let volume = cad.volume.map(|v| v * by.scale().powi(3));
+            Arc::new(CadMesh { mesh, volume, chord: cad.chord * by.scale(), ..(**cad).clone() })
+        });
+        Ok(Arc::new(made))
     }
 
     fn as_mesh(&self) -> Option<&MeshRegion> {

@@ -5,7 +5,8 @@
 
 use std::sync::Arc;
 
-use super::{MeshRegion, Region};
+use super::{MeshRegion, Region, Similarity};
+use geometry::fault::Fault;
 
 /// Regions that are combined.
 pub(super) struct List {
@@ -27,6 +28,17 @@ impl List {
         };
         let operands = of.iter().enumerate().filter_map(operand).collect();
         List { of, operands }
+    }
+
+    /// The images: what was made one stays one.
+    pub fn moved(&self, by: &Similarity) -> Result<List, Fault> {
+        let of = self.of.iter().map(|r| r.clone().moved(by)).collect::<Result<Vec<_>, Fault>>()?;
+        let operand = |(r, negated): &(Region, bool)| {
+            let given = self.of.iter().position(|o| Arc::ptr_eq(o, r));
+            Ok((given.map_or_else(|| r.clone().moved(by), |i| Ok(of[i].clone()))?, *negated))
+        };
+        let operands = self.operands.iter().map(operand).collect::<Result<_, Fault>>()?;
+        Ok(List { of, operands })
     }
 }
 

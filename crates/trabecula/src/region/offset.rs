@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape, joint};
+use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape, Similarity, joint};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -124,6 +124,10 @@ impl Shape for Offset {
 
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         self.of.clone().surfaces(self.by + by, out)
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        Ok(Arc::new(Offset::new(self.of.clone().moved(by)?, self.by * by.scale())?))
     }
 
     fn volume(&self) -> Option<f64> {

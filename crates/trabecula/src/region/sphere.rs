@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{apart, field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -70,6 +70,10 @@ impl Shape for Sphere {
         }
         let radius = self.radius + by;
         one_surface(Arc::new(Sphere { radius, ..*self }), out)
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        Ok(Arc::new(Sphere::new(by.point(self.center), self.radius * by.scale())?))
     }
 
     fn volume(&self) -> Option<f64> {

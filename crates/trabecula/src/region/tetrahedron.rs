@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, field, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -141,6 +141,11 @@ impl Shape for Tetrahedron {
             return CsgTree::Intersection(self.planes.map(|h| Arc::new(h).surfaces(by, out)).to_vec());
         }
         if by == 0.0 { one_surface(self, out) } else { rounded(self, by, out) }
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        let sharpness = self.sharpness.map(|k| k / by.scale());
+        Ok(Arc::new(Tetrahedron::new(self.corners.map(|p| by.point(p)), sharpness)?))
     }
 
     fn half_spaces(&self) -> Option<Vec<HalfSpace>> {

@@ -8,7 +8,7 @@ use trabecula::design::schema;
 use super::corpus;
 
 /// Alternatives without a design, and why.
-const EXEMPT: [(&str, &str); 7] = [
+const EXEMPT: [(&str, &str); 8] = [
     ("Ends: open", "as capped, but for files, which are not closed then"),
     ("Series: string", "a space group, as by its number"),
     ("TetCell: integer", "a space group, as by its symbol"),
@@ -16,6 +16,7 @@ const EXEMPT: [(&str, &str); 7] = [
     ("Mesher: ftetwild", "a program of another package"),
     ("Unit: ", "each is a factor"),
     ("Side: ", "six sides of one kind"),
+    ("Axis: ", "three axes of one kind"),
 ];
 
 /// The schema with its references resolved, and the name of the definition.

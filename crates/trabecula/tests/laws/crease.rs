@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
@@ -15,7 +16,7 @@ use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::implicit::Surface;
-use trabecula::region::{MeshRegion, Region, Shape, Union};
+use trabecula::region::{MeshRegion, Region, Shape, Similarity, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
@@ -176,6 +177,10 @@ impl Shape for Rounded {
     fn surfaces(self: Arc<Self>, _: f64, out: &mut Vec<Surface>) -> CsgTree {
         out.push(Surface::distance(self));
         CsgTree::Leaf(out.len() - 1)
+    }
+
+    fn moved(self: Arc<Self>, _: &Similarity) -> Result<Region, Fault> {
+        Err(Fault::new("", "it stays where it is"))
     }
 
     fn volume(&self) -> Option<f64> {

@@ -18,6 +18,7 @@ mod layered_tets;
 mod load_cases;
 mod local_thickness;
 mod measured;
+mod moved_regions;
 mod noisy_stress;
 mod patches;
 mod periodic_cells;

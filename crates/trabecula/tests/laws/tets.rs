@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::common::{Random, ball, cases, cuboid, fault, region, within};
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
@@ -15,7 +16,7 @@ use trabecula::field::Field;
 use trabecula::grade::{Grade, Linear};
 use trabecula::implicit::Surface;
 use trabecula::mesher::{ANGLES, Fit, background, fit};
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Shape, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Shape, Similarity, Union};
 use trabecula::solid::Solid;
 
 /// Points inside a field's bounds where it is negative.
@@ -128,6 +129,9 @@ impl Shape for Waves {
         let lipschitz = 1.0 + Waves::HEIGHT * self.0.iter().map(|(k, _)| norm(*k)).sum::<f64>();
         out.push(Surface { lipschitz, ..Surface::distance(self) });
         CsgTree::Leaf(out.len() - 1)
+    }
+    fn moved(self: Arc<Self>, _: &Similarity) -> Result<Region, Fault> {
+        Err(Fault::new("", "it stays where it is"))
     }
     fn volume(&self) -> Option<f64> {
         None

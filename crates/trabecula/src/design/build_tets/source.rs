@@ -16,13 +16,16 @@ use geometry::tetmesh::{Checked, TetMesh};
 /// Names under which programs write the zones of cells.
 const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "material", "zones"];
 
-/// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
-/// the region's.
+/// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; that of a region
+/// that is a mesh otherwise, such as a moved one; else one that is made of the region.
 pub(super) fn surface(region: &RegionKind, environment: &Environment, size: f64) -> Result<Mesh, DesignError> {
+    let own = environment.region.as_mesh().map(|m| m.mesh());
     if let RegionKind::Mesh(file) = region {
         // A part from a CAD system has no triangles of its own.
-        let own = |why| environment.region.as_mesh().map(|m| m.mesh().clone()).ok_or(why);
-        return triangles(file, environment.loader).or_else(own);
+        return triangles(file, environment.loader).or_else(|why| own.cloned().ok_or(why));
+    }
+    if let Some(own) = own {
+        return Ok(own.clone());
     }
     let solid = Solid::new(environment.region.clone(), None, size);
     match extract::surface(&solid, size / 4.0, &Silent) {

@@ -91,3 +91,27 @@ fn a_part_without_a_face_is_one_without_its_plane() {
         assert!(range.lo <= by_name.value(q) && by_name.value(q) <= range.hi, "{p:?}");
     }
 }
+
+/// Faces of a part that is turned, mirrored and scaled lie where it does: what is near them is the image of what was, and they open.
+#[test]
+fn faces_move_along_with_their_part() {
+    let mut turn = geometry::math::rotation([30.0, 40.0, 50.0]);
+    turn[1] = scale(turn[1], -1.0);
+    let by = Similarity::new(2.0, turn, [0.1, 0.2, 0.3], [1.0, 0.0, -1.0]);
+    let own = part([-0.9, -0.7, -0.4], [0.8, 1.0, 0.9]);
+    let moved = own.clone().moved(&by).unwrap();
+    let near = |part: &Region, within: f64| Arc::new(NearFaces { set: set(part, &["INLET"]).unwrap(), within });
+    let (image, again) = (near(&own, 0.3).moved(&by).unwrap(), near(&moved, 0.6));
+    let mut seed = 8;
+    for _ in 0..500 {
+        let p = [0; 3].map(|_| 4.0 * random(&mut seed));
+        assert!((image.value(p) - again.value(p)).abs() < 1e-13);
+    }
+    let mut found = [false];
+    let open = OpenSurface::Faces(set(&moved, &["INLET"]).unwrap());
+    let opened = moved.clone().opened(&[open], &mut found).unwrap();
+    assert!(found[0]);
+    // On the face the rest of the surface is the nearest.
+    let middle = by.point([0.0, 0.1, -0.4]);
+    assert!(moved.value(middle).abs() < 1e-13 && (opened.value(middle) + 2.0 * 0.8).abs() < 1e-13);
+}

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
-use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, halving};
+use crate::region::moved::Moved;
+use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, Similarity, halving};
 use geometry::distance::UNKNOWN;
 use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
 
 /// Corners of a triangle on a plane may be this far off it, as a share of the mesh's size: files hold coordinates in
@@ -152,6 +154,10 @@ impl Shape for OpenMesh {
             Ok(moved) => one_surface(Arc::new(moved), out),
             Err(_) => one_surface(self, out),
         }
+    }
+
+    fn moved(self: Arc<Self>, by: &Similarity) -> Result<Region, Fault> {
+        Ok(Arc::new(Moved::new(self, by)))
     }
 
     fn volume(&self) -> Option<f64> {
