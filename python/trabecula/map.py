@@ -138,15 +138,23 @@ def phase(
 
 
 @named
-def cylinder(wavelength: float | Vector, around: int, center: Vector | None = None, axis: Vector | None = None) -> dict:
+def cylinder(
+    wavelength: float | Vector,
+    around: int,
+    center: Vector | None = None,
+    axis: Vector | None = None,
+    start: float | None = None,
+) -> dict:
     """Wrapped round an axis, a whole number of cells, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
 
     wavelength: Cell edge along the radius and along the axis, one number or two. [mm, above 0]
     around: Number of cells around. [from 1 to 1e+06]
     center: A point on the axis. [mm, default [0.0, 0.0, 0.0]]
     axis: Direction of the axis. [default [0.0, 0.0, 1.0]]
+    start: Angle round the axis at which a cell begins, by the right-hand rule: from x if the axis is z, else from the
+        coordinate axis that is most normal to it. [degrees, from -360 to 360, default 0.0]
     """
-    return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
+    return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis, start=start)}
 
 
 @named

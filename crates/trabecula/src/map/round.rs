@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use super::Mapping;
 use super::inverse::{corners, listed, whole};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, scale, sin_cos_turns, sub, unit};
 
 /// A lattice wrapped round an axis or about a centre. Phases are (r/λ, n θ/2π, z/λ) on a cylinder and (r/λ, n φ/2π,
 /// n θ/2π) on a sphere: φ round the axis, θ from it, n cells around and half as many from pole to pole.
@@ -92,6 +92,13 @@ impl Round {
         e[least] = 1.0;
         let x = unit(sub(e, scale(n, dot(e, n))));
         Ok(Round { center, frame: [x, cross(n, x), n], wavelength, around, sphere, radii })
+    }
+
+    /// The same cells turned about the axis by an angle (degrees), by the right-hand rule.
+    pub fn started(self, degrees: f64) -> Round {
+        let ([x, y, n], (s, c)) = (self.frame, sin_cos_turns(degrees / 360.0));
+        let across = |a: f64, b: f64| add(scale(x, a), scale(y, b));
+        Round { frame: [across(c, s), across(-s, c), n], ..self }
     }
 
     /// Coordinates across and along the axis, and the distance from it.
@@ -329,6 +336,32 @@ mod tests {
         let u = plain.phase(plain.local([0.0, 4.0, 6.0]));
         assert!(norm(sub(u, [2.0, 3.0, 2.0])) < 1e-14, "{u:?}");
         assert_eq!(plain.lipschitz(&Aabb { min: [-1.0; 3], max: [1.0; 3] }), f64::INFINITY);
+    }
+
+    /// The phase at a point turned about the axis is that of the unturned map at the point itself, as for its slopes.
+    #[test]
+    fn cells_that_start_at_an_angle_are_turned_by_it() {
+        let axis = [0.3, -0.2, 0.9];
+        let map = Round::cylinder([1.0, 2.0, 3.0], axis, [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder");
+        for degrees in [0.0, 90.0, 17.0, -200.0] {
+            let turned = map.started(degrees);
+            let (s, c) = sin_cos_turns(degrees / 360.0);
+            let n = unit(axis);
+            let about = |d: Vec3| {
+                let along = scale(n, dot(n, d));
+                add(along, add(scale(sub(d, along), c), scale(cross(n, d), s)))
+            };
+            for p in positions() {
+                let q = add(map.center, about(sub(p, map.center)));
+                let (u, v) = (map.phase(map.local(p)), turned.phase(turned.local(q)));
+                let round = v[1] - u[1];
+                let off = [v[0] - u[0], round - 12.0 * (round / 12.0).round(), v[2] - u[2]];
+                assert!(norm(off) < 1e-11, "{degrees}: {off:?}");
+                let back = turned.position(v, q).expect("a position");
+                assert!(norm(sub(back, q)) < 1e-11);
+            }
+            assert_eq!(degrees == 0.0, turned == map);
+        }
     }
 
     #[test]

@@ -21,6 +21,10 @@ pub struct CylinderMapKind {
     /// Direction of the axis.
     #[kind(default = [0.0, 0.0, 1.0])]
     axis: [f64; 3],
+    /// Angle round the axis at which a cell begins, by the right-hand rule: from x if the axis is z, else from the coordinate axis
+    /// that is most normal to it.
+    #[kind(unit = "degrees", min = -360.0, max = 360.0, default = 0.0, hints("rotate", "turn", "angle", "offset", "phase"))]
+    start: f64,
 }
 
 /// Wrapped about a centre in shells, a whole number of cells round the equator and half as many from pole to pole.
@@ -55,7 +59,7 @@ impl BuildMap for CylinderMapKind {
     fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let radii = radii(self.center, self.axis, environment);
         let made = Round::cylinder(self.center, self.axis, self.wavelength.two(), self.around.into(), radii);
-        shared(made, path)
+        shared(made.map(|round| round.started(self.start)), path)
     }
 }
 
