@@ -291,7 +291,7 @@ def test_a_tiff_by_another_reader(part, tmp_path):
         assert (file.asarray() == np.load(tmp_path / "a.npy")[:, ::-1].T).all()
         assert file.imagej_metadata["slices"] == len(layers) and file.imagej_metadata["spacing"] == pytest.approx(0.8)
         dots, unit = file.pages[0].tags["XResolution"].value, file.pages[0].tags["ResolutionUnit"].value
-        # ImageJ takes pixels in the unit of its description for those of the tag, and writes "none" there unless it is inch or cm.
+        # ImageJ takes the unit of its description for that of the tag, and writes "none" there unless it is inch or cm.
         assert file.imagej_metadata["unit"] == "mm" and unit == 1
         assert dots[0] / dots[1] == pytest.approx(10)
 
