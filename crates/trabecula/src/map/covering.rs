@@ -66,7 +66,7 @@ impl Covering {
             .map_err(|f| if f.at == "step" { too_fine(radius) } else { f })?;
         let domain = SolveDomain::over(bounds, chosen.grid.padded(PADDING), wanted, settings.region)?;
         checkpoint();
-        let mut target = Target::new(&domain, wanted, None)?;
+        let mut target = Target::new(&domain, wanted)?;
         checkpoint();
         let least_length = 0.5 * shortest(&domain);
         let lines = singular_lines(&domain.grid, &target.frames, &domain.inside, &wanted.alike(), least_length, radius);

@@ -63,6 +63,8 @@ pub struct Phase {
     steps: usize,
     hasty: Option<String>,
     frames: OnceLock<Arc<[Mat3]>>,
+    /// How far nodes are outside the region, mm, if they are made again.
+    outside: Option<Vec<f64>>,
     /// The wavelengths at the nodes along the axes of the frames, where they are given along others.
     lengths: Option<Vec<Vec3>>,
     /// The cores of singular lines.
@@ -103,7 +105,7 @@ impl Phase {
         };
         let domain = SolveDomain::over(bounds, grid, wanted, settings.region)?;
         checkpoint();
-        let target = Target::new(&domain, wanted, None)?;
+        let target = Target::new(&domain, wanted)?;
         checkpoint();
         pace::check_pace(&domain.grid, &wanted.wavelength, &domain.given, &domain.inside)?;
         chosen.refuse()?;
@@ -131,7 +133,7 @@ impl Phase {
         let mut found = Candidate { target, weights, solution, periods: Vec::new(), mean, steps, quality };
         let mut tried = String::new();
         if found.quality.fold.is_some() || found.quality.missed > MISSED[0] {
-            let (closed, words) = closed(&domain, wanted, settings, ratio)?;
+            let (closed, words) = closed(&domain, wanted, settings, (ratio, &found.target))?;
             tried = words;
             if let Some(closed) = closed.filter(|c| c.is_better_than(&found)) {
                 found = closed;
@@ -189,7 +191,7 @@ impl Phase {
         let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
         let keep =
             wanted.averaged().is_some() || wanted.by_principal || !periods.is_empty() || solution.branches.is_some();
-        let Target { frames, lengths, .. } = target;
+        let Target { frames, outside, lengths, .. } = target;
         Ok(Phase {
             solution,
             periods,
@@ -205,6 +207,7 @@ impl Phase {
             steps,
             hasty,
             frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
+            outside: outside.filter(|_| !keep),
             lengths,
             cores: None,
         })
@@ -278,7 +281,8 @@ impl Phase {
         }
         let grid = self.solution.grid();
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes, None, None, None)?.at_nodes.into();
+        let made: Arc<[Mat3]> =
+            self.wanted.orientation.frames(grid, &nodes, None, None, self.outside.as_deref())?.at_nodes.into();
         Ok(self.frames.get_or_init(|| made).clone())
     }
 
@@ -447,7 +451,7 @@ fn closed(
     domain: &SolveDomain,
     wanted: &PhaseRequest,
     settings: &SolverOptions,
-    ratio: f64,
+    (ratio, target): (f64, &Target),
 ) -> Result<(Option<Candidate>, String), Fault> {
     let Some(region) = settings.region else { return Ok((None, String::new())) };
     let search = HoleSearch { grid: &domain.grid, depth: &domain.depth, region };
@@ -459,9 +463,6 @@ fn closed(
     if holes.is_empty() {
         return Ok((None, String::new()));
     }
-    // What is asked for within a hole may have little to do with the part.
-    let outside: Vec<f64> = domain.inside.iter().zip(&domain.depth).map(|(i, d)| if *i { 0.0 } else { *d }).collect();
-    let target = Target::new(domain, wanted, Some(&outside))?;
     let ones = || vec![1.0; domain.grid.len()];
     let roots = |steps: f64| -> Result<Vec<f64>, Fault> {
         Ok(domain.roots(wanted.weight.as_ref(), target.trust.as_deref(), steps)?.unwrap_or_else(ones))
@@ -475,9 +476,9 @@ fn closed(
     for (solution, periods) in angles.solutions(&domain.grid, &values) {
         checkpoint();
         if fold_at_node(&solution, domain).or_else(|| fold_between(&solution, &domain.inside)).is_none() {
-            let quality = SolutionQuality::of(domain, wanted, settings.region, &target, &solution)?;
+            let quality = SolutionQuality::of(domain, wanted, settings.region, target, &solution)?;
             if quality.fold.is_none() {
-                let words = tried(&periods);
+                let (words, target) = (tried(&periods), target.clone());
                 return Ok((Some(Candidate { target, weights, solution, periods, mean, steps, quality }), words));
             }
         }
@@ -488,7 +489,8 @@ fn closed(
     if !settings.folds && wanted.stretch.is_none() {
         return Ok((None, words));
     }
-    let quality = SolutionQuality::of(domain, wanted, settings.region, &target, &solution)?;
+    let quality = SolutionQuality::of(domain, wanted, settings.region, target, &solution)?;
+    let target = target.clone();
     Ok((Some(Candidate { target, weights, solution, periods, mean, steps, quality }), words))
 }
 

@@ -13,6 +13,7 @@ use crate::grade::Grade;
 use geometry::fault::{Fault, number, position};
 use geometry::math::{Aabb, Mat3, Vec3, exp, norm, scale};
 use geometry::progress::checkpoint;
+use geometry::voxel_distances::distances;
 
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
@@ -54,9 +55,20 @@ impl SolveDomain {
             depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096)).for_each(|(d, p)| region.values(p, d));
         }
         let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
-        let reach = 1e-9 * norm(bounds.size());
-        let inside = depth.iter().map(|d| *d <= reach).collect();
+        let inside = depth.iter().map(|d| *d <= reach(bounds)).collect();
         Ok(SolveDomain { bounds: *bounds, grid, nodes, clamped, depth, inside, surface, given })
+    }
+
+    /// How far each node is outside the region, mm, 0 in it; `None` where none is outside. From the nearest node in it, as the field of a
+    /// region may be far less than the distance: where a cylinder that makes a hole ends, or in a film of no thickness over a hole.
+    fn outside(&self) -> Option<Vec<f64>> {
+        if !self.inside.contains(&false) {
+            return None;
+        }
+        let reach = reach(&self.bounds);
+        let within: Vec<bool> = self.depth.iter().map(|d| *d < -reach).collect();
+        let counted = [&within, &self.inside].into_iter().find(|nodes| nodes.contains(&true));
+        Some(counted.map_or_else(|| self.depth.clone(), |nodes| distances(nodes, self.grid.shape, self.grid.step)))
     }
 
     /// Where nodes are asked what is wanted.
@@ -119,6 +131,11 @@ impl SolveDomain {
     }
 }
 
+/// How far from the surface of a region a point counts as on it, mm.
+fn reach(bounds: &Aabb) -> f64 {
+    1e-9 * norm(bounds.size())
+}
+
 /// Explains that a weight is zero everywhere.
 fn no_weight() -> Fault {
     let message = "the weight is 0 everywhere, and no direction or wavelength is followed anywhere: give one above 0 where cells \
@@ -127,8 +144,11 @@ fn no_weight() -> Fault {
 }
 
 /// The frames at the nodes, and the gradients of the three phases that they and the wavelengths ask for.
+#[derive(Clone)]
 pub(super) struct Target {
     pub frames: Vec<Mat3>,
+    /// How far each node is outside the region, mm, 0 in it, if that decided on frames.
+    pub outside: Option<Vec<f64>>,
     /// How sure frames are, from 0 to 1, where that differs.
     pub trust: Option<Vec<f64>>,
     /// The range of a stress, against which directions are more or less sure; 0 for other orientations.
@@ -139,17 +159,19 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// Signs and axes that are not given are chosen so that neighbours agree, the nearest to the part first, if it is known how far each
-    /// node is `outside`.
-    pub fn new(domain: &SolveDomain, wanted: &PhaseRequest, outside: Option<&[f64]>) -> Result<Target, Fault> {
+    /// Signs and axes that are not given are chosen so that neighbours agree, those in the part first: what is asked for in a hole, or is
+    /// carried on into it from the part, may wind round a line there, and so cross the part with a seam that belongs in the hole.
+    pub fn new(domain: &SolveDomain, wanted: &PhaseRequest) -> Result<Target, Fault> {
         let weight: Vec<f64> = (0..domain.grid.len()).map(|n| domain.nearness(FALL, n).powi(2)).collect();
+        let combed = wanted.orientation.is_combed() || domain.surface.is_some();
+        let outside = if combed { domain.outside() } else { None };
         let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
         let Frames { at_nodes: frames, trust, range } = wanted.orientation.frames(
             &domain.grid,
             domain.asked_at(),
             smoothing.as_ref(),
             domain.surface.as_ref(),
-            outside,
+            outside.as_deref(),
         )?;
         checkpoint();
         let lengths = match wanted.by_principal {
@@ -164,7 +186,7 @@ impl Target {
             let of = frames.iter().zip(lengths.as_ref().unwrap_or(&domain.given));
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
         });
-        Ok(Target { frames, trust, range, lengths, k })
+        Ok(Target { frames, outside, trust, range, lengths, k })
     }
 
     /// The wavelengths at the nodes along the cell's axes, mm.

@@ -63,5 +63,9 @@ pub(super) fn matrix([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Mat3 {
 pub(super) fn range(found: &[Principal], outside: Option<&[f64]>) -> f64 {
     let counted = || found.iter().enumerate().filter(|(n, _)| outside.is_none_or(|d| d[*n] == 0.0));
     let squares: f64 = counted().map(|(_, p)| p.difference().powi(2)).sum();
-    (3.0 * squares / counted().count() as f64).sqrt()
+    match counted().count() {
+        // A thin part may have no node in it.
+        0 => range(found, None),
+        count => (3.0 * squares / count as f64).sqrt(),
+    }
 }
