@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Literal
 
 from .base import memory
@@ -115,16 +116,32 @@ def grid(
 
 
 @named
-def points(path: str | os.PathLike[str] | ArrayLike, neighbours: int | None = None, remap: Stops | None = None) -> dict:
+def points(
+    path: str | os.PathLike[str] | ArrayLike,
+    columns: Sequence[str] | None = None,
+    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
+    neighbours: int | None = None,
+    remap: Stops | None = None,
+) -> dict:
     """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
     distance.
 
-    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file. Or the rows themselves, an array
-        (n, 4) or a data frame.
+    path: Path of a table (csv) of x, y, z, value, relative to the design file. Or the rows themselves, an array (n, 4)
+        or a data frame.
+    columns: The names, in the table's first line, of x, y, z and the value; unless given, the table has these four
+        columns alone. [optional]
+    unit: Unit of the coordinates (mm unless given). [optional]
     neighbours: Number of nearest points that count. [from 1 to 64, default 8]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"points": settings(path=memory.path_of(path, memory.cloud), neighbours=neighbours, remap=pairs(remap))}
+    given = settings(
+        path=memory.path_of(path, memory.cloud),
+        columns=columns,
+        unit=unit,
+        neighbours=neighbours,
+        remap=pairs(remap),
+    )
+    return {"points": given}
 
 
 @named

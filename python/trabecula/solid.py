@@ -300,8 +300,9 @@ class Solid(Seen, Simulated, Saved, Unchanging):
     def volume_error(self, edge: float | None = None, per_cell: float | None = None) -> float | None:
         """The relative error to expect of the volume that lattices and beams have in a mesh on a grid of this spacing, without
         meshing the part: one period of each lattice is meshed and held against its fraction on the torus, and some hubs with
-        their beams against their exact volume. The realised error is at most three times as much. None where neither is meshed
-        on a grid, over tetrahedra, and of beams that overlap halfway along.
+        their beams against their exact volume; where surfaces of the region that are no planes of the grid cut lattices, a term
+        of the third power of the spacing is added. The realised error is at most three times as much. None where neither is
+        meshed on a grid, over tetrahedra, and of beams that overlap halfway along.
         """
         return self._core.volume_error(self.spacing(edge, per_cell))
 
