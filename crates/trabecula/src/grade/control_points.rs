@@ -28,7 +28,7 @@ impl ControlPoints {
             ControlPoints::Path(file) => {
                 let at = format!("{path}.path");
                 let text = environment.load(file, &at)?;
-                let rows = table(&String::from_utf8_lossy(&text), None, &[3, 4], Unit::Mm)
+                let rows = table(&String::from_utf8_lossy(&text), None, &[3, 4], Some(Unit::Mm))
                     .map_err(|f| DesignError::new(&at, format!("{file}: {}", f.message)).found(file))?;
                 let points = rows.iter().map(|r| [r[0], r[1], r[2]]).collect();
                 Ok((points, rows.iter().map(|r| r.get(3).copied()).collect()))

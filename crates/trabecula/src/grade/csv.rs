@@ -5,37 +5,39 @@ use geometry::fault::Fault;
 use geometry::formats::{column, heading};
 
 /// Rows of positions (mm) and values: of the columns `names`, or of all if none are named, as many as one of `widths`. A heading of a
-/// coordinate that has a unit has to mean `unit`.
+/// coordinate that has a unit has to mean `unit`, mm where none is given.
 pub(super) fn table(
     text: &str,
     names: Option<&[String]>,
     widths: &[usize],
-    unit: Unit,
+    unit: Option<Unit>,
 ) -> Result<Vec<Vec<f64>>, Fault> {
     let mut rows = match names {
         Some(names) => named(text, names, unit),
         None => unnamed(text, widths, unit),
     }?;
-    rows.iter_mut().for_each(|row| row[..3].iter_mut().for_each(|c| *c *= unit.in_mm()));
+    let mm = unit.map_or(1.0, Unit::in_mm);
+    rows.iter_mut().for_each(|row| row[..3].iter_mut().for_each(|c| *c *= mm));
     Ok(rows)
 }
 
 /// Refuses headings of coordinates that have another unit.
-fn check_units<'a>(headings: impl IntoIterator<Item = &'a String>, unit: Unit) -> Result<(), Fault> {
-    let names = unit.names();
-    let other = |said: &str| !said.is_empty() && !names.iter().any(|name| name.eq_ignore_ascii_case(said));
-    match headings.into_iter().find(|h| other(heading(h).1)) {
-        Some(h) => Err(Fault::new(
-            "",
-            format!("the heading \"{h}\" has another unit than {}, in which positions are read", names[0]),
-        )),
-        None => Ok(()),
-    }
+fn check_units<'a>(headings: impl IntoIterator<Item = &'a String>, unit: Option<Unit>) -> Result<(), Fault> {
+    let read = unit.unwrap_or(Unit::Mm);
+    let other = |said: &str| !said.is_empty() && !read.has_name(said);
+    let Some(found) = headings.into_iter().find(|h| other(heading(h).1)) else { return Ok(()) };
+    let said = Unit::ALL.into_iter().find(|u| unit.is_none() && u.has_name(heading(found).1));
+    let hint = said.map_or(String::new(), |u| format!("; give unit = \"{}\"", u.names()[0]));
+    let read = read.names()[0];
+    Err(Fault::new(
+        "",
+        format!("the heading \"{found}\" has another unit than {read}, in which positions are read{hint}"),
+    ))
 }
 
 /// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width. Where a
 /// header line names x, y and z, they are taken from there.
-fn unnamed(text: &str, widths: &[usize], unit: Unit) -> Result<Vec<Vec<f64>>, Fault> {
+fn unnamed(text: &str, widths: &[usize], unit: Option<Unit>) -> Result<Vec<Vec<f64>>, Fault> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut order: Vec<usize> = Vec::new();
     let what = match widths {
@@ -107,7 +109,7 @@ fn places(names: &[String]) -> Vec<usize> {
 }
 
 /// The columns that the first line names so, in this order. Other columns may hold anything.
-fn named(text: &str, names: &[String], unit: Unit) -> Result<Vec<Vec<f64>>, Fault> {
+fn named(text: &str, names: &[String], unit: Option<Unit>) -> Result<Vec<Vec<f64>>, Fault> {
     let fault = |n: usize, message: String| Fault::new("", format!("line {}: {message}", n + 1));
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines.map(|(n, l)| (n, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
@@ -145,21 +147,26 @@ mod tests {
         let row = |heading: &str, unit| {
             table(&format!("{heading}\n1,2,3,0.5\n"), None, &[4], unit).map(|rows| rows[0].clone())
         };
-        assert_eq!(row("Y [mm],X (mm),z,t", Unit::Mm).unwrap(), [2.0, 1.0, 3.0, 0.5]);
-        assert_eq!(row("t,x,y,z", Unit::Cm).unwrap(), [20.0, 30.0, 5.0, 1.0]);
-        assert_eq!(row("x (Metre),y [m],z,t [K]", Unit::M).unwrap(), [1000.0, 2000.0, 3000.0, 0.5]);
-        assert_eq!(row("a,b,c,d", Unit::Inch).unwrap(), [25.4, 50.8, 3.0 * 25.4, 0.5]);
-        let other = row("x,y [m],z,t", Unit::Mm).unwrap_err().message;
-        assert_eq!(other, "the heading \"y [m]\" has another unit than mm, in which positions are read");
+        assert_eq!(row("Y [mm],X (mm),z,t", Some(Unit::Mm)).unwrap(), [2.0, 1.0, 3.0, 0.5]);
+        assert_eq!(row("t,x,y,z", Some(Unit::Cm)).unwrap(), [20.0, 30.0, 5.0, 1.0]);
+        assert_eq!(row("x (Metre),y [m],z,t [K]", Some(Unit::M)).unwrap(), [1000.0, 2000.0, 3000.0, 0.5]);
+        assert_eq!(row("a,b,c,d", Some(Unit::Inch)).unwrap(), [25.4, 50.8, 3.0 * 25.4, 0.5]);
+        let other = row("x,y [m],z,t", None).unwrap_err().message;
+        assert_eq!(
+            other,
+            "the heading \"y [m]\" has another unit than mm, in which positions are read; give unit = \"m\""
+        );
+        let other = row("x,y [pixel],z,t", Some(Unit::Cm)).unwrap_err().message;
+        assert_eq!(other, "the heading \"y [pixel]\" has another unit than cm, in which positions are read");
 
         let tensors = "x,y,z,11,12,13,22,23,33\n1,2,3,0.1,0.6,0.5,0.2,0.4,0.3\n";
-        assert_eq!(table(tensors, None, &[9], Unit::Mm).unwrap(), [[1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]);
+        assert_eq!(table(tensors, None, &[9], None).unwrap(), [[1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]);
 
         let text = "node,X Location (m),Y Location (m),Z Location (m),Stress (Pa)\n7,1,2,3,5e6\n";
         let names = ["X Location (m)", "Y Location (m)", "Z Location (m)", "Stress (Pa)"].map(String::from);
-        assert_eq!(table(text, Some(&names), &[4], Unit::M).unwrap(), [[1000.0, 2000.0, 3000.0, 5e6]]);
-        assert!(table(text, Some(&names), &[4], Unit::Mm).is_err());
-        for unit in [Unit::Mm, Unit::Micron, Unit::Cm, Unit::M, Unit::Inch, Unit::Foot] {
+        assert_eq!(table(text, Some(&names), &[4], Some(Unit::M)).unwrap(), [[1000.0, 2000.0, 3000.0, 5e6]]);
+        assert!(table(text, Some(&names), &[4], None).is_err());
+        for unit in Unit::ALL {
             assert_eq!(unit.names()[0].parse::<Unit>().unwrap(), unit);
         }
     }

@@ -64,15 +64,15 @@ fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
 pub struct PointsKind {
     /// Path of a table (csv) of x, y, z, value, relative to the design file.
     path: String,
-    /// The names, in the table's first line, of x, y, z and the value; unless given, the table has these four columns alone.
-    columns: Option<[String; 4]>,
-    /// Unit of the coordinates (mm unless given).
-    unit: Option<Unit>,
     /// Number of nearest points that count.
     #[kind(default = 8, min = 1.0, max = 64.0)]
     neighbours: u32,
     /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
+    /// The names, in the table's first line, of x, y, z and the value; unless given, the table has these four columns alone.
+    columns: Option<[String; 4]>,
+    /// Unit of the coordinates (mm unless given).
+    unit: Option<Unit>,
 }
 
 impl BuildGrade for PointsKind {
@@ -80,8 +80,8 @@ impl BuildGrade for PointsKind {
         let (environment, at) = (of.environment, format!("{}.path", of.path));
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
-        let (columns, unit) = (self.columns.as_ref().map(<[_; 4]>::as_slice), self.unit.unwrap_or(Unit::Mm));
-        let rows = table(&String::from_utf8_lossy(&file), columns, &[4], unit).map_err(wrong)?;
+        let columns = self.columns.as_ref().map(<[_; 4]>::as_slice);
+        let rows = table(&String::from_utf8_lossy(&file), columns, &[4], self.unit).map_err(wrong)?;
         let (positions, values): (Vec<Vec3>, Vec<[f64; 1]>) = rows.iter().map(|r| ([r[0], r[1], r[2]], [r[3]])).unzip();
         let bounds = environment.region.bounds();
         check_reach(&positions, &bounds, TOUCHED, self.unit).map_err(wrong)?;
@@ -116,8 +116,8 @@ impl TableKind {
         let at = format!("{path}.path");
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
-        let (columns, unit) = (self.columns.as_ref().map(<[_; 9]>::as_slice), self.unit.unwrap_or(Unit::Mm));
-        let rows = table(&String::from_utf8_lossy(&file), columns, &[9], unit).map_err(wrong)?;
+        let columns = self.columns.as_ref().map(<[_; 9]>::as_slice);
+        let rows = table(&String::from_utf8_lossy(&file), columns, &[9], self.unit).map_err(wrong)?;
         let of = |r: &Vec<f64>| ([r[0], r[1], r[2]], [r[3], r[4], r[5], r[6], r[7], r[8]]);
         let (positions, values): (Vec<Vec3>, Vec<[f64; 6]>) = rows.iter().map(of).unzip();
         let bounds = environment.region.bounds();

@@ -377,6 +377,14 @@ impl Unit {
         }
     }
 
+    /// All units.
+    pub const ALL: [Unit; 6] = [Unit::Mm, Unit::Micron, Unit::Cm, Unit::M, Unit::Inch, Unit::Foot];
+
+    /// Whether a word is one of its names, letter case not counted.
+    pub fn has_name(self, word: &str) -> bool {
+        self.names().iter().any(|name| name.eq_ignore_ascii_case(word))
+    }
+
     /// Its names in headings of tables, that of designs first.
     pub fn names(self) -> &'static [&'static str] {
         match self {

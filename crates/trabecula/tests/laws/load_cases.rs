@@ -125,6 +125,8 @@ fn a_table_is_the_tensor_that_it_holds() {
     };
     says(&named.replace("S.S23", "S23"), &many, &["no column is named \"S23\"", "\"S.S13\", \"S.S23\""]);
     says(&named, &many.replace("PART-1.7;-0.7", "PART-1.7;-"), &["line 9", "as S.S12, found \"-\""]);
-    says(&named.replace("unit = \"m\", ", ""), &many, &["the points reach from", "unit = \"m\""]);
+    let bare = named.replace("unit = \"m\", ", "");
+    says(&bare, &many, &["the heading \"X (m)\" has another unit than mm", "give unit = \"m\""]);
+    says(&bare.replace(" (m)", ""), &many.replace(" (m)", ""), &["the points reach from", "unit = \"m\""]);
     says("{ table = { path = \"t.csv\" } }", &many, &["line 2", "nine numbers x, y, z, 11, 22, 33, 23, 13, 12"]);
 }
