@@ -115,9 +115,9 @@ pub(super) fn add_regions(
     empty
 }
 
-/// Whether a triangle whose middle is `depth` outside a region follows its surface: no farther from it than the height of an arc with
-/// the triangle's longest edge L as chord, κ L² / 8, where the curvature κ is how fast normals turn along the edges. Nodes that balance
-/// chords are off the surface by less.
+/// Whether a triangle whose middle is `depth` outside a region follows its surface: no farther from it than twice the height of an arc
+/// with the triangle's longest edge L as chord, κ L² / 4 where the curvature κ is how fast normals turn along the edges. Nodes balance the
+/// chords of all triangles about them, of which others may be half as long again.
 fn is_chord(corners: &[Vec3; 3], region: &Region, depth: f64) -> bool {
     let ends = [[0, 1], [1, 2], [2, 0]];
     let edges = ends.map(|[a, b]| norm(sub(corners[b], corners[a])));
@@ -132,7 +132,7 @@ fn is_chord(corners: &[Vec3; 3], region: &Region, depth: f64) -> bool {
     let curvature = turns.fold(0.0, f64::max);
     let [a, b, c] = *corners;
     let own = unit(cross(sub(b, a), sub(c, a)));
-    depth <= curvature * longest.powi(2) / 8.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
+    depth <= curvature * longest.powi(2) / 4.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
 }
 
 /// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
