@@ -118,28 +118,28 @@ def grid(
 @named
 def points(
     path: str | os.PathLike[str] | ArrayLike,
-    columns: Sequence[str] | None = None,
-    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     neighbours: int | None = None,
     remap: Stops | None = None,
+    columns: Sequence[str] | None = None,
+    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
 ) -> dict:
     """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
     distance.
 
     path: Path of a table (csv) of x, y, z, value, relative to the design file. Or the rows themselves, an array (n, 4)
         or a data frame.
+    neighbours: Number of nearest points that count. [from 1 to 64, default 8]
+    remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     columns: The names, in the table's first line, of x, y, z and the value; unless given, the table has these four
         columns alone. [optional]
     unit: Unit of the coordinates (mm unless given). [optional]
-    neighbours: Number of nearest points that count. [from 1 to 64, default 8]
-    remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
     given = settings(
         path=memory.path_of(path, memory.cloud),
-        columns=columns,
-        unit=unit,
         neighbours=neighbours,
         remap=pairs(remap),
+        columns=columns,
+        unit=unit,
     )
     return {"points": given}
 
