@@ -126,13 +126,15 @@ fn is_chord(corners: &[Vec3; 3], region: &Region, depth: f64) -> bool {
     if depth > longest * 2f64.sqrt() / 8.0 {
         return false;
     }
-    let (mut values, mut normals) = ([0.0; 3], [[0.0; 3]; 3]);
-    region.gradients(corners, &mut values, &mut normals);
+    // Corners may be on an edge of the region, where it faces otherwise; the middle says how it faces.
+    let [a, b, c] = *corners;
+    let middle = scale(add(add(a, b), c), 1.0 / 3.0);
+    let (mut values, mut normals) = ([0.0; 4], [[0.0; 3]; 4]);
+    region.gradients(&[a, b, c, middle], &mut values, &mut normals);
     let turns = ends.iter().zip(edges).map(|([a, b], edge)| norm(sub(normals[*a], normals[*b])) / edge);
     let curvature = turns.fold(0.0, f64::max);
-    let [a, b, c] = *corners;
     let own = unit(cross(sub(b, a), sub(c, a)));
-    depth <= curvature * longest.powi(2) / 4.0 && normals.iter().all(|n| dot(*n, own).abs() >= FACING)
+    depth <= curvature * longest.powi(2) / 4.0 && dot(normals[3], own).abs() >= FACING
 }
 
 /// Whether a name is that of a set or a domain that volume meshes have by themselves, in capitals or small letters.
