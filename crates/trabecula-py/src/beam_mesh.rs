@@ -10,7 +10,7 @@ use trabecula::report::BeamMeshReport;
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, write_as};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, forces, members, text, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -101,8 +101,7 @@ impl BeamElements {
         fields: Vec<Field>,
         abaqus: bool,
     ) -> PyResult<()> {
-        let fields = fields.into_iter().map(field).collect();
-        let text = FeText { elastic, held, loads: fe_loads(loads), fields, abaqus, ..FeText::default() };
+        let text = FeText { abaqus, ..text(elastic, held, loads, fields) };
         write_as(py, &self.made.mesh, &BEAM_FORMATS, file, text)
     }
 }

@@ -41,9 +41,15 @@ impl From<LoadArgument> for Load {
     }
 }
 
-/// Names of sets and loads as the core takes them.
-pub fn loads(of: Vec<(String, LoadArgument)>) -> Vec<(String, Load)> {
-    of.into_iter().map(|(name, load)| (name, load.into())).collect()
+/// What is written besides a mesh: materials, what is held and loaded, fields.
+pub fn text(
+    elastic: Vec<[f64; 2]>,
+    held: Vec<String>,
+    loads: Vec<(String, LoadArgument)>,
+    fields: Vec<Field>,
+) -> FeText {
+    let loads = loads.into_iter().map(|(name, load)| (name, load.into())).collect();
+    FeText { elastic, held, loads, fields: fields.into_iter().map(field).collect(), ..FeText::default() }
 }
 
 /// A set as arrays.
@@ -59,7 +65,7 @@ pub fn forces(py: Python<'_>, of: Vec<(u32, Vec3)>) -> PyResult<Forces<'_>> {
 }
 
 /// A field as the core takes it.
-pub fn field((name, components, at_nodes, values): Field) -> FeField {
+fn field((name, components, at_nodes, values): Field) -> FeField {
     FeField { name, components, at_nodes, values }
 }
 

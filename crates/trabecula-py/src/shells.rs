@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use geometry::formats::{FeText, SHELL_FORMATS};
+use geometry::formats::SHELL_FORMATS;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use trabecula::report::ShellReport;
@@ -10,7 +10,7 @@ use trabecula::shell_mesh::{MeshedShell, Options};
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, write_as};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, forces, members, text, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -100,13 +100,7 @@ impl Shells {
         loads: Vec<(String, LoadArgument)>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let text = FeText {
-            elastic,
-            held,
-            loads: fe_loads(loads),
-            fields: fields.into_iter().map(field).collect(),
-            ..FeText::default()
-        };
+        let text = text(elastic, held, loads, fields);
         write_as(py, &self.made.mesh, &SHELL_FORMATS, file, text)
     }
 }

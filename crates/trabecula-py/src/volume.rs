@@ -15,7 +15,7 @@ use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, to_file};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, forces, members, text, to_file};
 use crate::file;
 use crate::mesh::Mesh;
 use crate::report::report;
@@ -183,8 +183,7 @@ impl VolumeMesh {
         let format = FE_FORMATS.iter().find(|f| f.suffix == suffix);
         let format =
             format.ok_or_else(|| PyValueError::new_err(format!("no format of volume meshes is named {suffix}")))?;
-        let fields = fields.into_iter().map(field).collect();
-        let text = FeText { title, elastic, cubic, held, loads: fe_loads(loads), fields, ..FeText::default() };
+        let text = FeText { title, cubic, ..text(elastic, held, loads, fields) };
         to_file(py, &path, |out| (format.write)(self.mesh(), &text, out))
     }
 

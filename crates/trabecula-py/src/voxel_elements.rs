@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use geometry::fe_mesh::HexMesh;
-use geometry::formats::{FeText, HEX_FORMATS};
+use geometry::formats::HEX_FORMATS;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use trabecula::report::VoxelElementsReport;
 
 use crate::arrays::table;
 use crate::error;
-use crate::fe_arrays::{Field, Forces, LoadArgument, Members, field, forces, loads as fe_loads, members, write_as};
+use crate::fe_arrays::{Field, Forces, LoadArgument, Members, forces, members, text, write_as};
 use crate::report::report;
 use crate::run::run;
 use crate::solid::Solid;
@@ -89,13 +89,7 @@ impl VoxelElements {
         loads: Vec<(String, LoadArgument)>,
         fields: Vec<Field>,
     ) -> PyResult<()> {
-        let text = FeText {
-            elastic,
-            held,
-            loads: fe_loads(loads),
-            fields: fields.into_iter().map(field).collect(),
-            ..FeText::default()
-        };
+        let text = text(elastic, held, loads, fields);
         write_as(py, &self.mesh, &HEX_FORMATS, file, text)
     }
 }
