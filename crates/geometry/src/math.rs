@@ -126,6 +126,12 @@ pub fn rotation(degrees: Vec3) -> Mat3 {
     product(&rx, &product(&ry, &rz))
 }
 
+/// A vector turned about a unit vector n by an angle of this sine and cosine, by the right-hand rule: v cos + (n × v) sin + n (n·v) (1 − cos),
+/// Rodrigues' formula.
+pub fn turned(v: Vec3, n: Vec3, (sine, cosine): (f64, f64)) -> Vec3 {
+    add(add(scale(v, cosine), scale(cross(n, v), sine)), scale(n, (1.0 - cosine) * dot(n, v)))
+}
+
 /// A complex number (re, im).
 pub type Complex = (f64, f64);
 
@@ -267,6 +273,12 @@ impl Aabb {
     /// The box grown by `by` on every side.
     pub fn grown(self, by: f64) -> Aabb {
         Aabb { min: self.min.map(|v| v - by), max: self.max.map(|v| v + by) }
+    }
+
+    /// The point at these shares of its edges, each from 0 to 1.
+    pub fn at(&self, share: Vec3) -> Vec3 {
+        let size = self.size();
+        core::array::from_fn(|a| self.min[a] + size[a] * share[a])
     }
 
     /// Its middle.

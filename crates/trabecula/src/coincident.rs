@@ -120,12 +120,7 @@ type Sample = (Vec3, Vec3);
 
 /// Sample points of a surface within the bounds.
 fn samples(surface: &dyn Field, bounds: &Aabb) -> Vec<Sample> {
-    let size = bounds.size();
-    let position = |i: usize| {
-        let u = low_discrepancy(i + 1);
-        core::array::from_fn(|a| bounds.min[a] + size[a] * u[a])
-    };
-    let mut points: Vec<Vec3> = (0..SAMPLES).map(position).collect();
+    let mut points: Vec<Vec3> = (0..SAMPLES).map(|i| bounds.at(low_discrepancy(i + 1))).collect();
     let (mut values, mut gradients) = (vec![0.0; SAMPLES], vec![[0.0; 3]; SAMPLES]);
     for _ in 0..4 {
         surface.gradients(&points, &mut values, &mut gradients);
@@ -137,7 +132,7 @@ fn samples(surface: &dyn Field, bounds: &Aabb) -> Vec<Sample> {
         }
     }
     surface.gradients(&points, &mut values, &mut gradients);
-    let tolerance = TOLERANCE * norm(size);
+    let tolerance = TOLERANCE * norm(bounds.size());
     (0..SAMPLES)
         .filter(|&i| values[i].abs() <= tolerance && bounds.distance(points[i]) <= tolerance)
         .map(|i| (points[i], geometry::math::unit(gradients[i])))

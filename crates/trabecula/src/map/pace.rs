@@ -208,10 +208,7 @@ impl<'a> Probe<'a> {
         if wanted.orientation.is_constant() && wanted.wavelength.iter().all(|g| g.constant().is_some()) {
             return Ok(None);
         }
-        let size = bounds.size();
-        let mut points: Vec<Vec3> = (0..POINTS[1])
-            .map(|i| core::array::from_fn(|a| bounds.min[a] + low_discrepancy(i + 1)[a] * size[a]))
-            .collect();
+        let mut points: Vec<Vec3> = (0..POINTS[1]).map(|i| bounds.at(low_discrepancy(i + 1))).collect();
         if let Some(region) = region {
             let mut depth = vec![0.0; points.len()];
             region.values(&points, &mut depth);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::smooth_frames::Octahedral;
 use crate::field::Field;
 use geometry::fault::{Fault, number};
-use geometry::math::{Mat3, Vec3, add, cross, dot, norm, scale, transpose};
+use geometry::math::{Mat3, Vec3, cross, dot, norm, scale, transpose, turned};
 
 /// The part of the depth over which frames are averaged.
 const AVERAGED: f64 = 0.5;
@@ -107,12 +107,7 @@ fn turned_to(frame: &Mat3, normal: Vec3, share: f64) -> Mat3 {
     let (about, angle) = (scale(about, 1.0 / sine), sine.atan2(cosine));
     let clear = smooth_step((CLEAR[1] - angle.to_degrees()) / (CLEAR[1] - CLEAR[0]));
     let (s, c) = (share * clear * angle).sin_cos();
-    // Rodrigues' formula.
-    let turned = axes.map(|v| {
-        let along = scale(about, (1.0 - c) * dot(about, v));
-        add(add(scale(v, c), scale(cross(about, v), s)), along)
-    });
-    transpose(&turned)
+    transpose(&axes.map(|v| turned(v, about, (s, c))))
 }
 
 /// A frame whose third axis is along a normal.

@@ -89,12 +89,8 @@ fn packed(class: &[Body], s: usize, share: f64) -> Surface {
 /// Whether surface `s` is the same function for all bodies of a class, such as the plane on which they stand.
 fn is_one(class: &[Body], s: usize) -> bool {
     let bounds = class.iter().fold(Aabb::EMPTY, |all, b| all.union(b.bounds));
-    let (size, far) = (bounds.size(), norm(bounds.min).max(norm(bounds.max)));
-    let point = |i: usize| {
-        let u = low_discrepancy(i + 1);
-        core::array::from_fn(|a| bounds.min[a] + size[a] * u[a])
-    };
-    let points: Vec<Vec3> = (0..SAMPLES).map(point).collect();
+    let far = norm(bounds.min).max(norm(bounds.max));
+    let points: Vec<Vec3> = (0..SAMPLES).map(|i| bounds.at(low_discrepancy(i + 1))).collect();
     let values = |b: &Body| {
         let mut out = vec![0.0; SAMPLES];
         b.surfaces[s].field.values(&points, &mut out);

@@ -9,9 +9,7 @@ use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::{Key, Kind};
 use geometry::fault::{Fault, number};
-use geometry::math::{
-    Aabb, IDENTITY, Interval, Mat3, Vec3, add, cross, product, rotation, scale, sin_cos_turns, transpose,
-};
+use geometry::math::{self, Aabb, IDENTITY, Interval, Mat3, Vec3, product, rotation, sin_cos_turns, transpose};
 
 /// Most degrees of an angle: beyond, whole turns cost digits.
 const MOST_DEGREES: f64 = 1e6;
@@ -122,13 +120,8 @@ pub(super) fn turned(at: &str, axis: Vec3, degrees: f64) -> Result<Mat3, Fault> 
         angles[a] = n[a] * degrees;
         return Ok(rotation(angles));
     }
-    let (s, c) = sin_cos_turns(degrees / 360.0);
-    // Each column is the image of an axis: c e + (1 − c) (n·e) n + s n × e.
-    let image = |a: usize| {
-        let e = IDENTITY[a];
-        add(add(scale(e, c), scale(n, (1.0 - c) * n[a])), scale(cross(n, e), s))
-    };
-    Ok(transpose(&[0, 1, 2].map(image)))
+    let by = sin_cos_turns(degrees / 360.0);
+    Ok(transpose(&IDENTITY.map(|e| math::turned(e, n, by))))
 }
 
 /// The reflection in a plane through the origin of this normal, of any length. `at` names it in a fault.
