@@ -13,7 +13,7 @@ use crate::grade::{Quantity, key_of};
 use crate::kind::{DesignError, Warning};
 use crate::region::{FaceSet, HalfSpace, Intersection, Notes, OpenSurface, Region, joint};
 use crate::skin::{outside, skin};
-use geometry::fault::{number, position};
+use geometry::fault::number;
 use geometry::math::Vec3;
 
 /// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `region`.
@@ -100,13 +100,8 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         places.push(path);
     }
     let width = Varied::of_grade(&thickness, environment);
-    if let Some(p) = joint(region, points, width.max) {
-        let message = format!(
-            "the skin is a wall at {}, inside the region, where parts of a union only touch: faces that two have in common count as surface; \
-             let the parts overlap by {} mm, or make them one mesh",
-            position(p),
-            number(2.0 * width.max)
-        );
+    if let Some(place) = joint(region, points, width.max, width.max) {
+        let message = format!("the skin is a wall {place}");
         environment.notes.borrow_mut().warnings.push(Warning { path: path.into(), message });
     }
     let deepest = || {

@@ -6,7 +6,7 @@ use super::{BuildGrade, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind, Warning};
 use crate::region::{DistanceTable, Region, RegionKind, joint};
-use geometry::fault::{Fault, number, position};
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// By depth below a surface: piecewise linear, constant beyond the ends.
@@ -29,13 +29,8 @@ impl BuildGrade for DepthKind {
         };
         let depth = Depth::of(region.clone(), of.stops(self.stops.clone()));
         let last = depth.stops.ends().hi;
-        if let Some(p) = joint(&region, of.environment.points, last) {
-            let message = format!(
-                "depth falls to 0 at {}, inside the region, where parts of a union only touch: faces that two have in common count as \
-                 surface; let the parts overlap by {} mm, or make them one mesh",
-                position(p),
-                number(2.0 * last)
-            );
+        if let Some(place) = joint(&region, of.environment.points, last, last) {
+            let message = format!("depth falls to 0 {place}");
             of.environment.notes.borrow_mut().warnings.push(Warning { path: of.path.clone(), message });
         }
         Ok(depth.into())

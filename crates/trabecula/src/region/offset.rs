@@ -7,7 +7,7 @@ use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
-use geometry::fault::{Fault, number, position};
+use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3};
 use geometry::random::low_discrepancy;
 
@@ -25,31 +25,22 @@ pub struct OffsetKind {
 impl BuildRegion for OffsetKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let of = context.below("of", |context| self.of.build(context))?;
-        if let Some(p) = divided(&of, self.by) {
-            context.warn(format!(
-                "shrinking divides the region at {}, where parts of a union only touch: faces that two have in common count as surface; \
-                 let the parts overlap by {} mm, or make them one mesh",
-                position(p),
-                number(-2.0 * self.by)
-            ));
+        if let Some(place) = divided(&of, self.by) {
+            context.warn(format!("shrinking divides it {place}"));
         }
         Ok(Arc::new(Offset::new(of, self.by)?))
     }
 }
 
-/// A position at which a region is divided when it is shrunk, since parts of it only touch there.
-fn divided(region: &Region, by: f64) -> Option<Vec3> {
+/// Where a region is divided when it is shrunk, since parts of it only touch there, in words.
+fn divided(region: &Region, by: f64) -> Option<String> {
     const SAMPLES: usize = 4096;
     let bounds = region.bounds();
     if by >= 0.0 || !bounds.is_finite() {
         return None;
     }
-    let size = bounds.size();
-    let at = |k: usize| {
-        let share = low_discrepancy(k);
-        core::array::from_fn(|a| bounds.min[a] + share[a] * size[a])
-    };
-    joint(region, &(0..SAMPLES).map(at).collect::<Vec<_>>(), f64::INFINITY)
+    let points: Vec<Vec3> = (0..SAMPLES).map(|k| bounds.at(low_discrepancy(k))).collect();
+    joint(region, &points, f64::INFINITY, -by)
 }
 
 /// A region grown (positive) or shrunk (negative): d − by.
