@@ -17,7 +17,7 @@ reports
 io
 pictures
 jobs
-beams blend cell grade layers level levels map quadors thickness transition voxels
+beams blend cell finite_elements grade layers level levels map quadors thickness transition voxels
 mesh
 parts region volumes
 carrier

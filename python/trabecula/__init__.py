@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .carrier import Carrier
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
+    from .finite_elements import VolumeSet
     from .laws import Law, law
     from .layers import Layer, Layers
     from .levels import fraction, iso
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
-    from .volumes import BeamMesh, ShellMesh, VolumeMesh, VolumeSet, VoxelElements
+    from .volumes import BeamMesh, ShellMesh, VolumeMesh, VoxelElements
     from .voxels import Voxels
 
 __all__ = [
@@ -106,7 +107,7 @@ _HOMES = {
     "BeamMesh": "volumes",
     "ShellMesh": "volumes",
     "VoxelElements": "volumes",
-    "VolumeSet": "volumes",
+    "VolumeSet": "finite_elements",
     "Voxels": "voxels",
     "objective": "sweeps.table",
     "spartan": "design",

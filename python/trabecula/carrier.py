@@ -10,7 +10,8 @@ from . import _core
 from .base.files import extension
 from .base.formats import VOLUME_WRITES
 from .base.given import fixed, poisson, positive, thread_count, whole
-from .volumes import Load, VolumeMesh, check_order
+from .finite_elements import Load
+from .volumes import VolumeMesh, check_order
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:

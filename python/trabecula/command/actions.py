@@ -27,9 +27,10 @@ from ..base.terminal import Progress, figure, put_json, say, settle, warned
 from ..base.texts import counted
 from ..carrier import Carrier
 from ..errors import DesignError, Refused, WrongUsage
+from ..finite_elements import FiniteElements, check_steps
 from ..mesh import region_of_file
 from ..pictures.local_fields import fields_at
-from ..volumes import FiniteElements, check_case, check_order, check_solver, check_steps
+from ..volumes import check_case, check_order, check_solver
 from ..voxels import fits_file
 from .catalogue import cell_facts, cell_words, tet_cell_words, unit_cell_words
 from .drawing import render

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..volumes import FiniteElements
+    from ..finite_elements import FiniteElements
 
 __all__ = ["write"]
 
