@@ -12,92 +12,7 @@ pub use pattern_field::PatternField;
 
 use crate::graph::{Beam, Graph, Hub, Profile};
 use geometry::fault::{Fault, counted, number};
-use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, product, rotation, scale, sub, transpose};
-
-/// A similarity x → s R x + t.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Similarity {
-    /// s, positive.
-    pub scale: f64,
-    /// R, a rotation.
-    pub rotation: Mat3,
-    /// t, mm.
-    pub shift: Vec3,
-}
-
-impl Similarity {
-    /// The identity.
-    pub const IDENTITY: Similarity = Similarity { scale: 1.0, rotation: IDENTITY, shift: [0.0; 3] };
-
-    /// Scaling by s and rotation (degrees about x, y, z; z first) about a fixed point, then translation (mm).
-    pub fn new(s: f64, rotate: Vec3, about: Vec3, by: Vec3) -> Similarity {
-        let rotation = rotation(rotate);
-        Similarity { scale: s, rotation, shift: add(by, sub(about, scale(apply(&rotation, about), s))) }
-    }
-
-    /// Whether it is a translation.
-    pub fn is_translation(&self) -> bool {
-        self.rotation == IDENTITY && self.scale == 1.0
-    }
-
-    /// The image of a point.
-    pub fn apply(&self, p: Vec3) -> Vec3 {
-        add(scale(apply(&self.rotation, p), self.scale), self.shift)
-    }
-
-    /// The composition: this after `first`.
-    pub fn after(&self, first: &Similarity) -> Similarity {
-        Similarity {
-            scale: self.scale * first.scale,
-            rotation: product(&self.rotation, &first.rotation),
-            shift: self.apply(first.shift),
-        }
-    }
-
-    /// The inverse.
-    pub fn inverse(&self) -> Similarity {
-        let rotation = transpose(&self.rotation);
-        let s = 1.0 / self.scale;
-        Similarity { scale: s, rotation, shift: scale(apply(&rotation, self.shift), -s) }
-    }
-
-    /// The powers 0 to `count` − 1.
-    pub fn powers(&self, count: usize) -> Vec<Similarity> {
-        let next = |p: &Similarity| Some(self.after(p));
-        std::iter::successors(Some(Similarity::IDENTITY), next).take(count).collect()
-    }
-
-    /// Angle of the rotation, degrees.
-    pub fn angle(&self) -> f64 {
-        let r = &self.rotation;
-        let sine = geometry::math::norm([r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]);
-        sine.atan2(r[0][0] + r[1][1] + r[2][2] - 1.0).to_degrees()
-    }
-
-    /// The first power below `count` that is the identity, within rounding at points up to `size` (mm) from the origin.
-    pub fn period(&self, count: u32, size: f64) -> Option<u32> {
-        if self.scale != 1.0 || self.is_translation() && self.shift != [0.0; 3] {
-            return None;
-        }
-        let far = size + geometry::math::norm(self.shift);
-        let mut power = *self;
-        (1..count.min(LONGEST_PERIOD)).find(|n| {
-            let off = 1e-12 + 1e-15 * f64::from(*n);
-            let turned = (0..9).any(|i| (power.rotation[i / 3][i % 3] - IDENTITY[i / 3][i % 3]).abs() > off);
-            let same = !turned && power.shift.iter().all(|t| t.abs() <= off * far);
-            power = self.after(&power);
-            same
-        })
-    }
-
-    /// Whether the two commute, within rounding at points up to `size` (mm) from the origin.
-    pub fn commutes(&self, other: &Similarity, size: f64) -> bool {
-        let (a, b) = (self.after(other), other.after(self));
-        let rotation = (0..9).all(|n| (a.rotation[n / 3][n % 3] - b.rotation[n / 3][n % 3]).abs() < 1e-12);
-        let far = size + geometry::math::norm(a.shift);
-        rotation && (0..3).all(|i| (a.shift[i] - b.shift[i]).abs() < 1e-12 * far)
-    }
-}
+use geometry::similarity::Similarity;
 
 /// A strut of a pattern: from a node at index [i, j, k] to a node at [i, j, k] + `by`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,9 +36,6 @@ pub struct Pattern {
     pub steps: [(Similarity, u32); 3],
 }
 
-/// Most repeats among which a step is searched for one that comes back to where it began.
-const LONGEST_PERIOD: u32 = 100_000;
-
 /// Maximum number of distinct hubs.
 const MAX_DISTINCT_HUBS: f64 = 1e6;
 
@@ -146,9 +58,9 @@ impl Pattern {
     pub fn check(&self) -> Result<(), Fault> {
         let size = self.nodes.iter().map(|h| geometry::math::norm(h.center)).fold(0.0, f64::max);
         for (a, (step, count)) in self.steps.iter().enumerate() {
-            if !(step.scale > 0.0 && step.scale.is_finite()) || *count == 0 {
+            if !(step.scale() > 0.0 && step.scale().is_finite()) || *count == 0 {
                 let message =
-                    format!("repeat count and scale must be positive, found {count} and {}", number(step.scale));
+                    format!("repeat count and scale must be positive, found {count} and {}", number(step.scale()));
                 return Err(Fault::new(format!("repeat[{a}]"), message));
             }
             if let Some(period) = step.period(*count, size) {
@@ -206,7 +118,7 @@ impl Pattern {
         let home = self.at(index).inverse();
         let ball = |n: u32, index: [u32; 3]| {
             let (at, h) = (home.after(&self.at(index)), self.nodes[n as usize]);
-            Hub { center: at.apply(h.center), radius: at.scale * h.radius }
+            Hub { center: at.point(h.center), radius: at.scale() * h.radius }
         };
         let mut star = Graph { hubs: vec![ball(node, index)], beams: Vec::new() };
         for s in &self.struts {
@@ -228,7 +140,7 @@ impl Pattern {
                 star.hubs.push(ball(s.ends[1 - end], other));
                 star.beams.push(Beam {
                     ends,
-                    profile: Pattern::scaled_profile(s.profile, home.scale * self.at(first).scale),
+                    profile: Pattern::scaled_profile(s.profile, home.scale() * self.at(first).scale()),
                 });
             }
         }
@@ -256,7 +168,7 @@ impl Pattern {
             let at = self.at(index);
             graph
                 .hubs
-                .extend(self.nodes.iter().map(|h| Hub { center: at.apply(h.center), radius: at.scale * h.radius }));
+                .extend(self.nodes.iter().map(|h| Hub { center: at.point(h.center), radius: at.scale() * h.radius }));
         }
         for index in indices() {
             for s in &self.struts {
@@ -264,7 +176,7 @@ impl Pattern {
                 if (0..3).all(|a| (0..i64::from(self.steps[a].1)).contains(&other[a])) {
                     graph.beams.push(Beam {
                         ends: [number(s.ends[0], index), number(s.ends[1], other.map(|v| v as u32))],
-                        profile: Pattern::scaled_profile(s.profile, self.at(index).scale),
+                        profile: Pattern::scaled_profile(s.profile, self.at(index).scale()),
                     });
                 }
             }

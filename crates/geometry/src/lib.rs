@@ -70,6 +70,7 @@ mod remesh;
 pub mod render;
 pub mod repair;
 pub mod roots;
+pub mod similarity;
 pub mod simplify;
 pub mod smooth;
 pub mod spatial_order;

@@ -8,12 +8,13 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::{MAX_DISTINCT_HUBS, Pattern, Similarity, Strut};
+use super::{MAX_DISTINCT_HUBS, Pattern, Strut};
 use crate::graph::Graph;
 use crate::quador::{Fillet, Quadors};
 use box_tree::BoxTree;
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Interval, Vec3, add, apply, norm, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, sub};
+use geometry::similarity::Similarity;
 use index_classes::IndexClasses;
 
 /// The hub that represents its class.
@@ -103,10 +104,10 @@ impl PatternField {
         }
         let quadors = Quadors::new(&graph, fillet)?;
         let inverses: [Vec<Similarity>; 3] = core::array::from_fn(|a| match &pattern.steps[a] {
-            (step, _) if step.is_translation() => Vec::new(),
+            (step, _) if step.shift().is_some() => Vec::new(),
             (step, count) => step.inverse().powers(*count as usize),
         });
-        let last_scale = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1).min(1.0);
+        let last_scale = |s: &(Similarity, u32)| s.0.scale().powi(s.1 as i32 - 1).min(1.0);
         let min_scale = pattern.steps.iter().map(last_scale).product();
         let thick = pattern.nodes.iter().map(|h| h.radius).sum::<f64>() / pattern.nodes.len() as f64;
         let mut field = PatternField {
@@ -134,7 +135,10 @@ impl PatternField {
     fn inverse_power(&self, step: usize, n: usize) -> Similarity {
         match self.inverses[step].get(n) {
             Some(done) => *done,
-            None => Similarity { shift: scale(self.pattern.steps[step].0.shift, -(n as f64)), ..Similarity::IDENTITY },
+            None => {
+                let by = self.pattern.steps[step].0.shift().unwrap_or_default();
+                Similarity::translation(scale(by, -(n as f64)))
+            }
         }
     }
 
@@ -159,19 +163,19 @@ impl PatternField {
             let ((by, _), (first, n)) = (&steps[step], self.classes[step].members(class));
             let power = |n: usize| self.inverse_power(step, n).inverse();
             let last = first + n - 1;
-            let between = if by.is_translation() { first..first } else { first..last };
-            let ends = image_bounds(&power(first), &b).union(image_bounds(&power(last), &b));
-            between.fold(ends, |all, n| all.union(image_bounds(&power(n), &b)))
+            let between = if by.shift().is_some() { first..first } else { first..last };
+            let ends = power(first).bounds(&b).union(power(last).bounds(&b));
+            between.fold(ends, |all, n| all.union(power(n).bounds(&b)))
         };
         let (mut row_trees, mut row_bounds, mut home) = (Vec::new(), Vec::new(), Aabb::EMPTY);
         for b in 0..classes_v {
             let at: Vec<Aabb> = (0..classes_u).map(|a| own(a, b)).collect();
             home = at.iter().fold(home, |all, b| all.union(*b));
-            if steps[0].0.is_translation() {
+            if steps[0].0.shift().is_some() {
                 let line = (0..classes_u).map(|a| spread(0, a, at[a]));
                 row_bounds.push(line.fold(Aabb::EMPTY, Aabb::union));
             } else {
-                let of = |i: usize| image_bounds(&self.inverse_power(0, i).inverse(), &at[self.classes[0].of(i)]);
+                let of = |i: usize| self.inverse_power(0, i).inverse().bounds(&at[self.classes[0].of(i)]);
                 let row = BoxTree::of((0..self.classes[0].count).map(of).collect());
                 row_bounds.push(row.all());
                 row_trees.push(row);
@@ -208,7 +212,7 @@ impl PatternField {
         let meets = |b: &Aabb, held: &Aabb| !b.intersection(*held).is_empty();
         for k in candidate_repeats(w, p, &self.layer_bounds) {
             let inverse_w = self.inverse_power(2, k);
-            let in_layer = image_bounds(&inverse_w, p);
+            let in_layer = inverse_w.bounds(p);
             if !meets(&in_layer, &self.layer_bounds) {
                 continue;
             }
@@ -216,14 +220,14 @@ impl PatternField {
             for j in candidate_repeats(v, &in_layer, &self.widest_row) {
                 let b = self.classes[1].of(j);
                 let inverse_v = self.inverse_power(1, j);
-                let in_line = image_bounds(&inverse_v, &in_layer);
+                let in_line = inverse_v.bounds(&in_layer);
                 if !meets(&in_line, &self.row_bounds[b]) {
                     continue;
                 }
                 let mut one = |i: usize| {
                     let inverse_u = self.inverse_power(0, i);
-                    let home = image_bounds(&inverse_u, &in_line);
-                    let s = 1.0 / (inverse_u.scale * inverse_v.scale * inverse_w.scale);
+                    let home = inverse_u.bounds(&in_line);
+                    let s = 1.0 / (inverse_u.scale() * inverse_v.scale() * inverse_w.scale());
                     let first = ((c * classes_v + b) * classes_u + self.classes[0].of(i)) * nodes;
                     found([i, j, k], first, home, s)
                 };
@@ -300,7 +304,7 @@ impl PatternField {
         let nodes = self.pattern.nodes.len();
         let [classes_u, classes_v, _] = self.classes.map(|c| c.len());
         let sum = |step: usize, class: usize| {
-            let s = self.pattern.steps[step].0.scale.powi(3);
+            let s = self.pattern.steps[step].0.scale().powi(3);
             let (first, n) = self.classes[step].members(class);
             let all = if s == 1.0 { n as f64 } else { (s.powi(n as i32) - 1.0) / (s - 1.0) };
             s.powi(first as i32) * all
@@ -340,7 +344,7 @@ impl PatternField {
 
     /// The minimum and maximum scale.
     pub fn scales(&self) -> [f64; 2] {
-        let last = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1);
+        let last = |s: &(Similarity, u32)| s.0.scale().powi(s.1 as i32 - 1);
         let each = self.pattern.steps.iter().map(last);
         [self.min_scale, each.map(|s| s.max(1.0)).product()]
     }
@@ -354,7 +358,7 @@ impl PatternField {
             let from = s.offset.map(|n| (-n).max(0).unsigned_abs());
             let [a, b] = s.ends.map(|n| pattern.nodes[n as usize].center);
             let (p, q) = (pattern.at(from), pattern.at(back));
-            norm(sub(q.apply(b), p.apply(a))) / p.scale.max(q.scale)
+            norm(sub(q.point(b), p.point(a))) / p.scale().max(q.scale())
         };
         let mean = pattern.struts.iter().map(length).sum::<f64>() / pattern.struts.len() as f64;
         mean * self.min_scale
@@ -372,29 +376,14 @@ impl PatternField {
     }
 }
 
-/// Bounding box of the image of a box.
-fn image_bounds(by: &Similarity, b: &Aabb) -> Aabb {
-    if b.is_empty() {
-        return *b;
-    }
-    if by.is_translation() {
-        return Aabb { min: add(b.min, by.shift), max: add(b.max, by.shift) };
-    }
-    let (middle, half) = (by.apply(b.center()), scale(b.size(), 0.5 * by.scale));
-    let reach = apply(&by.rotation.map(|row| row.map(f64::abs)), half);
-    Aabb { min: sub(middle, reach), max: add(middle, reach) }
-}
-
 /// The repeats n for which the inverse image of p under n steps may meet b: by division for translations, otherwise
 /// all.
 fn candidate_repeats((step, count): &(Similarity, u32), p: &Aabb, b: &Aabb) -> std::ops::Range<usize> {
     let count = *count as usize;
-    if !step.is_translation() {
-        return 0..count;
-    }
+    let Some(by) = step.shift() else { return 0..count };
     let (mut low, mut high) = (0.0f64, count as f64 - 1.0);
     for a in 0..3 {
-        let t = step.shift[a];
+        let t = by[a];
         if t == 0.0 {
             if p.max[a] < b.min[a] || p.min[a] > b.max[a] {
                 return 0..0;

@@ -11,8 +11,10 @@ use crate::kind::DesignError;
 use crate::report::{BeamsReport, PatternReport};
 use crate::truss::Beams;
 use ::beams::graph::{Hub, Profile};
-use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
+use ::beams::pattern::{Pattern, PatternField, Strut};
 use geometry::fault::{counted, number};
+use geometry::math::rotation;
+use geometry::similarity::Similarity;
 
 /// The pattern of a design, filling the region.
 pub(super) fn laid(
@@ -61,7 +63,7 @@ pub(super) fn laid(
             );
             return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
         }
-        *step = (Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by), repeat.count);
+        *step = (Similarity::new(repeat.scale, rotation(repeat.rotate), repeat.about, repeat.by), repeat.count);
     }
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;

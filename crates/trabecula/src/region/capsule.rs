@@ -4,13 +4,14 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, Similarity, one_surface};
+use super::{BuildRegion, Context, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::{Key, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
+use geometry::similarity::Similarity;
 
 /// A capsule: all points within a distance of a straight segment.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]

@@ -6,15 +6,14 @@ use super::alike_bodies::{self, Body};
 use super::halfspace::polyhedron_bounds;
 use super::meshes::List;
 use super::narrowed::{self, MANY};
-use super::{
-    BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, Similarity, bodies,
-};
+use super::{BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
+use geometry::similarity::Similarity;
 
 /// Points in any of the regions.
 #[derive(Clone, Debug, PartialEq, Kind)]

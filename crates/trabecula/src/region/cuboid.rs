@@ -5,13 +5,14 @@ use std::sync::Arc;
 use super::halfspace::flat;
 use super::moved::{Moved, lost};
 use super::primitive::{field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::{Key, Kind};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, sub};
+use geometry::similarity::Similarity;
 
 /// An axis-aligned box, by its size and centre, or by two corners.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]

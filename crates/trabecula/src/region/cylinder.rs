@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::halfspace::flat;
 use super::primitive::{along, apart, coordinate_axis, direction, field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::similarity::Similarity;
 
 /// A straight round cylinder.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]

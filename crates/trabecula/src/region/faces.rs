@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, Context, Region, Shape, Similarity, cad, halving, one_surface};
+use super::{BuildRegion, Context, Region, Shape, cad, halving, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -11,6 +11,7 @@ use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::TriangleBvh;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, norm, scale};
+use geometry::similarity::Similarity;
 
 /// All points within a distance of faces of the design's region, as its STEP file names them.
 #[derive(Clone, Debug, PartialEq, Kind)]

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::primitive::{along, coordinate_axis, direction, field, fill_rows};
-use super::{BuildRegion, Context, FARTHEST, Region, Shape, Similarity, one_surface};
+use super::{BuildRegion, Context, FARTHEST, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::{Plane, Surface};
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
+use geometry::similarity::Similarity;
 
 /// One side of a plane; it bounds nothing alone, so combine it.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]

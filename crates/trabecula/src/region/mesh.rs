@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{CadMesh, Offset, OpenSurface, Region, Shape, Similarity, one_surface};
+use super::{CadMesh, Offset, OpenSurface, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -14,6 +14,7 @@ use geometry::feature_edges::{Creases, creases};
 use geometry::math::{Aabb, Interval, Vec3, cross, norm, sub};
 use geometry::mesh::Mesh;
 use geometry::repair::{Repair, Repaired};
+use geometry::similarity::Similarity;
 
 mod open;
 

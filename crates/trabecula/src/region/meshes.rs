@@ -5,8 +5,9 @@
 
 use std::sync::Arc;
 
-use super::{MeshRegion, Region, Similarity};
+use super::{MeshRegion, Region};
 use geometry::fault::Fault;
+use geometry::similarity::Similarity;
 
 /// Regions that are combined.
 pub(super) struct List {

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::primitive::{coordinate_axis, direction};
-use super::{BuildRegion, Context, HalfSpace, Region, RegionKind, Shape, Similarity};
+use super::{BuildRegion, Context, HalfSpace, Region, RegionKind, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::{Key, Kind};
 use geometry::fault::{Fault, number};
 use geometry::math::{self, Aabb, IDENTITY, Interval, Mat3, Vec3, product, rotation, sin_cos_turns, transpose};
+use geometry::similarity::Similarity;
 
 /// Most degrees of an angle: beyond, whole turns cost digits.
 const MOST_DEGREES: f64 = 1e6;
@@ -200,7 +201,7 @@ impl Shape for Moved {
         let (first, mut own) = (out.len(), Vec::new());
         let tree = self.of.clone().surfaces(by / self.field.by.scale(), &mut own);
         for surface in own {
-            self.field.by.surface(surface, out);
+            push_image(surface, &self.field.by, out);
         }
         tree.renumbered(first)
     }
@@ -256,15 +257,13 @@ impl Field for MovedField {
     }
 }
 
-impl Similarity {
-    /// Adds the image of a surface that is a distance.
-    fn surface(&self, of: Surface, out: &mut Vec<Surface>) {
-        match of.plane {
-            Some(plane) => drop(Arc::new(HalfSpace::of_plane(plane).image(self)).surfaces(0.0, out)),
-            None => {
-                let field = Arc::new(MovedField { of: of.field, by: *self });
-                out.push(Surface { field, pair: None, creases: Arc::default(), mesh: None, ..of });
-            }
+/// Adds the image of a surface that is a distance.
+fn push_image(of: Surface, by: &Similarity, out: &mut Vec<Surface>) {
+    match of.plane {
+        Some(plane) => drop(Arc::new(HalfSpace::of_plane(plane).image(by)).surfaces(0.0, out)),
+        None => {
+            let field = Arc::new(MovedField { of: of.field, by: *by });
+            out.push(Surface { field, pair: None, creases: Arc::default(), mesh: None, ..of });
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape, Similarity, joint};
+use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape, joint};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -10,6 +10,7 @@ use crate::kind::Kind;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3};
 use geometry::random::low_discrepancy;
+use geometry::similarity::Similarity;
 
 /// A region grown or shrunk by a distance.
 #[derive(Clone, Debug, PartialEq, Kind)]

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use super::moved::{moved, turned};
-use super::{BuildRegion, Context, Region, RegionKind, Similarity, Union, bodies};
+use super::{BuildRegion, Context, Region, RegionKind, Union, bodies};
 use crate::kind::{Key, Kind};
 use geometry::fault::{Fault, counted};
 use geometry::math::{IDENTITY, Vec3, scale};
+use geometry::similarity::Similarity;
 
 /// Most copies of a region.
 const MOST: u32 = 10_000;

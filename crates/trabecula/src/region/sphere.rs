@@ -4,13 +4,14 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{apart, field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, Similarity, one_surface};
+use super::{BuildRegion, Context, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, norm, sub, unit};
+use geometry::similarity::Similarity;
 
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::primitive::{along, field, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, Similarity, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use crate::kind::Kind;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
+use geometry::similarity::Similarity;
 use geometry::tetmesh::FACES;
 
 /// A height of less than this share of the longest edge is none.

@@ -9,6 +9,7 @@ use geometry::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotatio
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 use geometry::surface_mesh::SurfaceMesh;
 use trabecula::cell::Part;
 use trabecula::csg_tree::CsgTree;
@@ -16,7 +17,7 @@ use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::implicit::Surface;
-use trabecula::region::{MeshRegion, Region, Shape, Similarity, Union};
+use trabecula::region::{MeshRegion, Region, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 

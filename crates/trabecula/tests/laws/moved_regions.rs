@@ -6,11 +6,12 @@ use std::sync::Arc;
 use geometry::math::{Vec3, norm, product, rotation, sub};
 use geometry::progress::Silent;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 use trabecula::cell::Part;
 use trabecula::design::{self, NoFiles, Node};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
-use trabecula::region::{MeshRegion, Region, Similarity};
+use trabecula::region::{MeshRegion, Region};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 

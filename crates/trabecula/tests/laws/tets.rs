@@ -8,6 +8,7 @@ use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 use geometry::tetmesh::TetMesh;
 use geometry::tetmesh::surface_fit::LostKind;
 use trabecula::csg_tree::CsgTree;
@@ -16,7 +17,7 @@ use trabecula::field::Field;
 use trabecula::grade::{Grade, Linear};
 use trabecula::implicit::Surface;
 use trabecula::mesher::{ANGLES, Fit, background, fit};
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Shape, Similarity, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Shape, Union};
 use trabecula::solid::Solid;
 
 /// Points inside a field's bounds where it is negative.

@@ -55,7 +55,7 @@ impl PatternField {
         let bounds = self.quadors.hub_bounds(self.representatives[class].hub);
         let bounds = Aabb { min: sub(bounds.min, offset), max: sub(bounds.max, offset) };
         let mut near = vec![(node, index)];
-        self.indices_near(&super::image_bounds(&there, &bounds), &mut |at, _, _, _| {
+        self.indices_near(&there.bounds(&bounds), &mut |at, _, _, _| {
             let at = at.map(|v| v as u32);
             let others = (0..nodes as u32).map(|n| (n, at));
             near.extend(others.filter(|o| *o != (node, index)));
@@ -67,7 +67,7 @@ impl PatternField {
         for (n, at) in near {
             cluster.add(n, at, |n, at| {
                 let (local, h) = (inverse.after(&self.pattern.at(at)), self.pattern.nodes[n as usize]);
-                Hub { center: local.apply(h.center), radius: local.scale * h.radius }
+                Hub { center: local.point(h.center), radius: local.scale() * h.radius }
             });
         }
         let graph = cluster.graph;
@@ -76,7 +76,7 @@ impl PatternField {
         let own = |b: u32| graph.beams[b as usize].ends.contains(&0);
         let mut own = found.iter().filter(|c| c.beams.iter().any(|b| own(*b)));
         let first = own.next();
-        Ok(Collisions { count: own.count() + usize::from(first.is_some()), at: first.map(|c| there.apply(c.at)) })
+        Ok(Collisions { count: own.count() + usize::from(first.is_some()), at: first.map(|c| there.point(c.at)) })
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::graph::{Hub, Profile};
+use geometry::math::rotation;
 
 fn samples_in_unit_cube() -> impl Iterator<Item = Vec3> {
     (1..4000).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract()))
@@ -16,9 +17,9 @@ fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
 
 /// Translations; rotation with rings along the axis; a shrinking spiral; and steps none of which commute.
 fn samples() -> [Pattern; 4] {
-    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
-    let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
-    let shrink = Similarity::new(0.9, [0.0, 0.0, 20.0], [0.0; 3], [0.0; 3]);
+    let by = Similarity::translation;
+    let turn = |z| Similarity::new(1.0, rotation([0.0, 0.0, z]), [0.0; 3], [0.0; 3]);
+    let shrink = Similarity::new(0.9, rotation([0.0, 0.0, 20.0]), [0.0; 3], [0.0; 3]);
     [
         pattern([(by([1.5, 0.0, 0.0]), 6), (by([0.3, 1.4, 0.0]), 5), (by([0.0, 0.2, 1.6]), 4)], [0.0; 3]),
         pattern([(by([1.5, 0.0, 0.0]), 4), (turn(24.0), 12), (by([0.0, 0.0, 1.6]), 5)], [4.0, 0.0, 0.0]),
@@ -26,8 +27,8 @@ fn samples() -> [Pattern; 4] {
         pattern(
             [
                 (by([1.5, 0.0, 0.0]), 4),
-                (Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]), 5),
-                (Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]), 4),
+                (Similarity::new(0.95, rotation([10.0, 0.0, 15.0]), [1.0; 3], [0.0, 1.4, 0.0]), 5),
+                (Similarity::new(1.0, rotation([0.0, 9.0, 0.0]), [0.0; 3], [0.0, 0.2, 1.6]), 4),
             ],
             [3.0, 0.0, 0.0],
         ),
@@ -82,7 +83,7 @@ fn bounds_hold_the_values() {
 
 #[test]
 fn different_hubs_are_few_where_steps_commute() {
-    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+    let by = Similarity::translation;
     let steps = [(by([1.5, 0.0, 0.0]), 1000), (by([0.0, 1.5, 0.0]), 1000), (by([0.0, 0.0, 1.5]), 1000)];
     let field = PatternField::new(pattern(steps, [0.0; 3]), Fillet::None).expect("a pattern");
     let (_, representatives) = field.representatives();
@@ -95,7 +96,7 @@ fn different_hubs_are_few_where_steps_commute() {
 /// A strut that narrowly misses its neighbours or intersects them: the same answer as for the expanded pattern.
 #[test]
 fn beams_that_run_into_each_other_are_found() {
-    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+    let by = Similarity::translation;
     let crossing = |apart: f64, r: f64| {
         let strut = |ends, offset| Strut { ends, offset, profile: Profile::Mid(r) };
         let node = |z| Hub { center: [0.0, 0.0, z], radius: r };
@@ -134,7 +135,7 @@ fn repeats_that_coincide_are_refused() {
         let nodes = vec![Hub { center: [18.0, 0.0, 0.0], radius: 0.25 }];
         Pattern { nodes, struts: vec![strut], steps: [(step, count), still, still] }
     };
-    let turn = |s, degrees, up| Similarity::new(s, [0.0, 0.0, degrees], [3.0, 1.0, 0.0], [0.0, 0.0, up]);
+    let turn = |s, degrees, up| Similarity::new(s, rotation([0.0, 0.0, degrees]), [3.0, 1.0, 0.0], [0.0, 0.0, up]);
     for (degrees, period) in [(22.5, 16), (135.0, 8), (-7.2, 50), (0.01, 36_000), (180.0, 2)] {
         let step = turn(1.0, degrees, 0.0);
         assert_eq!(ring(step, period).check(), Ok(()), "{degrees}");

@@ -5,6 +5,7 @@ use geometry::math::{add, sub};
 use geometry::mesh::Mesh;
 use geometry::random::random;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 
 /// A box of which each side is a face, the bottom named and the top red.
 fn part(lo: Vec3, hi: Vec3) -> Region {

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
 use crate::region::moved::Moved;
-use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, Similarity, halving};
+use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, halving};
 use geometry::distance::UNKNOWN;
 use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
+use geometry::similarity::Similarity;
 
 /// Corners of a triangle on a plane may be this far off it, as a share of the mesh's size: files hold coordinates in
 /// single precision.

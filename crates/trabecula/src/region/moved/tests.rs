@@ -5,6 +5,7 @@ use geometry::math::norm;
 use geometry::mesh::Mesh;
 use geometry::random::random;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 
 fn shapes() -> Vec<(&'static str, Region, f64)> {
     let cuboid = || Arc::new(Cuboid::new([-1.0, -0.7, 0.1], [1.3, 0.7, 1.1]).unwrap()) as Region;

@@ -7,6 +7,7 @@ use geometry::math::{Aabb, norm};
 use geometry::mesh::Mesh;
 use geometry::random::random;
 use geometry::repair::Repair;
+use geometry::similarity::Similarity;
 
 fn row(by: Vec3, count: u32) -> RowKind {
     RowKind { by, count }

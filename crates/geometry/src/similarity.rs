@@ -1,9 +1,11 @@
 //! Similarity transforms: rotations, reflections, scalings and translations, and what is made of them.
 
-use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, norm, product, scale, sub, transpose};
+use crate::math::{Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, norm, product, scale, sub, transpose};
 
 /// Entries of a rotation that are this close to −1, 0 or 1 in all places are these: a hundred times their rounding.
 const ROUNDING: f64 = 2e-14;
+/// Most powers among which one is searched for that is the identity.
+const LONGEST_PERIOD: u32 = 100_000;
 
 /// A similarity transform x ↦ s R (x − c) + d.
 ///
@@ -22,9 +24,17 @@ pub struct Similarity {
 }
 
 impl Similarity {
+    /// The identity.
+    pub const IDENTITY: Similarity = Similarity { scale: 1.0, turn: IDENTITY, from: [0.0; 3], to: [0.0; 3] };
+
     /// x ↦ s R (x − about) + about + by, with an orthogonal R; lengths in mm.
     pub fn new(s: f64, turn: Mat3, about: Vec3, by: Vec3) -> Similarity {
         Similarity { scale: s, turn: sharp(turn), from: about, to: add(about, by) }
+    }
+
+    /// x ↦ x + by.
+    pub fn translation(by: Vec3) -> Similarity {
+        Similarity { to: by, ..Similarity::IDENTITY }
     }
 
     /// The factor on lengths.
@@ -35,6 +45,12 @@ impl Similarity {
     /// Whether it is the identity.
     pub fn is_identity(&self) -> bool {
         self.scale == 1.0 && self.turn == IDENTITY && self.from == self.to
+    }
+
+    /// By what it shifts all points, mm, if it is a translation.
+    #[inline]
+    pub fn shift(&self) -> Option<Vec3> {
+        (self.scale == 1.0 && self.turn == IDENTITY).then(|| sub(self.to, self.from))
     }
 
     /// Whether it reverses orientation.
@@ -56,7 +72,7 @@ impl Similarity {
     /// The point whose image this is, mm.
     #[inline]
     pub fn back(&self, p: Vec3) -> Vec3 {
-        add(scale(apply(&transpose(&self.turn), sub(p, self.to)), 1.0 / self.scale), self.from)
+        self.inverse().point(p)
     }
 
     /// The image of a direction, of the same length.
@@ -69,31 +85,73 @@ impl Similarity {
         if b.is_empty() {
             return Aabb::EMPTY;
         }
-        let (lo, hi) = (sub(b.min, self.from), sub(b.max, self.from));
-        self.hull(&self.turn, self.scale, self.to, [lo, hi])
+        let [lo, hi] = [sub(b.min, self.from), sub(b.max, self.from)];
+        if self.shift().is_some() {
+            return Aabb { min: add(lo, self.to), max: add(hi, self.to) };
+        }
+        // A coordinate without weight does not count, infinite or not.
+        let end = |upper: bool| {
+            [0, 1, 2].map(|i| {
+                let term = |j: usize| match self.turn[i][j] {
+                    0.0 => 0.0,
+                    w => w * if (w > 0.0) == upper { hi[j] } else { lo[j] },
+                };
+                self.scale * (0..3).map(term).sum::<f64>() + self.to[i]
+            })
+        };
+        Aabb { min: end(false), max: end(true) }
     }
 
     /// A box that holds all points whose images lie in a box, rounding included.
     pub fn back_bounds(&self, b: &Aabb) -> Aabb {
-        let (lo, hi) = (sub(b.min, self.to), sub(b.max, self.to));
-        let hull = self.hull(&transpose(&self.turn), 1.0 / self.scale, self.from, [lo, hi]);
-        let far = |v: Vec3| norm(v);
-        let terms = (far(b.min) + far(b.max) + far(self.to)) / self.scale + far(self.from);
-        hull.grown(8.0 * f64::EPSILON * terms)
+        let terms = (norm(b.min) + norm(b.max) + norm(self.to)) / self.scale + norm(self.from);
+        self.inverse().bounds(b).grown(8.0 * f64::EPSILON * terms)
     }
 
-    /// Σⱼ s Mᵢⱼ dⱼ + o over a box of d; a coordinate without weight does not count, infinite or not.
-    fn hull(&self, m: &Mat3, s: f64, o: Vec3, [lo, hi]: [Vec3; 2]) -> Aabb {
-        let end = |upper: bool| {
-            [0, 1, 2].map(|i| {
-                let term = |j: usize| match m[i][j] {
-                    0.0 => 0.0,
-                    w => w * if (w > 0.0) == upper { hi[j] } else { lo[j] },
-                };
-                s * (0..3).map(term).sum::<f64>() + o[i]
-            })
-        };
-        Aabb { min: end(false), max: end(true) }
+    /// The inverse.
+    pub fn inverse(&self) -> Similarity {
+        Similarity { scale: 1.0 / self.scale, turn: transpose(&self.turn), from: self.to, to: self.from }
+    }
+
+    /// The powers 0 to `count` − 1.
+    pub fn powers(&self, count: usize) -> Vec<Similarity> {
+        let next = |p: &Similarity| Some(self.after(p));
+        std::iter::successors(Some(Similarity::IDENTITY), next).take(count).collect()
+    }
+
+    /// Angle of the rotation, degrees.
+    pub fn angle(&self) -> f64 {
+        let r = &self.turn;
+        let sine = norm([r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]);
+        sine.atan2(r[0][0] + r[1][1] + r[2][2] - 1.0).to_degrees()
+    }
+
+    /// The first power below `count` that is the identity, within rounding at points up to `size` (mm) from the origin.
+    pub fn period(&self, count: u32, size: f64) -> Option<u32> {
+        if self.scale != 1.0 || self.shift().is_some_and(|by| by != [0.0; 3]) {
+            return None;
+        }
+        let far = size + norm(self.to) + norm(self.from);
+        let mut power = *self;
+        (1..count.min(LONGEST_PERIOD)).find(|n| {
+            let off = 1e-12 + 1e-15 * f64::from(*n);
+            let same = power.is_near(&Similarity::IDENTITY, off, far);
+            power = self.after(&power);
+            same
+        })
+    }
+
+    /// Whether the two commute, within rounding at points up to `size` (mm) from the origin.
+    pub fn commutes(&self, other: &Similarity, size: f64) -> bool {
+        let (a, b) = (self.after(other), other.after(self));
+        a.is_near(&b, 1e-12, size + norm(a.point([0.0; 3])))
+    }
+
+    /// Whether rotations differ by no more than `off`, and images of the origin by no more than `off` times `far` (mm).
+    fn is_near(&self, other: &Similarity, off: f64, far: f64) -> bool {
+        let turned = (0..9).any(|n| (self.turn[n / 3][n % 3] - other.turn[n / 3][n % 3]).abs() > off);
+        let between = sub(self.point([0.0; 3]), other.point([0.0; 3]));
+        !turned && between.iter().all(|t| t.abs() <= off * far)
     }
 
     /// This after another.
@@ -117,8 +175,8 @@ fn sharp(m: Mat3) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::math::rotation;
-    use geometry::random::random;
+    use crate::math::rotation;
+    use crate::random::random;
 
     fn some(seed: &mut u64) -> Similarity {
         let v = |seed: &mut u64, reach: f64| [0; 3].map(|_| reach * random(seed));
@@ -152,7 +210,7 @@ mod tests {
         assert_eq!(turn.point([0.1, 0.2, 7.7]), [0.1, 0.2, 7.7]);
         assert!(turn.keeps_axes() && !turn.mirrors());
         let oblique = Similarity::new(1.0, rotation([31.0, 22.0, 13.0]), [0.0; 3], [0.0; 3]);
-        let undone = Similarity { turn: transpose(&oblique.turn), ..oblique }.after(&oblique);
+        let undone = oblique.inverse().after(&oblique);
         assert!(!oblique.keeps_axes() && undone.is_identity());
     }
 
