@@ -281,8 +281,7 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         say(hasty.to_string());
     }
     if d.turn > TURN {
-        let remedy =
-            if phase.cores().is_some() { "give a larger core_radius there" } else { "let it turn more slowly" };
+        let remedy = if phase.cores().is_some() { "give a larger core_radius there" } else { phase.smoother() };
         say(format!(
             "the orientation turns by {:.0} degrees a cell at {}: above {TURN} neighbouring cells no longer fit \
              together without being torn out of shape; {remedy}, or use smaller cells",

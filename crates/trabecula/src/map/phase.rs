@@ -291,6 +291,11 @@ impl Phase {
         self.hasty.as_deref()
     }
 
+    /// What makes its directions vary more slowly, in words.
+    pub fn smoother(&self) -> &'static str {
+        self.wanted.smoother()
+    }
+
     /// Cells that are stretched beyond the range that was given, in words.
     pub fn overstretched(&self) -> Option<String> {
         self.wanted.stretch.and_then(|s| s.exceeded(&self.distortion))

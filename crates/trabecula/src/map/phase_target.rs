@@ -17,6 +17,8 @@ use geometry::voxel_distances::distances;
 
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
+/// How far from a point on the surface the interior is looked for, in distances that count as on the surface.
+const PROBE: f64 = 1e3;
 /// Least root of a weight.
 pub(super) const LEAST_ROOT: f64 = 1e-3;
 
@@ -55,20 +57,22 @@ impl SolveDomain {
             depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096)).for_each(|(d, p)| region.values(p, d));
         }
         let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
-        let inside = depth.iter().map(|d| *d <= reach(bounds)).collect();
+        let reach = reach(bounds);
+        let inside = |(p, d): (&Vec3, &f64)| {
+            *d < -reach || *d <= reach && region.is_none_or(|region| touches(region, *p, reach))
+        };
+        let inside = nodes.iter().zip(&depth).map(inside).collect();
         Ok(SolveDomain { bounds: *bounds, grid, nodes, clamped, depth, inside, surface, given })
     }
 
     /// How far each node is outside the region, mm, 0 in it; `None` where none is outside. From the nearest node in it, as the field of a
-    /// region may be far less than the distance: where a cylinder that makes a hole ends, or in a film of no thickness over a hole.
+    /// region may be far less than the distance where a cylinder that makes a hole ends.
     fn outside(&self) -> Option<Vec<f64>> {
         if !self.inside.contains(&false) {
             return None;
         }
-        let reach = reach(&self.bounds);
-        let within: Vec<bool> = self.depth.iter().map(|d| *d < -reach).collect();
-        let counted = [&within, &self.inside].into_iter().find(|nodes| nodes.contains(&true));
-        Some(counted.map_or_else(|| self.depth.clone(), |nodes| distances(nodes, self.grid.shape, self.grid.step)))
+        let nearest = || distances(&self.inside, self.grid.shape, self.grid.step);
+        Some(if self.inside.contains(&true) { nearest() } else { self.depth.clone() })
     }
 
     /// Where nodes are asked what is wanted.
@@ -134,6 +138,17 @@ impl SolveDomain {
 /// How far from the surface of a region a point counts as on it, mm.
 fn reach(bounds: &Aabb) -> f64 {
     1e-9 * norm(bounds.size())
+}
+
+/// Whether a point on the surface of a region is next to its interior: a hole that ends in a face leaves a film of no thickness over it,
+/// where the field of a difference is 0.
+fn touches(region: &dyn Field, p: Vec3, reach: f64) -> bool {
+    let off = PROBE * reach;
+    let octants: Vec<Vec3> =
+        (0..8).map(|n| [0, 1, 2].map(|a| p[a] + if n >> a & 1 == 0 { -off } else { off })).collect();
+    let mut values = vec![0.0; octants.len()];
+    region.values(&octants, &mut values);
+    values.iter().any(|v| *v < -reach)
 }
 
 /// Explains that a weight is zero everywhere.
@@ -221,4 +236,38 @@ pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>,
         }
     }
     Ok(out)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::map::frame::Orientation;
+    use crate::region::{Cuboid, Cylinder, Difference, Region};
+
+    /// A hole is a hole whether the cylinder that makes it ends in the faces of the block or beyond them, though the field of the difference
+    /// is 0 all over its ends in the first case.
+    #[test]
+    fn films_over_holes_are_not_inside() {
+        let block: Region = Arc::new(Cuboid::new([-4.0, -4.0, 0.0], [4.0, 4.0, 3.0]).unwrap());
+        let plate = |beyond: f64| {
+            let hole = Cylinder::new([0.5, 0.25, -beyond], [0.0, 0.0, 1.0], 2.1, 3.0 + 2.0 * beyond).unwrap();
+            Difference::new(vec![block.clone(), Arc::new(hole)]).unwrap()
+        };
+        let of = |v: f64| [0; 3].map(|_| Grade::Constant(v));
+        let wanted = PhaseRequest::new(of(2.0), Orientation::Angles(of(0.0)));
+        let bounds = block.bounds();
+        let inside = |region: Difference| {
+            let domain =
+                SolveDomain::over(&bounds, Grid::over(&bounds, [33, 33, 13]), &wanted, Some(&region)).unwrap();
+            domain.inside
+        };
+        let (ends, through) = (inside(plate(0.0)), inside(plate(1.0)));
+        assert_eq!(ends, through);
+        // Every layer of nodes has the hole, and the nodes of the block's faces, edges and corners are in it.
+        assert!(through.chunks(33 * 33).all(|layer| layer == &through[..33 * 33]));
+        assert_eq!(through[..33 * 33].iter().filter(|inside| !**inside).count(), 221);
+    }
 }
