@@ -214,7 +214,12 @@ def test_the_law_command(tmp_path):
 def test_a_level_may_ask_for_a_stiffness():
     made = solid("gyroid", "sheet", level.stiffness(0.1, n=24))
     # A thousandth is left by the search, and a table's share of a fraction.
-    assert made.stiffness(n=24).E[0] == pytest.approx(0.1, rel=2e-3)
+    cell = made.stiffness(n=24)
+    assert cell.E[0] == pytest.approx(0.1, rel=2e-3)
+    # What the report says of it is that cell's, but for that share; shares of moduli are differences of its grids.
+    found = made.report().lattices["core"].property
+    assert (found.name, found.n) == ("stiffness", 24) and found.value == pytest.approx(cell.E[0], rel=1e-3)
+    assert found.error == pytest.approx(cell.E_error[0], rel=0.05) and found.error > 1e-3
     # The fraction of an independent table, which 24 voxels are 2 % off.
     assert made.report().lattices["core"].fraction == pytest.approx(0.262, abs=0.006)
     across = solid("diamond", "lower", level.stiffness(0.1, along=[1, 1, 1], n=8), wavelength=[3, 3, 3], rotate=[0, 0, 30])
@@ -226,14 +231,19 @@ def test_a_level_may_ask_for_a_stiffness():
 
 def test_a_level_may_ask_for_a_permeability():
     made = solid("gyroid", "sheet", level.permeability(0.01, n=12))
-    assert made.permeability(n=12).k[0][0] == pytest.approx(0.01, rel=2e-3)
+    pore = made.permeability(n=12)
+    assert pore.k[0][0] == pytest.approx(0.01, rel=2e-3)
+    found = made.report().lattices["core"].property
+    assert found.value == pytest.approx(pore.k[0][0], rel=1e-3) and found.error == pytest.approx(pore.error, rel=0.05)
 
 
 def test_a_grade_may_ask_for_a_stiffness():
     amount = level.stiffness(lt.grade.linear([0, 0, 1], {-4: 0.08, 4: 0.2}), n=8)
     lattice = lt.Lattice("gyroid", "sheet", map.affine(wavelength=4), amount)
     made = lt.Design(region.box(size=[4, 4, 8]), lattice).build()
-    low, high = made.report().lattices["core"].fraction
+    report = made.report().lattices["core"]
+    low, high = report.fraction
+    assert report.property.value == pytest.approx([0.08, 0.2]) and 0 < report.property.error < 1
     # Monotone cubics in logarithms through six fractions.
     for fraction, wanted in ((low, 0.08), (high, 0.2)):
         assert solid(amount=level.fraction(fraction)).stiffness(n=8).E[0] == pytest.approx(wanted, rel=0.03)

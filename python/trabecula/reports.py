@@ -41,6 +41,7 @@ __all__ = [
     "NetReport",
     "PeriodReport",
     "PermeabilityReport",
+    "PropertyReport",
     "QualityReport",
     "RbfReport",
     "RegionReport",
@@ -556,6 +557,7 @@ class LatticeReport(Report):
         "distortion": "DistortionReport",
         "fit": "FitReport",
         "periods": "PeriodReport",
+        "property": "PropertyReport",
         "singular": "SingularLineReport",
         "tets": "TilingReport",
     }
@@ -583,6 +585,8 @@ class LatticeReport(Report):
     """Of a sheet: the same of the void f < 0 and of the void f > 0, mm."""
     porosity: float | list[float]
     """1 − fraction."""
+    property: PropertyReport | None
+    """The stiffness or permeability that the level was solved for. None for other levels."""
     singular: list[SingularLineReport] | None
     """Lines round which the axes that a solved map is asked for do not come back to themselves, at least half a wavelength
     long, the longest first. None without a solved map."""
@@ -801,6 +805,20 @@ class PermeabilityReport(Report):
     """Tortuosity porosity / conductivity, with the mean conductivity over the axes; None where the pore does not conduct."""
     warnings: list[WarningReport]
     """Possible mistakes."""
+
+
+class PropertyReport(Report):
+    """A property of the cell that a level was solved for."""
+
+    error: float
+    """Estimated relative error of that: the change from n voxels to infinitely many; where it varies, the greatest."""
+    n: int
+    """Voxels along the edge of the cell, or of a cube of its volume."""
+    name: str
+    """stiffness: Young's modulus of the cell over that of the solid; permeability, mm²."""
+    value: float | list[float]
+    """What it is at the fraction found, extrapolated to infinitely many voxels; where it varies, what it was interpolated
+    for."""
 
 
 class QualityReport(Report):

@@ -58,7 +58,7 @@ use crate::implicit::Implicit;
 use crate::kind::{Kind, NodeCursor};
 use crate::lattice::Lattice;
 use crate::region::Region;
-use crate::report::{DesignReport, StepReport, TransitionReport};
+use crate::report::{DesignReport, PropertyReport, StepReport, TransitionReport};
 use crate::shell_mesh;
 use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
@@ -197,6 +197,8 @@ pub struct Built {
     pub sets: Vec<(String, Region)>,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The properties that levels were solved for, by the names of their lattices.
+    pub properties: Vec<(String, PropertyReport)>,
     /// The lattices over tetrahedral meshes, by name.
     pub tilings: Vec<Tiled>,
     /// The beams in it, by name.

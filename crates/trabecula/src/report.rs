@@ -19,7 +19,7 @@ pub use beams_report::{
 pub use cell_report::{CellGrid, ConductivityReport, PermeabilityReport, StiffnessReport};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
-    PeriodReport, RbfReport, RegionReport, SingularLineReport, TessellationReport, TransitionReport,
+    PeriodReport, PropertyReport, RbfReport, RegionReport, SingularLineReport, TessellationReport, TransitionReport,
 };
 pub use layers_report::LayersReport;
 pub use mesh_report::{

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         FitReport,
         LatticeReport,
         PeriodReport,
+        PropertyReport,
         SingularLineReport,
         TetMeshReport,
         TilingReport,
@@ -108,6 +109,8 @@ def _lattice(it: LatticeReport) -> Iterator[str]:
         narrowest = it.pore if isinstance(it.pore, (int, float)) else min(it.pore)
         closed = "" if narrowest else "; 0: closed in every cell"
         yield f"  pore       {span(it.pore)} mm (largest ball that passes{side}{closed})"
+    if it.property is not None:
+        yield f"  {it.property.name:<10} {_property(it.property)}"
     if not (it.tets and it.tets.zones):
         whole = intervals(it.connected_fraction)
         yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"
@@ -120,6 +123,12 @@ def _lattice(it: LatticeReport) -> Iterator[str]:
     yield from _singular(it.singular or [])
     for period in it.periods or []:
         yield _period(period)
+
+
+def _property(it: PropertyReport) -> str:
+    unit = " mm²" if it.name == "permeability" else " of the solid's E"
+    value = " to ".join(figure(v) for v in ([it.value] if isinstance(it.value, (int, float)) else it.value))
+    return f"{value}{unit}, within about {100 * it.error:.2g} % (extrapolated from {it.n} voxels along the cell)"
 
 
 def _beams_title(it: Report) -> str:

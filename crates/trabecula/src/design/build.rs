@@ -18,6 +18,7 @@ use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
 use crate::region::{FARTHEST, Notes, Region};
+use crate::report::PropertyReport;
 use crate::solid::Solid;
 use crate::truss::Beams;
 use geometry::fault::number;
@@ -73,6 +74,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 
     let mut warnings = Vec::new();
     let (mut lattices, mut tilings, mut graphs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut properties = Vec::new();
     let mut nets = Vec::new();
     if let Some(domain) = domain {
         let environment = at(format!("lattice.{}", domain.name));
@@ -82,7 +84,9 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     }
     for (name, spec) in d.lattice.iter().filter(|(_, s)| !matches!(s.map, MapKind::Tets(_))) {
         let environment = at(format!("lattice.{name}"));
-        lattices.push((name.clone(), Arc::new(checked_lattice(spec, d, &environment, &mut warnings)?)));
+        let (made, property) = checked_lattice(spec, d, &environment, &mut warnings)?;
+        lattices.push((name.clone(), Arc::new(made)));
+        properties.extend(property.map(|p| (name.clone(), p)));
     }
     for (name, spec) in &d.beams.0 {
         graphs.push((name.clone(), build_beams::beams(spec, &at(format!("beams.{name}")), &mut warnings)?));
@@ -119,7 +123,22 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         }
     }
     let warnings = all;
-    Ok(Built { solid, bodies, sets, lattices, tilings, beams: graphs, blend, skin, warnings, repairs, figures, moves })
+    let beams = graphs;
+    Ok(Built {
+        solid,
+        bodies,
+        sets,
+        lattices,
+        properties,
+        tilings,
+        beams,
+        blend,
+        skin,
+        warnings,
+        repairs,
+        figures,
+        moves,
+    })
 }
 
 /// Refuses a region that is empty, unbounded or too far away.
@@ -200,19 +219,19 @@ fn tiled(
     Ok((tiled, net.map(|rods| rods.solid)))
 }
 
-/// A lattice, with warnings of likely mistakes.
+/// A lattice, with warnings of likely mistakes, and the property that its level was solved for.
 fn checked_lattice(
     spec: &LatticeSpec,
     d: &Design,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
-) -> Result<Lattice, DesignError> {
+) -> Result<(Lattice, Option<PropertyReport>), DesignError> {
     let path = &environment.path;
     if spec.level.of == Of::Part && d.blend.is_some() {
         let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
         return Err(DesignError::new(format!("{path}.level.of"), message));
     }
-    let built = lattice(spec, environment)?;
+    let (built, property) = lattice(spec, environment)?;
     let points = built.level.grade().check_points(environment);
     let environment = &Environment { path: path.clone(), points: &points, ..*environment };
     warn::check(&built, environment, spec)?;
@@ -221,7 +240,7 @@ fn checked_lattice(
     warn::wrapped_map(&built, &spec.map, environment, warnings);
     let level = Environment { path: format!("{path}.level"), ..*environment };
     warn::fraction_with_thickness(&built, spec, &level, warnings)?;
-    Ok(built)
+    Ok((built, property))
 }
 
 /// The field of a design without a blend.
@@ -266,7 +285,8 @@ fn members(
     lattices.chain(tilings).chain(graphs).collect()
 }
 
-fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, DesignError> {
+/// A lattice, and the property that its level was solved for.
+fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<(Lattice, Option<PropertyReport>), DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let (name, cell) = cell(&spec.cell, &below("cell"), environment.loader)?;
     let cell = build_level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
@@ -278,6 +298,6 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     };
     let map = build_core::centred(map, &cell, &below("cell"))?;
     let here = level;
-    let level = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
-    Ok(Lattice::new(cell, map, spec.part.into(), level))
+    let (level, property) = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
+    Ok((Lattice::new(cell, map, spec.part.into(), level), property))
 }

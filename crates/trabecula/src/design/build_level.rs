@@ -11,6 +11,7 @@ use crate::grade::{Grade, Product, Quantity, Remapped, Stops, key_of};
 use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::{CoreFill, Cores, Map};
+use crate::report::PropertyReport;
 use geometry::fault::{Fault, number};
 use geometry::math::{Interval, Vec3};
 use rayon::prelude::*;
@@ -54,7 +55,7 @@ pub fn spartan(cell: &str, p: f64) -> Option<f64> {
     Some(c.iter().fold(0.0, |t, a| t * p + a))
 }
 
-/// Builds the level of a lattice. `name` is the cell's, if it has one.
+/// Builds the level of a lattice, and says what is found of a property that it is solved for. `name` is the cell's, if it has one.
 pub(super) fn level(
     spec: &LevelSpec,
     part: PartSpec,
@@ -62,7 +63,7 @@ pub(super) fn level(
     cell: &Arc<Cell>,
     map: &Map,
     environment: &Environment,
-) -> Result<Level, DesignError> {
+) -> Result<(Level, Option<PropertyReport>), DesignError> {
     let path = |key: &str| format!("{}.{key}", environment.path);
     let (key, value) = (spec.amount.key(), spec.amount.grade());
     if let AmountSpec::Thickness(_) = spec.amount {
@@ -81,23 +82,25 @@ pub(super) fn level(
         }
     }
     if let (Some(length @ ("thickness", _)), PartSpec::Sheet) = (length, part) {
-        return Ok(Level::Thickness(length_grade(length, environment)?));
+        return Ok((Level::Thickness(length_grade(length, environment)?), None));
     }
-    match &spec.amount {
+    let level = match &spec.amount {
         AmountSpec::Thickness(_) => {
             within_wavelength(value, &amount, &quantity, map.longest())?;
             mid_surface(cell, path(key))?;
-            Ok(Level::Thickness(amount))
+            Level::Thickness(amount)
         }
-        AmountSpec::Pore(_) => pore(&amount, part.into(), cell, map, environment),
-        AmountSpec::Iso(_) => Ok(Level::Iso(amount)),
+        AmountSpec::Pore(_) => pore(&amount, part.into(), cell, map, environment)?,
+        AmountSpec::Iso(_) => Level::Iso(amount),
         AmountSpec::Stiffness(_) | AmountSpec::Permeability(_) => {
-            build_property::level(&spec.amount, &amount, part.into(), cell, map, environment)
+            let made = build_property::level(&spec.amount, &amount, part.into(), cell, map, environment);
+            return made.map(|(level, property)| (level, Some(property)));
         }
         AmountSpec::Fraction(_) | AmountSpec::Porosity(_) => {
-            of_fraction(spec, amount, (part, name), cell, map, environment)
+            of_fraction(spec, amount, (part, name), cell, map, environment)?
         }
-    }
+    };
+    Ok((level, None))
 }
 
 /// The level of a fraction (or a porosity) of the cell or of the part.

@@ -14,6 +14,7 @@ use crate::grade::{Grade, Remapped, Stops};
 use crate::kind::DesignError;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Affine, Map};
+use crate::report::{PropertyReport, Varying};
 use geometry::fault::number;
 use geometry::math::{Vec3, apply, dot, norm, scale, transpose};
 use geometry::monotone_cubic::monotone;
@@ -42,6 +43,13 @@ const STOPS: usize = 65;
 /// Part of a fraction by which the first and the last of these are further out than the ends of what is asked for.
 const BEYOND: f64 = 0.01;
 
+/// A property at a fraction, and the estimated relative error of it.
+#[derive(Clone, Copy)]
+struct Found {
+    value: f64,
+    error: f64,
+}
+
 /// A property of a cell by its fraction.
 struct Property<'a> {
     cell: &'a Arc<Cell>,
@@ -52,7 +60,7 @@ struct Property<'a> {
     path: String,
 }
 
-/// The level at which the cell has the property asked for.
+/// The level at which the cell has the property asked for, and that property.
 pub(super) fn level(
     spec: &AmountSpec,
     amount: &Grade,
@@ -60,7 +68,7 @@ pub(super) fn level(
     cell: &Arc<Cell>,
     map: &Map,
     environment: &Environment,
-) -> Result<Level, DesignError> {
+) -> Result<(Level, PropertyReport), DesignError> {
     let key = spec.key();
     let path = format!("{}.{key}", environment.path);
     let Some(affine) = map.affine() else {
@@ -75,11 +83,16 @@ pub(super) fn level(
     }
     let along = scale(along, 1.0 / norm(along));
     let property = Property { cell, part, map: *affine, amount: spec, along, path };
+    let n = property.fine();
     if let Some(value) = amount.constant() {
-        return Ok(Level::Fraction(Grade::Constant(property.fraction(value)?)));
+        let (fraction, Found { value, error }) = property.fraction(value)?;
+        let report = PropertyReport { name: key, value: Varying::Number(value), error, n };
+        return Ok((Level::Fraction(Grade::Constant(fraction)), report));
     }
-    let stops = property.between(Varied::of_grade(amount, environment))?;
-    Ok(Level::Fraction(Grade::from(Remapped::new(amount.clone(), stops))))
+    let asked = Varied::of_grade(amount, environment);
+    let (stops, error) = property.between(asked)?;
+    let report = PropertyReport { name: key, value: asked.varying(), error, n };
+    Ok((Level::Fraction(Grade::from(Remapped::new(amount.clone(), stops))), report))
 }
 
 impl Property<'_> {
@@ -92,30 +105,39 @@ impl Property<'_> {
     }
 
     /// The property at a fraction: 0 where a cell falls apart or lets nothing through.
-    fn value(&self, fraction: f64, n: usize) -> Result<f64, DesignError> {
+    fn found(&self, fraction: f64, n: usize) -> Result<Found, DesignError> {
         let cell = self.at(fraction)?;
         let (axes, _) = upper_edges(&transpose(&cell.edges));
-        let found = match self.amount {
+        let (value, error) = match self.amount {
             AmountSpec::Stiffness(of) => {
                 let material = Material::isotropic(1.0, of.nu).map_err(|f| DesignError::fault(&self.path, f))?;
                 let made = cell.stiffness(&material, Resolution { n, plain: false }, &Silent);
-                let Some(made) = self.unless_degenerate(made)? else { return Ok(0.0) };
+                let Some(made) = self.unless_degenerate(made)? else { return Ok(Found { value: 0.0, error: 0.0 }) };
                 // An axis of the frame along the direction.
                 let other = if self.along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
                 let third = geometry::math::cross(self.along, other);
                 let (to, _) = upper_edges(&transpose(&[self.along, other, third]));
                 let frame = geometry::math::product(&axes, &to);
-                Moduli::of(&turned(&made.C, &transpose(&frame))).map_or(0.0, |m| m.young[0])
+                let [limit, on_voxels] =
+                    [made.C, made.C_n].map(|c| Moduli::of(&turned(&c, &transpose(&frame))).map_or(0.0, |m| m.young[0]));
+                (limit, (on_voxels / limit - 1.0).abs())
             }
             _ => {
                 let made = cell.permeability(n, None, &Silent);
                 let along = apply(&axes, self.along);
                 // On voxels that no wall is seen by, nothing holds the flow.
-                let Some(made) = self.unless_degenerate(made)? else { return Ok(f64::INFINITY) };
-                dot(along, apply(&made.k, along))
+                let Some(made) = self.unless_degenerate(made)? else {
+                    return Ok(Found { value: f64::INFINITY, error: 0.0 });
+                };
+                (dot(along, apply(&made.k, along)), made.error)
             }
         };
-        Ok(found.max(0.0))
+        Ok(Found { value: value.max(0.0), error })
+    }
+
+    /// The property at a fraction.
+    fn value(&self, fraction: f64, n: usize) -> Result<f64, DesignError> {
+        Ok(self.found(fraction, n)?.value)
     }
 
     /// A report, or `None` where the property is at its limit.
@@ -159,20 +181,24 @@ impl Property<'_> {
         Ok([low, high])
     }
 
-    /// The fraction at which the property has this value.
-    fn fraction(&self, asked: f64) -> Result<f64, DesignError> {
+    /// The fraction at which the property has this value, and the property there on fine voxels.
+    fn fraction(&self, asked: f64) -> Result<(f64, Found), DesignError> {
         let (mut at, mut slope) = self.coarse_root(asked)?;
         let [low, high] = self.range()?;
         let mut last: Option<[f64; 2]> = None;
         // Values on few voxels are noisy, and steps may not come nearer: the nearest counts.
-        let mut nearest = [f64::INFINITY, at];
-        for _ in 0..STEPS[1] {
-            let off = (self.value(at, self.fine())? / asked).ln();
+        let mut nearest = (f64::INFINITY, at, self.found(at, self.fine())?);
+        let mut found = nearest.2;
+        for step in 0..STEPS[1] {
+            if step > 0 {
+                found = self.found(at, self.fine())?;
+            }
+            let off = (found.value / asked).ln();
             if !off.is_finite() {
                 break;
             }
-            if off.abs() < nearest[0] {
-                nearest = [off.abs(), at];
+            if off.abs() < nearest.0 {
+                nearest = (off.abs(), at, found);
             }
             if off.abs() <= MET[1] {
                 break;
@@ -185,7 +211,7 @@ impl Property<'_> {
             last = Some([at.ln(), off]);
             at = (at.ln() - off / slope).exp().clamp(low, high);
         }
-        Ok(nearest[1])
+        Ok((nearest.1, nearest.2))
     }
 
     /// Voxels along a fine cell.
@@ -258,17 +284,19 @@ impl Property<'_> {
         Ok((last[0].exp(), slope))
     }
 
-    /// The fraction by the property, over the range of what is asked for.
-    fn between(&self, asked: Varied) -> Result<Stops, DesignError> {
+    /// The fraction by the property, over the range of what is asked for, and the greatest error of the property there.
+    fn between(&self, asked: Varied) -> Result<(Stops, f64), DesignError> {
         // On fine voxels: the coarse ones may be off by more than the range.
-        let ends = [self.fraction(asked.min)?, self.fraction(asked.max)?];
+        let ends = [self.fraction(asked.min)?.0, self.fraction(asked.max)?.0];
         let ([low, high], [least, most]) = (self.range()?, [ends[0].min(ends[1]), ends[0].max(ends[1])]);
         let (first, last) = ((least * (1.0 - BEYOND)).max(low).ln(), (most * (1.0 + BEYOND)).min(high).ln());
-        let mut nodes: Vec<[f64; 2]> = Vec::new();
+        let (mut nodes, mut error) = (Vec::<[f64; 2]>::new(), 0f64);
         for i in 0..NODES {
             let share = i as f64 / (NODES - 1) as f64;
             let at = if self.grows() { first + (last - first) * share } else { last + (first - last) * share };
-            let value = self.value(at.exp(), self.fine())?.ln();
+            let found = self.found(at.exp(), self.fine())?;
+            error = error.max(found.error);
+            let value = found.value.ln();
             if value.is_finite() && nodes.last().is_none_or(|n| n[0] < value) {
                 nodes.push([value, at]);
             }
@@ -288,6 +316,6 @@ impl Property<'_> {
         let at = |i: usize| from + (to - from) * i as f64 / (STOPS - 1) as f64;
         let mut stops: Vec<[f64; 2]> = (0..STOPS).map(|i| [at(i), monotone(&nodes, at(i).ln()).exp()]).collect();
         stops.dedup_by(|a, b| a[0] == b[0]);
-        Ok(Stops(stops))
+        Ok((Stops(stops), error))
     }
 }

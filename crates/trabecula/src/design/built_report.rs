@@ -1,6 +1,7 @@
 //! The report on a design, without meshing it.
 
 use std::cell::LazyCell;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::build_blend::Functions;
@@ -54,7 +55,10 @@ pub(super) fn report(built: &Built) -> DesignReport {
     points.extend(sample::nodes(region));
     points.extend(built.lattices.iter().flat_map(|(_, l)| l.level.grade().extremes(region)));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
-    let lattices = built.lattices.iter().map(|(name, l)| (name.clone(), lattice(l, &points)));
+    let property = |name: &str| built.properties.iter().find(|p| p.0 == name).map(|p| p.1);
+    let lattices = built.lattices.iter();
+    let lattices =
+        lattices.map(|(name, l)| (name.clone(), LatticeReport { property: property(name), ..lattice(l, &points) }));
     let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it, built)));
     let beams = built.beams.iter().map(|(name, made)| {
         let sampled = LazyCell::new(|| filling(built, made));
@@ -82,8 +86,12 @@ pub(super) fn report(built: &Built) -> DesignReport {
 
 /// The files of CAD systems of a region, if any.
 fn tessellated(region: &Region) -> Option<Vec<TessellationReport>> {
-    let mut files = Vec::new();
+    let mut files: Vec<Arc<CadMesh>> = Vec::new();
     region.cad(&mut files);
+    // Copies of a part are of one file.
+    let key = |f: &CadMesh| (f.file.clone(), f.chord.to_bits(), f.angle.to_bits());
+    let mut seen = HashSet::new();
+    files.retain(|f| seen.insert(key(f)));
     let reported = |f: Arc<CadMesh>| TessellationReport {
         path: f.file.clone(),
         chord: f.chord,
@@ -116,6 +124,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         thickness: thickness(lattice, iso),
         pore: narrower,
         pore_sides: sides,
+        property: None,
         folding: lattice.folding(),
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
@@ -166,8 +175,7 @@ fn finished_zones(it: &Tiled, built: &Built) -> Vec<Option<f64>> {
 
 /// A lattice over a tetrahedral mesh.
 fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
-    let tiling = &it.tiling;
-    let part = tiling.part;
+    let (tiling, part) = (&it.tiling, it.tiling.part);
     let shares = tiling.shares();
     let sums = |zones: Option<&[i64]>| {
         let of = (0..tiling.map.len()).filter(|t| zones.is_none_or(|z| z.contains(&tiling.map.zone(*t))));
@@ -213,6 +221,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         thickness: None,
         pore: None,
         pore_sides: None,
+        property: None,
         folding: None,
         connected_fraction: Vec::new(),
         truncation: None,

@@ -56,6 +56,9 @@ pub struct LatticeReport {
     /// Of a sheet: the same of the void f < 0 and of the void f > 0, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pore_sides: Option<[Varying; 2]>,
+    /// The stiffness or permeability that the level was solved for. None for other levels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub property: Option<PropertyReport>,
     /// The thickness beyond which a wall of given thickness folds, mm; None for other levels.
     pub folding: Option<f64>,
     /// Intervals of the fraction in which the periodic solid is one connected component.
@@ -79,6 +82,19 @@ pub struct LatticeReport {
     /// The tetrahedral mesh of a lattice over tetrahedra, and the cells in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tets: Option<TilingReport>,
+}
+
+/// A property of the cell that a level was solved for.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct PropertyReport {
+    /// stiffness: Young's modulus of the cell over that of the solid; permeability, mm².
+    pub name: &'static str,
+    /// What it is at the fraction found, extrapolated to infinitely many voxels; where it varies, what it was interpolated for.
+    pub value: Varying,
+    /// Estimated relative error of that: the change from n voxels to infinitely many; where it varies, the greatest.
+    pub error: f64,
+    /// Voxels along the edge of the cell, or of a cube of its volume.
+    pub n: usize,
 }
 
 /// The region of a design.
