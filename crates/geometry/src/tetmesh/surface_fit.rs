@@ -119,9 +119,12 @@ pub fn volume_outside(mesh: &TetMesh, distance: impl Fn(&[Vec3]) -> Vec<f64>) ->
     let near: Vec<usize> = (0..mesh.tets.len()).filter(|&i| values[i] > -reaches(i)).collect();
     let points: Vec<Vec3> = near
         .iter()
-        .flat_map(|&i| {
+        .enumerate()
+        .flat_map(|(n, &i)| {
             let p = mesh.corners(i);
-            (0..SAMPLES).map(move |k| within(p, low_discrepancy(k)))
+            // One sequence for all: the same few points in each would miss the same place in each. Point 0 is the middle of an edge,
+            // which may lie on the surface.
+            (1..=SAMPLES).map(move |k| within(p, low_discrepancy(n * SAMPLES + k)))
         })
         .collect();
     // Distances of points on the surface are known to rounding.

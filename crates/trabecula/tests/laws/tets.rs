@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::common::{Random, ball, cases, cuboid, fault, region, within};
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, rotation, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use geometry::repair::Repair;
@@ -401,6 +401,43 @@ fn a_box_is_met_exactly() {
     // differ by r = 1.067 at most, which changes an angle by at most asin((r² − 1) / (r² + 1)), 3.7 degrees.
     let q = mesh.quality().expect("quality");
     assert!(q.dihedral.min > 41.3 && q.dihedral.max < 93.7, "{:?}", q.dihedral);
+}
+
+/// The volume of tetrahedra outside the region is none for a box however it is turned; for a hole, into which flat faces bulge, it is that of many points
+/// of each.
+#[test]
+fn the_volume_outside_the_region_is_known() {
+    let space = cuboid([0.0; 3], [2.0, 1.6, 1.0]);
+    for turn in [[30.0, 20.0, 10.0], [0.0, 0.0, 45.0], [77.0, -31.0, 5.0]] {
+        let by = Similarity::new(1.0, rotation(turn), [0.0; 3], [0.3, -0.2, 7.0]);
+        let (mesh, fit) = mesh(&space.clone().moved(&by).expect("turned"), &Grade::Constant(0.3));
+        sound("turned", &mesh);
+        // Planes are met to the rounding of their coordinates.
+        assert!((mesh.volume() / 3.2 - 1.0).abs() < 1e-9);
+        assert!(fit.gained < 1e-9 && fit.missed < 1e-9, "{turn:?}: {} {}", fit.gained, fit.missed);
+    }
+    let mut random = Random(7);
+    for size in [0.2, 0.35] {
+        let center = [0.9, 0.8, 0.5];
+        let parts = vec![cuboid([0.0; 3], [2.0, 1.6, 1.2]), ball(center, 0.4)];
+        let space: Region = Arc::new(Difference::new(parts).expect("hole"));
+        let (mesh, fit) = mesh(&space, &Grade::Constant(size));
+        let mut outside = 0.0;
+        for i in 0..mesh.tets.len() {
+            let corners = mesh.corners(i);
+            let is_outside = (0..200).filter(|_| {
+                // Evenly spread barycentric coordinates: the differences of three ordered numbers.
+                let mut cuts = [0; 3].map(|_| random.between(0.0, 1.0));
+                cuts.sort_by(f64::total_cmp);
+                let weights = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
+                let p = corners.iter().zip(weights).fold([0.0; 3], |sum, (c, w)| add(sum, scale(*c, w)));
+                norm(sub(p, center)) < 0.4
+            });
+            outside += is_outside.count() as f64 / 200.0 * geometry::tetmesh::volume(corners);
+        }
+        // The root of the number of samples outside, some hundreds to thousands, three times.
+        assert!((fit.gained / outside - 1.0).abs() < 0.15, "{size}: {} for {outside}", fit.gained);
+    }
 }
 
 #[test]
