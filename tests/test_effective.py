@@ -34,9 +34,32 @@ def test_cells_are_as_stiff_as_an_independent_program_found(cell: str, part: str
     # The table has four digits of a computation of its own, good to about a hundredth.
     assert values == pytest.approx(wanted, rel=0.02)
     # The estimate is greatest for the diamond sheet, whose shears the coarser grids do not resolve.
-    assert found.error < 0.02 and found.fraction == pytest.approx(fraction, abs=2e-5)  # tables of levels
+    assert found.error < 0.02 and found.fraction == fraction
     assert found.zener == pytest.approx(2 * values[2] / (values[0] - values[1]), rel=1e-6)
     assert found.bulk_bounds[0] <= found.bulk <= found.bulk_bounds[1]
+
+
+def blended(weight, cells: tuple = ("gyroid", "gyroid"), wavelengths: tuple = (4, 4)) -> lt.Solid:
+    lattices = {
+        name: lt.Lattice(cell, "sheet", map.affine(wavelength=w), level.fraction(0.3))
+        for name, cell, w in zip("ab", cells, wavelengths, strict=True)
+    }
+    return lt.Design(region.box(size=[8, 8, 8]), lattices, blend=lt.blend.between("a", "b", weight)).build()
+
+
+def test_a_blend_of_alike_cells_in_constant_shares_has_a_cell():
+    whole = solid().stiffness(n=16)
+    # A cell blended with itself is itself, to the table of its levels.
+    assert np.allclose(blended(0.4).stiffness(n=16).C, whole.C, rtol=0, atol=1e-3 * whole.C[0][0])
+    found = blended(0.5, ("gyroid", "diamond")).stiffness(n=24)
+    c = np.array(found.C)
+    # Both are cubic, about axes in common: what the blend keeps of that are the three rotations about the diagonal.
+    assert c[0][0] == pytest.approx(c[1][1], rel=1e-6) == pytest.approx(c[2][2], rel=1e-6)
+    # Blends keep fractions within 0.0025.
+    assert found.grids[0].fraction == pytest.approx(0.3, abs=0.0025)
+    for made in (blended(lt.grade.linear([1, 0, 0], {-4: 0, 4: 1})), blended(0.5, wavelengths=(4, 5))):
+        with pytest.raises(lt.DesignError, match="the cells of this blend differ from place to place"):
+            made.stiffness(n=16)
 
 
 def test_a_sheet_conducts_as_an_independent_program_found():

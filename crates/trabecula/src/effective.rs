@@ -158,7 +158,7 @@ impl UnitCell {
         if across < ACROSS && (across > 0.0 || self.apart().is_none()) {
             let message = match enough(n, ACROSS / across) {
                 Some(need) => format!(
-                    "the thinnest wall is {across:.1} voxels across; below {ACROSS} the figures are too high by more than the error says: \
+                    "the thinnest wall is {across:.1} voxels across; below {ACROSS} the figures may be off by more than the error says: \
                      take n = {need}"
                 ),
                 None => "the thinnest wall or neck is of no thickness, which no number of voxels resolves: the figures are of a cell whose \

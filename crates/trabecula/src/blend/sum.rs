@@ -149,6 +149,11 @@ impl Blend {
         best.min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
     }
 
+    /// Whether its lattices have the same shares everywhere.
+    pub fn is_uniform(&self) -> bool {
+        self.weights.are_constant()
+    }
+
     /// Which phases meet, where the fraction is kept.
     pub fn phases(&self) -> Option<Phases> {
         self.levels.as_ref().map(|l| l.windows.phases)

@@ -21,6 +21,11 @@ impl Weights {
         Weights { of: vec![weight], between: true }
     }
 
+    /// Whether they are the same everywhere.
+    pub fn are_constant(&self) -> bool {
+        self.of.iter().all(|grade| grade.constant().is_some())
+    }
+
     /// One number for each lattice, cut off at 0 and divided by their sum. Where all are 0 the shares are equal; designs
     /// with such weights are refused.
     pub fn shares(of: Vec<Grade>) -> Weights {

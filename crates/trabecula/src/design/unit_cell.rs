@@ -6,12 +6,13 @@ use std::cell::RefCell;
 use super::data::*;
 use super::tiled_cell::TiledCell;
 use super::{Built, Design, Loader};
+use crate::blend::Blend;
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::effective::{SheetSide, UnitCell};
 use crate::environment::Environment;
 use crate::implicit::{Implicit, Surface};
 use crate::kind::DesignError;
-use crate::lattice::Lattice;
+use crate::lattice::{Lattice, Level};
 use crate::map::{Affine, MapKind};
 use crate::region::{Cuboid, Region};
 use crate::truss::Beams;
@@ -23,10 +24,8 @@ const MARGIN: f64 = 0.1;
 
 /// The cell of a design that has been built.
 pub(super) fn of(built: &Built, design: &Design, loader: &dyn Loader) -> Result<UnitCell, DesignError> {
-    if design.blend.is_some() {
-        let message = "a blend has no cell of its own: where the lattices mix, each place has another one. Take the figures of a \
-                       design with one of its lattices, at several fractions if they vary";
-        return Err(DesignError::new("blend", message));
+    if let Some(blended) = &built.blend {
+        return of_blend(&blended.blend, built);
     }
     match (&built.lattices[..], &built.tilings[..], &built.beams[..]) {
         ([(name, lattice)], [], []) => of_lattice(name, lattice),
@@ -48,6 +47,21 @@ fn frame(map: &Affine, repeats: [i32; 3]) -> (Vec3, Mat3) {
     (corner, edges)
 }
 
+/// Of lattices whose cells are alike in size and orientation and that have the same shares everywhere.
+fn of_blend(blend: &Arc<Blend>, built: &Built) -> Result<UnitCell, DesignError> {
+    let maps: Option<Vec<&Affine>> = built.lattices.iter().map(|(_, l)| l.uniform().and(l.map.affine())).collect();
+    let maps = maps.filter(|_| blend.is_uniform() && built.tilings.is_empty() && built.beams.is_empty());
+    let maps = maps.filter(|maps| maps.iter().all(|map| map.matrix == maps[0].matrix));
+    let Some([first, ..]) = maps.as_deref() else {
+        let message = "the cells of this blend differ from place to place; those of lattices of one level each, of the same wavelength and \
+                       orientation, under constant weights are alike. Take the figures of a design with one of its lattices, at several \
+                       fractions if they vary";
+        return Err(DesignError::new("blend", message));
+    };
+    let (corner, edges) = frame(first, [1; 3]);
+    Ok(pulled("blend".into(), blend.clone(), corner, edges))
+}
+
 pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell, DesignError> {
     let path = format!("lattice.{name}");
     let Some(map) = lattice.map.affine() else {
@@ -66,7 +80,10 @@ pub(super) fn of_lattice(name: &str, lattice: &Arc<Lattice>) -> Result<UnitCell,
         None => lattice.cell.thickness(lattice.part, level, &map.matrix),
     };
     let mut cell = pulled(path, lattice.clone(), corner, edges);
-    cell.fraction = Some(lattice.fraction(level));
+    cell.fraction = match &lattice.level {
+        Level::Fraction(asked) => asked.constant(),
+        _ => Some(lattice.fraction(level)),
+    };
     cell.connected = Some(lattice.connected_fraction());
     cell.wall = wall;
     if lattice.distance().is_none() {
