@@ -1320,6 +1320,9 @@ class TransitionReport(Report):
     """The narrowest neck of the widest path from one lattice to the other; None where they are not connected."""
     pieces: int
     """Connected components of the solid that reach into it; 1 where it holds together."""
+    resolved: bool
+    """Whether the thinnest wall, neck or beam of the lattices is two steps thick: else it may seem broken, and components
+    more."""
     step: float
     """Distance between sample points, mm."""
     volume: float

@@ -263,13 +263,15 @@ def _transition(it: TransitionReport) -> Iterator[str]:
     error = "" if worst is None else f", off by {worst:+.4f} at most"
     fractions = [row.found for row in it.fractions]
     yield f"  fraction   {span([min(fractions), max(fractions)])}{error}"
-    yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm, on which walls under two steps may seem broken"
+    sure = it.resolved or it.pieces == 1
+    unknown = f"not known: walls are thinner than two steps of a grid of {it.step:.3g} mm; a mesh counts them"
+    yield f"  pieces     {f'{it.pieces} on a grid of {it.step:.3g} mm' if sure else unknown}"
     neck = "none: not connected across the transition"
     if it.neck:
         found = f"{it.neck.diameter:.3g} mm to within {it.step:.3g} mm"
         neck = f"{found}, at {point(it.neck.place)} mm, the narrowest of the widest path across"
     yield f"  neck       {neck}"
-    for word, bodies in (("loose", it.loose), ("dangling", it.dangling)):
+    for word, bodies in (("loose", it.loose), ("dangling", it.dangling)) if sure else ():
         yield f"  {word:10} {bodies.bodies}" + (f", {figure(bodies.volume)} mm³" if bodies.bodies else "")
 
 

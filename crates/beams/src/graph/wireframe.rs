@@ -136,14 +136,20 @@ impl Wireframe {
         Within { struts: vec![true; self.struts.len()], joints: nodes.clone(), nodes }
     }
 
-    /// Statistics of what is within a region.
-    pub fn report(&self, within: &Within) -> WireframeReport {
-        let kept = self.struts.iter().zip(&within.struts).filter(|(_, kept)| **kept);
-        let part = Wireframe { nodes: self.nodes.clone(), struts: kept.map(|(s, _)| *s).collect() };
+    /// Statistics of what is within a region; pairs of struts that `cross` are joined there.
+    pub fn report(&self, within: &Within, cross: impl Iterator<Item = [u32; 2]>) -> WireframeReport {
+        let mut numbers = vec![None; self.struts.len()];
+        let kept = (0..self.struts.len()).filter(|s| within.struts[*s]);
+        let kept = kept.enumerate().map(|(number, s)| {
+            numbers[s] = Some(number as u32);
+            self.struts[s]
+        });
+        let part = Wireframe { nodes: self.nodes.clone(), struts: kept.collect() };
         let incidence = Incidence::of(&part);
+        let cross = cross.filter_map(|[a, b]| Some([numbers[a as usize]?, numbers[b as usize]?]));
         let mut report = WireframeReport {
             struts: part.struts.len(),
-            components: part.components(&incidence, &within.joints),
+            components: part.components(&incidence, &within.joints, cross),
             ..WireframeReport::default()
         };
         for strut in &part.struts {
@@ -181,10 +187,13 @@ impl Wireframe {
         report
     }
 
-    /// Number of connected components of struts, which are joined at these nodes.
-    fn components(&self, incidence: &Incidence, joints: &[bool]) -> usize {
+    /// Number of connected components of struts, which are joined at these nodes and where they cross.
+    fn components(&self, incidence: &Incidence, joints: &[bool], cross: impl Iterator<Item = [u32; 2]>) -> usize {
         let mut root = singles(self.struts.len());
         let mut components = self.struts.len();
+        for [a, b] in cross {
+            components -= usize::from(unite(&mut root, a, b));
+        }
         for node in (0..self.nodes.len()).filter(|n| joints[*n]) {
             for pair in incidence.at(node).windows(2) {
                 components -= usize::from(unite(&mut root, pair[0], pair[1]));
@@ -213,7 +222,8 @@ mod tests {
             struts: vec![[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [5, 6]],
         };
         let mut within = wireframe.whole();
-        let report = wireframe.report(&within);
+        let apart = std::iter::empty;
+        let report = wireframe.report(&within, apart());
         assert_eq!(report.valence, BTreeMap::from([(1, 3), (2, 3), (3, 1)]));
         assert_eq!((report.length, report.components), (Some([1.0, 3.0]), 2));
         assert!((report.total_length - 12.0).abs() < 1e-12);
@@ -221,9 +231,14 @@ mod tests {
         // What crosses a region with both ends outside is counted, and joined to others at nodes there alone.
         within.nodes.fill(false);
         within.joints = vec![false, true, false, false, false, false, false];
-        let report = wireframe.report(&within);
+        let report = wireframe.report(&within, apart());
         assert_eq!((report.struts, report.components, report.valence.len()), (6, 5, 0));
+        // Struts that cross are one component too, unless one is left out.
+        let cross = || [[0, 2], [2, 5], [5, 0]].into_iter();
+        assert_eq!(wireframe.report(&within, cross()).components, 3);
+        within.struts[2] = false;
+        assert_eq!(wireframe.report(&within, cross()).components, 3);
         within.struts.fill(false);
-        assert_eq!(wireframe.report(&within), WireframeReport::default());
+        assert_eq!(wireframe.report(&within, apart()), WireframeReport::default());
     }
 }

@@ -107,8 +107,8 @@ pub(super) fn beams(
     let within = if whole { wire.whole() } else { truss::within(&quadors, region, &inside) };
     let truss = Truss {
         whole,
+        report: wire.report(&within, collisions.iter().map(|c| c.beams)),
         collisions,
-        report: wire.report(&within),
         within,
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         shortfalls,

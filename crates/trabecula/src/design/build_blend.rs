@@ -151,12 +151,11 @@ pub(super) fn blend(
     unused(&blend, &names, members, environment, warnings);
     cancelling(&blend, &names, &equal, environment, warnings);
     // The width is that at samples: exactly two cells are wide enough.
-    if let Some(Transition { width, between: [a, b], cell }) = narrow.filter(|t| t.cells() < 2.0 * (1.0 - WIDTH_ERROR))
-    {
-        let lost = if by == By::Fraction { ", and the fraction is not held" } else { "" };
+    let steep = narrow.filter(|t| by == By::Fraction && t.cells() < 2.0 * (1.0 - WIDTH_ERROR));
+    if let Some(Transition { width, between: [a, b], cell }) = steep {
         let message = format!(
             "the transition between \"{}\" and \"{}\" is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet \
-             there without growing into each other{lost}",
+             there without growing into each other, and the fraction is not held",
             names[a],
             names[b],
             figure(width),

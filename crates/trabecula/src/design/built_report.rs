@@ -26,24 +26,24 @@ const ZONES: usize = 10;
 pub(super) fn expected(built: &Built) -> (f64, f64) {
     let region = &built.solid.region;
     let (points, share) = sample::inside(region, 2 * sample::COUNT);
-    let mut values = vec![0.0; points.len()];
-    built.solid.values(&points, &mut values);
-    let solid = values.iter().filter(|v| **v <= 0.0).count();
     let sampled = || share * region.bounds().size().iter().product::<f64>();
-    let volume = region.volume().unwrap_or_else(sampled);
-    (solid as f64 / points.len().max(1) as f64, volume)
+    (solid_share(&points, &built.solid), region.volume().unwrap_or_else(sampled))
 }
 
-/// The solid share of the region; of beams in a blend, if they filled it alone.
+/// The solid share of the region; of beams in a blend, if they filled it alone. Within about a thousandth of it where a few hundredths are
+/// solid.
 fn filling(built: &Built, beams: &Beams) -> f64 {
-    if built.blend.is_none() {
-        return expected(built).0;
+    let (points, _) = sample::inside(&built.solid.region, 40 * sample::COUNT);
+    match built.blend {
+        Some(_) => solid_share(&points, &*beams.field()),
+        None => solid_share(&points, &built.solid),
     }
-    let (points, _) = sample::inside(&built.solid.region, 2 * sample::COUNT);
-    let mut values = vec![0.0; points.len()];
-    beams.field().values(&points, &mut values);
-    let solid = values.iter().filter(|v| **v <= 0.0).count();
-    solid as f64 / points.len().max(1) as f64
+}
+
+/// The share of points at which a field is solid.
+fn solid_share(points: &[[f64; 3]], field: &dyn Field) -> f64 {
+    let values = sample::values(points, |points, out| field.values(points, out));
+    values.iter().filter(|v| **v <= 0.0).count() as f64 / points.len().max(1) as f64
 }
 
 pub(super) fn report(built: &Built) -> DesignReport {
@@ -289,10 +289,14 @@ pub(super) fn transitions(built: &Built) -> Vec<TransitionReport> {
         return Vec::new();
     };
     let bodies = |(bodies, volume): (usize, f64)| LooseBodies { bodies, volume };
+    let figures = built.report();
+    let walls = figures.lattices.values().filter_map(|l| l.thickness).map(Varying::least);
+    let thinnest = walls.chain(figures.beams.values().map(|b| b.thickness)).fold(f64::INFINITY, f64::min);
     let one = |t: Transition| TransitionReport {
         between: t.between.map(|i| b.names[i].clone()),
         volume: t.volume,
         pieces: t.pieces,
+        resolved: 2.0 * t.step <= thinnest,
         loose: bodies(t.loose),
         dangling: bodies(t.dangling),
         neck: t.neck.map(|(diameter, place)| NarrowestNeck { diameter, place }),

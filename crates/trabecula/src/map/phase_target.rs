@@ -260,8 +260,7 @@ mod tests {
         let wanted = PhaseRequest::new(of(2.0), Orientation::Angles(of(0.0)));
         let bounds = block.bounds();
         let inside = |region: Difference| {
-            let domain =
-                SolveDomain::over(&bounds, Grid::over(&bounds, [33, 33, 13]), &wanted, Some(&region)).unwrap();
+            let domain = SolveDomain::over(&bounds, Grid::over(&bounds, [33, 33, 13]), &wanted, Some(&region)).unwrap();
             domain.inside
         };
         let (ends, through) = (inside(plate(0.0)), inside(plate(1.0)));

@@ -235,6 +235,8 @@ pub struct TransitionReport {
     pub volume: f64,
     /// Connected components of the solid that reach into it; 1 where it holds together.
     pub pieces: usize,
+    /// Whether the thinnest wall, neck or beam of the lattices is two steps thick: else it may seem broken, and components more.
+    pub resolved: bool,
     /// Components that touch neither side.
     pub loose: LooseBodies,
     /// Components attached by necks under half the narrowest neck of the widest path across.

@@ -92,7 +92,7 @@ mod tests {
             let mut wireframe = fill(&graph, &affine(4.0), &bounds, 0.0).expect("a wireframe");
             let done = wireframe.clean(1e-9, &mut GivenRadii::default());
             assert_eq!(done, Default::default(), "{}", unit.name);
-            let report = wireframe.report(&wireframe.whole());
+            let report = wireframe.report(&wireframe.whole(), std::iter::empty());
             let mut lengths = graph.lengths([4.0; 3]);
             lengths.sort_by(f64::total_cmp);
             let [least, most] = report.length.expect("struts");
