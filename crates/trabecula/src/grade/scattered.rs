@@ -2,11 +2,12 @@
 
 use super::csv::table;
 use super::remapped::sampled;
+use super::result::percent;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::Environment;
 use crate::kind::{DesignError, Kind, Unit, Warning};
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Vec3, scale};
+use geometry::math::{Aabb, Vec3, norm, scale};
 
 /// The share of the region's bounds along each axis that a table of tensors has to reach over: middles of large elements do.
 const COVERED: f64 = 0.5;
@@ -58,6 +59,24 @@ fn doubt(positions: &[Vec3], bounds: &Aabb) -> Option<String> {
     ))
 }
 
+/// The share of the region beyond the points from which on it is said.
+const BEYOND: f64 = 0.25;
+
+/// Says that much of the region lies farther out than the points by more than they are apart.
+fn beyond(positions: &[Vec3], environment: &Environment) -> Option<String> {
+    let all = positions.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+    let reach = all.grown(norm(all.size()) / (positions.len() as f64).cbrt());
+    let out = environment.points.iter().filter(|p| reach.distance(**p) > 0.0).count();
+    let share = out as f64 / environment.points.len().max(1) as f64;
+    let message = format!(
+        "the points reach from {:?} to {:?} mm: {} of the region is beyond, where the numbers of the nearest count",
+        all.min,
+        all.max,
+        percent(share)
+    );
+    (share > BEYOND).then_some(message)
+}
+
 /// Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the distance.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Points", noun = "a grade at points")]
@@ -85,7 +104,8 @@ impl BuildGrade for PointsKind {
         let (positions, values): (Vec<Vec3>, Vec<[f64; 1]>) = rows.iter().map(|r| ([r[0], r[1], r[2]], [r[3]])).unzip();
         let bounds = environment.region.bounds();
         check_reach(&positions, &bounds, TOUCHED, self.unit).map_err(wrong)?;
-        if let Some(message) = self.unit.is_none().then(|| doubt(&positions, &bounds)).flatten() {
+        let doubted = self.unit.is_none().then(|| doubt(&positions, &bounds)).flatten();
+        if let Some(message) = doubted.or_else(|| beyond(&positions, environment)) {
             let message = format!("{}: {message}", self.path);
             environment.notes.borrow_mut().warnings.push(Warning { path: at.clone(), message });
         }
