@@ -20,6 +20,8 @@ SHOWN = (
     ("stress_bracket", 20, 300, 20, LONG),
     ("heat_exchanger", 24, 30, 35, WIDE),
     ("helmet_liner", 24, 30, -20, WIDE),
+    ("hip_cup", 24, 30, 40, WIDE),
+    ("shoe_sole", 28, 300, 35, LONG),
     ("octet_filleted", None, 30, 25, WIDE),
     ("diamond_cylinder", None, 30, 25, WIDE),
     ("swirl", 16, 30, 25, WIDE),
