@@ -11,8 +11,10 @@ import os
 import pickle
 import random
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 import types
 import warnings
@@ -569,6 +571,70 @@ def test_rows_of_a_worker_of_another_version_are_not_taken(tmp_path: Path):
                 # The worker goes, and one with another version comes.
                 client.run(exec, "import trabecula._core as it; it.__version__ = '9.9.9'", {})
     assert 0 < len(rows) < 12 and {row["version"] for row in rows} == {lt.__version__}
+
+
+#: The command in a process in which a cluster has a second to answer.
+IMPATIENT = """
+import sys
+import threading
+from trabecula.command import cli
+from trabecula.jobs import clusters
+clusters.PATIENCE = 1
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+@contextlib.contextmanager
+def listening(reply: bytes):
+    """The address of a port that accepts whoever comes and sends this at once."""
+    with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as kept:
+
+        def serve() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    kept.enter_context(server.accept()[0]).sendall(reply)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)  # which ends the wait for the next one
+        thread.join()
+
+
+def refused_by_cluster(tmp_path: Path, address: str) -> str:
+    """The one line that the command ends with, which names the cluster, within its patience, and writes nothing."""
+    study, begun = written(tmp_path, TWO), time.monotonic()
+    words = [sys.executable, "-c", IMPATIENT, "sweep", study, "-o", tmp_path / "out.csv", "--cluster", address]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1 and done.stderr.startswith(f"trabecula: cluster {address}"), done.stderr
+    assert done.stderr.count("\n") == 1 and time.monotonic() - begun < 20
+    assert os.listdir(tmp_path) == ["study.toml"]
+    return done.stderr
+
+
+@pytest.mark.parametrize(
+    ("reply", "said"),
+    [
+        (b"", "there is a connection, but no Dask scheduler answers within 1 s"),
+        (b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n", "what answers there is no Dask scheduler"),
+        (b"SSH-2.0-OpenSSH_9.2p1\r\n", "what answers there is no Dask scheduler"),
+        (bytes(8), "no Dask scheduler answers there"),
+    ],
+)
+def test_a_port_of_something_else_than_a_cluster_is_named_with_what_may_be_wrong(tmp_path: Path, reply: bytes, said: str):
+    pytest.importorskip("distributed")
+    with listening(reply) as address:
+        found = refused_by_cluster(tmp_path, address)
+    assert said in found and "8787 is usually the port of its dashboard" in found and "Unable to allocate" not in found
+
+
+def test_ports_of_a_cluster_that_are_not_its_schedulers_are_told_from_it(tmp_path: Path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50) as made:
+        (worker,) = made.scheduler.workers
+        assert "a worker of Dask answers there, not a scheduler" in refused_by_cluster(tmp_path, worker)
+        dashboard = f"tcp://127.0.0.1:{made.scheduler.http_server.port}"
+        assert "no Dask scheduler answers" in refused_by_cluster(tmp_path, dashboard)
 
 
 def test_workers_of_a_cluster_that_are_killed_all_at_once_cost_no_row(tmp_path: Path):

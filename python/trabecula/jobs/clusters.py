@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 import time
 import warnings
 from collections import deque
@@ -72,6 +73,8 @@ def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
         return opened.enter_context(dask.Client(here, direct_to_workers=True))
     queued = cluster.partition(":")[0] in QUEUES
     at, patience = (_queued(cluster, opened), QUEUED) if queued else (cluster, PATIENCE)
+    if not queued:
+        _check_scheduler(cluster)
     try:
         client = opened.enter_context(dask.Client(at, timeout=PATIENCE))
         client.patience = patience
@@ -79,6 +82,62 @@ def _client(dask: Any, cluster: str, opened: ExitStack) -> Any:
         return client
     except (OSError, TimeoutError, ValueError) as error:
         raise ValueError(f"cluster {cluster} does not answer within {patience} s: {error}") from None
+
+
+def _check_scheduler(address: str) -> None:
+    """Refuses an address where no Dask scheduler answers within ``PATIENCE``. A client of Dask waits for ever for an answer to
+    its greeting, and leaves threads and messages where that is none.
+    """
+    found: list[str | Exception] = []
+
+    def ask() -> None:
+        try:
+            # A second more than the connection has, so that silence after it is told from there being none.
+            found.append(asyncio.run(asyncio.wait_for(_kind(address), PATIENCE + 1)))
+        except Exception as error:  # whatever the bytes of something else than Dask end in
+            found.append(error)
+
+    # A thread has an event loop of its own, also in notebooks, and one that is a daemon keeps no interrupt waiting.
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    asking.join()
+    (said,) = found
+    if said == "Scheduler":
+        return
+    if isinstance(said, ConnectionError):
+        words = f"does not answer within {PATIENCE} s; does a Dask scheduler run there, and does a firewall let it through?"
+        raise ValueError(f"cluster {address} {words}")
+    if isinstance(said, str):
+        words = f"a {said.lower()} of Dask answers there, not a scheduler"
+    elif isinstance(said, (TimeoutError, asyncio.TimeoutError)):
+        words = f"there is a connection, but no Dask scheduler answers within {PATIENCE} s"
+    elif isinstance(said, MemoryError):  # the first bytes of HTTP or SSH, read as the length of a message
+        words = "what answers there is no Dask scheduler"
+    else:
+        words = f"no Dask scheduler answers there ({' '.join(str(said).split()) or type(said).__name__:.200})"
+    raise ValueError(
+        f"cluster {address}: {words}; take the address that the scheduler prints, such as tcp://head:8786 (8787 is usually the "
+        "port of its dashboard)"
+    )
+
+
+async def _kind(address: str) -> str:
+    """What of Dask answers at an address: "Scheduler", "Worker", "Nanny". ConnectionError where nothing can be connected to."""
+    from distributed import Security
+    from distributed.comm import CommClosedError
+    from distributed.core import connect
+
+    try:
+        comm = await connect(address, PATIENCE, **Security().get_connection_args("client"))
+    except (CommClosedError, TimeoutError, asyncio.TimeoutError):
+        raise
+    except OSError as error:
+        raise ConnectionError(str(error)) from error
+    try:
+        await comm.write({"op": "identity", "reply": True})
+        return (await comm.read())["type"]
+    finally:
+        comm.abort()
 
 
 def _started(dask: Any, count: int, opened: ExitStack) -> Any:
