@@ -118,9 +118,32 @@ def percent(share):
     return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
+def doubted(law):
+    """(property, fraction) of the figures whose notes say that they may be off by more than their error."""
+    signs = ("more than the error says", "off by more than", "links may pass")
+    return {
+        (message.partition(":")[0], note["fraction"])
+        for note in law["notes"]
+        for message in note["messages"]
+        if any(words in message for words in signs)
+    }
+
+
 def steps(law):
     """The voxels along the cell, and the nodes for flow if these are others."""
     return f"{law['n']}, K {law['n_flow']}" if law.get("n_flow", law["n"]) != law["n"] else str(law["n"])
+
+
+def row(law, i, doubts):
+    """The texts of the figures of a law at one of its fractions."""
+    fraction = law["columns"]["fraction"][i]
+    yield f"{fraction:.2f}"
+    for name, of in (("E", "stiffness"), ("zener", None), ("k", "conductivity"), ("K", "permeability"), ("area", None)):
+        value = law["columns"][name][i] if name in law["columns"] else None
+        none = value is None or (value == 0 and name == "K")
+        yield "–" if none else f"{value:.4g}"
+        if of:
+            yield "–" if none else ("> " if (of, fraction) in doubts else "") + percent(law["columns"][f"{name}_error"][i])
 
 
 def lines(laws):
@@ -134,25 +157,18 @@ def lines(laws):
         "[properties.json](properties.json). A dash is a cell that falls apart or, of K, a pore that does not go through "
         "or was not computed: flow takes most of the time, and is of as many nodes along the cell as stand after K. "
         "Tetrahedral cells stand in the equal tetrahedra of a body-centred cubic lattice, and λ is the edge of a regular one "
-        "of the same volume; their permeability is left out."
+        "of the same volume; their permeability is left out. Where `>` stands before an error, the thinnest wall is less than "
+        "three voxels across (of K two steps), or the grids differ too much: the figures, most often too high, are off by more "
+        "than that."
     )
     for part in (part for part in PARTS if any(kind(law) == part for law in laws)):
         yield from ("", f"## {part}", "", f"![Properties by fraction](../images/properties_{part}.svg)", "")
         yield "| cell | n | fraction | E | error of E | Zener | k | error of k | K / λ² | error of K | area λ / V |"
         yield "|" + "---|" * 11
         for law in (law for law in laws if kind(law) == part):
-            columns = law["columns"]
-            for i in range(0, len(columns["fraction"]), 2):
-                cells = [
-                    columns[name][i] if name in columns else None
-                    for name in ("E", "E_error", "zener", "k", "k_error", "K", "K_error", "area")
-                ]
-                shares = {1, 4, 6}
-                texts = [
-                    "–" if v is None or (v == 0 and j == 5) else percent(v) if j in shares else f"{v:.4g}"
-                    for j, v in enumerate(cells)
-                ]
-                yield "| " + " | ".join([f"`{law['cell']}`", steps(law), f"{columns['fraction'][i]:.2f}", *texts]) + " |"
+            doubts = doubted(law)
+            for i in range(len(law["columns"]["fraction"])):
+                yield "| " + " | ".join([f"`{law['cell']}`", steps(law), *row(law, i, doubts)]) + " |"
 
 
 def main():
