@@ -243,11 +243,17 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path):
     assert [None if t == "" else float(t) for t in texts] == read["volume_mm3"].to_pylist()
     assert read.schema.field("volume_mm3").metadata == {b"unit": "mm³".encode()}
     study = written(tmp_path, '"lattice.a.map.affine.wavelength" = [4, 5]\n"lattice.a.map.affine.rotate" = [[0, 0, 0]]')
-    assert command("sweep", study, "-o", tmp_path / "units.parquet", "--per-cell", 8).returncode == 0
-    schema = parquet.read_schema(tmp_path / "units.parquet")
+    for name in ("with.csv", "with.parquet"):
+        assert command("sweep", study, "-o", tmp_path / name, "--per-cell", 8).returncode == 0
+    schema = parquet.read_schema(tmp_path / "with.parquet")
     assert schema.field("lattice.a.map.affine.wavelength").metadata == {b"unit": b"mm"}
     assert schema.field("lattice.a.map.affine.rotate").metadata == {b"unit": "°".encode()}
     assert [str(schema.field(name).type) for name in ("error", "warnings", "version")] == ["string"] * 3
+    # A table in CSV has plain headings, and the same units in a table of their own.
+    units = {row["column"]: row["unit"] for row in csv.DictReader((tmp_path / "with.units.csv").open(encoding="utf-8"))}
+    assert list(units) == schema.names == (tmp_path / "with.csv").read_text().partition("\n")[0].split(",")
+    assert set(units.values()) == {"mm", "°", "mm²", "mm³", "s", ""}
+    assert units == {name: (schema.field(name).metadata or {b"unit": b""})[b"unit"].decode() for name in schema.names}
 
 
 def test_each_figure_has_its_error_and_each_row_what_reports_warn_of(tmp_path: Path):
@@ -333,6 +339,57 @@ def test_rows_that_are_there_are_taken_up_unless_the_study_has_changed(tmp_path:
 
     assert command(*words, "--new").returncode == 0
     assert [row["pieces"] for row in table(out)] == ["1", "1"]
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_finished_table_of_another_study_is_kept(tmp_path: Path, kind: str):
+    if kind == "parquet":
+        pytest.importorskip("pyarrow")
+    out = tmp_path / f"out.{kind}"
+    sweep = '"lattice.a.level.fraction" = [0.2, 1.5]\n"lattice.a.cell" = ["gyroid", "diamond"]\n'
+    words = ("sweep", written(tmp_path, sweep), "-o", out, "--per-cell", 8, "--jobs", 1)
+    assert command(*words).returncode == 0
+    finished = out.read_bytes()
+    text = (tmp_path / "study.toml").read_text()
+    for old, new, said in (
+        ("1.5", "0.3", "lattice.a.level.fraction (1.5, now 0.3)"),
+        ('"diamond"]', '"iwp"]', "lattice.a.cell (diamond, now iwp)"),
+        ("[0.2, 1.5]", "[0.2]", "the number of designs (4, now 2)"),
+        ('"lattice.a.cell" = ["gyroid", "diamond"]', "", "columns (lattice.a.cell)"),
+        ('part = "sheet"', 'part = "lower"', "keys of the design that do not vary (its sha256 differs)"),
+        ("[4, 4, 4]", "[4, 4, 5]", "keys of the design that do not vary (its sha256 differs)"),
+    ):
+        assert old in text
+        (tmp_path / "study.toml").write_text(text.replace(old, new))
+        done = command(*words)
+        assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+        assert f"{out} is the finished table of another sweep: changed since are {said}" in done.stderr, done.stderr
+        assert done.stderr.endswith("; name another output, or overwrite it with --new\n")
+        assert out.read_bytes() == finished and not Path(f"{out}.rows").exists()
+    done = command(*words, "--properties", "conductivity", "--n", 8)
+    assert done.returncode == 1 and "changed since are columns (k11, k12, k13 and " in done.stderr, done.stderr
+    done = command(*words, "--new")
+    assert done.returncode == 0 and out.read_bytes() != finished
+    # The same study is made again, however its values are written.
+    (tmp_path / "study.toml").write_text((tmp_path / "study.toml").read_text().replace("[4, 4, 5]", "[4.0, 4, 5e0]"))
+    done = command(*words, "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["resumed"] == 0, done.stderr
+
+
+def test_a_table_of_another_version_is_kept_and_what_is_no_table_is_not(tmp_path: Path):
+    study, out = written(tmp_path, TWO), tmp_path / "out.csv"
+    words = ("sweep", study, "-o", out, "--per-cell", 8, "--jobs", 1)
+    assert command(*words).returncode == 0
+    out.write_text(out.read_text().replace(lt.__version__, "0.0.9"))
+    done = command(*words)
+    assert done.returncode == 1 and f"changed since are the version (0.0.9, now {lt.__version__})" in done.stderr, done.stderr
+    # Rows of this study have been made since the table was: they are gone on with.
+    journal_of(study, out, row_of(Job(lt.load(study), per_cell=8.0), 0, {"lattice.a.level.fraction": 0.2}))
+    done = command(*words, "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["resumed"] == 1, done.stderr
+    for other in (b"", b"a,b\n1,2\n", b"\xff\xfe\x00"):
+        out.write_bytes(other)
+        assert command(*words).returncode == 0 and len(table(out)) == 2
 
 
 def journal_of(study: Path, out: Path, *rows: dict) -> Path:

@@ -277,17 +277,18 @@ def check_sets(args: Namespace) -> None:
 
 def sweep(args: Namespace) -> None:
     """``trabecula sweep``."""
-    from .sweeping import draw, table_of
+    from .sweeping import draw, table_of, units_of
 
     if args.plot and not 2 <= len(args.plot) <= 3:
         raise WrongUsage(f"--plot takes two columns, or three: X Y COLOUR; found {len(args.plot)}")
     if args.front and not args.plot:
         raise WrongUsage("--front is of --plot; name columns, or leave it out")
     drawing = os.path.splitext(args.output)[0] + ".svg" if args.plot else None
-    for name in filter(None, (args.output, drawing)):
+    of_table = kind_of(args.study) in SWEEP_WRITES
+    for name in filter(None, (args.output, drawing, None if of_table else units_of(args.output))):
         check_place(name)
         keep_file(args.study, name)
-    if kind_of(args.study) in SWEEP_WRITES:
+    if of_table:
         if not drawing:
             raise Refused(f"{args.study} is a table already; say with --plot X Y what to draw of it")
         return draw(args.study, args, drawing)

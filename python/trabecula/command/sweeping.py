@@ -10,19 +10,20 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any
 
-from ..base.files import read_text, write_svg
+from .. import _core
+from ..base.files import read_text, special, write_svg
 from ..base.formats import kind_of
 from ..base.keys import nearest
 from ..base.terminal import Progress, left, say
 from ..design import Design
 from ..errors import Refused, WrongUsage
 from ..io.bridges import package
-from ..sweeps.rows import TEXTS, Job, columns_of_job, is_made, named
+from ..sweeps.rows import TEXTS, Job, columns_of_job, digest_of, is_made, named
 from ..sweeps.scatter import scatter, without_place
 from ..sweeps.study import Study
-from ..sweeps.table import FEW, Journal, columns_of, prepared, run, write_table
+from ..sweeps.table import FEW, Journal, cell, columns_of, prepared, run, units_of, write_table
 
-__all__ = ["draw", "table_of"]
+__all__ = ["draw", "table_of", "units_of"]
 
 
 def table_of(design: Design, args: Namespace) -> dict[str, Any]:
@@ -49,6 +50,8 @@ def table_of(design: Design, args: Namespace) -> dict[str, Any]:
     journal = Journal(args.output, job)
     with journal.writing(args.new) as add:
         resumed = len(journal.rows)
+        if not (args.new or resumed):
+            check_finished(args.output, job, points)
         if resumed:
             say(f"{resumed} of {len(points)} rows are there already ({journal.path})")
         make(job, points, journal, add, args)
@@ -61,6 +64,52 @@ def table_of(design: Design, args: Namespace) -> dict[str, Any]:
         write_table(args.output, columns_of(made))
         journal.end()
     return {"rows": len(made), "failed": len(failed), "resumed": resumed}
+
+
+def check_finished(name: str, job: Job, points: list[dict[str, Any]]) -> None:
+    """Refuses to overwrite a finished table of other designs, with what differs. What is no table of a sweep is an output like
+    others.
+    """
+    if special(name) or not os.path.isfile(name) or not os.path.getsize(name):
+        return
+    try:
+        found = columns_of_table(name)
+    except (Refused, ValueError):
+        return
+    if "design" in found and "sha256" in found and (changed := changes(found, job, points)):
+        raise Refused(
+            f"{name} is the finished table of another sweep: changed since are {', '.join(changed[:6])}; name another "
+            "output, or overwrite it with --new"
+        )
+
+
+def changes(table: dict[str, list], job: Job, points: list[dict[str, Any]]) -> list[str]:
+    """What differs between a finished table and one of these points, as far as the table shows it."""
+    known = columns_of_job(job, points[0])
+    if other := [column for column in dict.fromkeys([*table, *known]) if (column in table) != (column in known)]:
+        more = f" and {len(other) - 3} more" if len(other) > 3 else ""
+        return [f"columns ({', '.join(other[:3])}{more})"]
+    count = len(table["design"])
+    if count != len(points):
+        return [f"the number of designs ({count}, now {len(points)})"]
+    changed = []
+    for path in points[0]:
+        pairs = zip(table[path], (point[path] for point in points), strict=True)
+        if other := next(((old, new) for old, new in pairs if plain(old) != plain(new)), None):
+            changed.append(f"{path} ({plain(other[0])!s:.40}, now {plain(other[1])!s:.40})")
+    if changed:
+        return changed
+    if version := next((of for of in table["version"] if of and of != _core.__version__), None):
+        return [f"the version ({version}, now {_core.__version__})"]
+    # Values are the same, so that of the designs either all or none are.
+    made = next(((digest, point) for digest, point in zip(table["sha256"], points, strict=True) if digest), None)
+    same = made is None or made[0] == digest_of(job.design, made[1])
+    return [] if same else ["keys of the design that do not vary (its sha256 differs)"]
+
+
+def plain(value: Any) -> float | str:
+    """A value as a table in CSV gives it back."""
+    return number_of(str(cell(value)))
 
 
 def make(

@@ -31,6 +31,7 @@ __all__ = [
     "Job",
     "check_paths",
     "columns_of_job",
+    "digest_of",
     "is_made",
     "named",
     "row_of",
@@ -116,7 +117,7 @@ def _at_home(job: Job, text: str) -> str:
 def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]:
     core = _varied(job.design, values)
     folder = job.design.folder or os.getcwd()
-    figures: dict[str, Any] = {"sha256": hashlib.sha256(core.to_toml().encode()).hexdigest()}
+    figures: dict[str, Any] = {"sha256": _digest(core)}
     if job.sent:
         folder, places = job.sent
         core = _core.Design.from_data(moved(json.loads(core.to_json()), lambda name: places.get(name, name)))
@@ -150,6 +151,15 @@ def _figures(job: Job, number: int, values: Mapping[str, Any]) -> dict[str, Any]
     figures["warnings"] = " | ".join(dict.fromkeys(said))
     figures["error"] = " | ".join(failed) or None
     return figures
+
+
+def _digest(core: _core.Design) -> str:
+    return hashlib.sha256(core.to_toml().encode()).hexdigest()
+
+
+def digest_of(design: Design, values: Mapping[str, Any]) -> str:
+    """The SHA-256 of the text of the design with these values, as its row has it."""
+    return _digest(_varied(design, values))
 
 
 def _located(warning: Mapping[str, str]) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import _core
-from ..base.files import check_place, extension, whole_file
+from ..base.files import check_place, extension, special, whole_file
 from ..base.formats import MESH_WRITES, SWEEP_WRITES
 from ..base.given import whole
 from ..base.keys import nearest
@@ -29,7 +29,7 @@ from .rows import LAST, PROPERTIES, TEXTS, Job, check_paths, columns_of_job, is_
 from .study import Study
 from .workers import rows_by_processes, rows_here
 
-__all__ = ["FEW", "Journal", "columns_of", "objective", "run", "sweep", "write_table"]
+__all__ = ["FEW", "Journal", "cell", "columns_of", "objective", "run", "sweep", "units_of", "write_table"]
 
 #: More designs than these are asked about.
 FEW = 1_000_000
@@ -279,14 +279,18 @@ class Journal:
         self.ended = True
 
 
+def units_of(path: str) -> str | None:
+    """The name of the table of units next to a table in CSV; None of others, which carry them, and of what is no file."""
+    stem, dot = os.path.splitext(path)
+    return f"{stem}.units{dot}" if dot.lower() == ".csv" and not special(path) else None
+
+
 def write_table(path: str, columns: dict[str, list]) -> None:
-    """Writes a table, CSV or (with pyarrow) Parquet, whose columns then carry their units."""
-    kind = extension(path, SWEEP_WRITES)
-    if kind == "csv":
-        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as out:
-            writer = csv.writer(out, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*(map(cell, column) for column in columns.values()), strict=True))
+    """Writes a table, Parquet (with pyarrow), whose columns carry their units, or CSV, with a table of units next to it."""
+    if extension(path, SWEEP_WRITES) == "csv":
+        if units := units_of(path):
+            _write_csv(units, ["column", "unit"], ((name, unit_of_column(name)) for name in columns))
+        _write_csv(path, columns, zip(*(map(cell, column) for column in columns.values()), strict=True))
         return
     arrow = package("pyarrow")
     parquet = package("pyarrow.parquet")
@@ -303,6 +307,13 @@ def write_table(path: str, columns: dict[str, list]) -> None:
         arrays.append(array)
     with whole_file(path) as temporary:
         parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), temporary)
+
+
+def _write_csv(path: str, head: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows(rows)
 
 
 def cell(value: Any) -> Any:
