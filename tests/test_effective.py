@@ -1,7 +1,10 @@
 """Stiffness and conductivity of cells: published values, another discretisation, closed forms, bounds, files and mistakes."""
 
+import csv
+import itertools
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -313,8 +316,6 @@ def test_the_commands_print_and_write(cube, tmp_path):
     assert all(name.stat().st_size > 100 for name in names)
     keys = {"C", "C_n", "n", "error", "residual", "E", "G", "nu", "zener", "anisotropy", "bulk_bounds", "fraction", "warnings"}
     assert keys <= set(report) and report["n"] == 16
-    first = names[0].read_text().splitlines()[1].split(",")
-    assert first[:2] == ["11", "11"] and float(first[2]) == report["C"][0][0]
     meshio = pytest.importorskip("meshio")
     read = meshio.read(tmp_path / "cell.vtu")
     assert np.allclose(np.linalg.norm(read.points, axis=1), read.point_data["E"], rtol=1e-6)
@@ -325,6 +326,116 @@ def test_the_commands_print_and_write(cube, tmp_path):
     report = json.loads(in_process("conductivity", cube, "--n", 16, "--json", "--pore", 0.1))
     assert {"k", "k_n", "error", "bounds"} <= set(report)
     assert "k, relative to the solid's" in in_process("conductivity", cube, "--n", 16)
+
+
+def rows_of(path: Path) -> dict[tuple[str, str, str], dict[str, str]]:
+    """A table of figures by their names, rows and columns."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = {(row["figure"], row["row"], row["column"]): row for row in rows}
+    assert len(found) == len(rows)
+    return found
+
+
+def test_a_table_has_all_figures_of_the_report_with_what_is_known_of_each(cube, tmp_path):
+    out, axes = tmp_path / "cell.csv", ["11", "22", "33", "23", "13", "12"]
+    it = json.loads(in_process("stiffness", cube, "--n", 16, "--json", "-o", out))
+    rows = rows_of(out)
+    for i, j in itertools.product(range(6), range(6)):
+        row = rows["C", axes[i], axes[j]]
+        assert (float(row["value"]), float(row["at_n"])) == (it["C"][i][j], it["C_n"][i][j])
+    for name, of in (("E", "123"), ("G", axes[3:]), ("nu", axes[3:])):
+        assert [float(rows[name, a, ""]["value"]) for a in of] == it[name]
+        assert [rows[name, a, ""]["error"] for a in of] == [str(e) for e in it.get(f"{name}_error") or [""] * 3]
+    for name in ("bulk", "shear"):
+        bounds = [float(rows[name, "", ""][f"{which}_bound"]) for which in ("lower", "upper")]
+        assert bounds == it[f"{name}_bounds"] and float(rows[name, "", ""]["value"]) == it[name]
+    for name in ("zener", "anisotropy", "error", "fraction", "n", "residual", "wall_voxels"):
+        assert float(rows[name, "", ""]["value"]) == it[name]
+    assert len(rows) == 36 + 9 + 2 + 7
+
+    it = json.loads(in_process("conductivity", cube, "--n", 16, "--json", "-o", out))
+    rows = rows_of(out)
+    assert [float(rows["k", a, a]["error"]) for a in "123"] == it["axis_errors"]
+    assert [float(rows["mean", "", ""][f"{which}_bound"]) for which in ("lower", "upper")] == it["bounds"]
+
+    it = json.loads(in_process("permeability", cube, "--n", 16, "--json", "-o", out))
+    rows = rows_of(out)
+    assert [float(rows["k", "1", a]["value"]) for a in "123"] == it["k"][0] and rows["k", "1", "1"]["unit"] == "mm²"
+    # Of cells that are cubes of 4 mm.
+    assert float(rows["k_cell", "1", "1"]["value"]) == pytest.approx(it["k"][0][0] / 16, rel=1e-12)
+    for name in (
+        "hydraulic_diameter",
+        "area_per_volume",
+        "porosity",
+        "tortuosity",
+        "kozeny",
+        "error",
+        "fraction",
+        "pore_nodes",
+    ):
+        assert float(rows[name, "", ""]["value"]) == it[name]
+
+
+def test_the_command_takes_a_solid_of_any_stiffness(cube, tmp_path):
+    """Cubic, and of rows by commas, semicolons and spaces: that of Python; and of a cell that is all solid it is its own."""
+    c = np.diag([2.0, 2, 2, 0.5, 0.5, 0.5])
+    c[:3, :3] += 1 - np.eye(3)
+    path = tmp_path / "solid.csv"
+    lines = [sign.join(str(v) for v in row) for sign, row in zip([",", "; ", " ", "\t", " , ", "  "], c.tolist(), strict=True)]
+    path.write_text("\ufeff# cubic\n" + "\r\n".join(lines) + " # the last\n\n", encoding="utf-8")
+    out = tmp_path / "cell.inp"
+    it = json.loads(in_process("stiffness", cube, "--n", 16, "--json", "--C", path, "-o", out))
+    assert it["C"] == lt.load(cube).build().stiffness(n=16, C=c).C and it["bulk_bounds"] is None
+    assert f"solid of the stiffness in {path}" in out.read_text()
+
+
+SPD = [[2.0 if i == j else 0.25 for j in range(6)] for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([*SPD[:5], [0.25, 0.5, 0.25, 0.25, 0.25, 2.0]], "entries 62 and 26 are 0.5 and 0.25; a stiffness is symmetric"),
+        (
+            [[2.0 if i == j else 2.5 for j in range(6)] for i in range(6)],
+            "its least eigenvalue is -0.5; a stiffness is positive",
+        ),
+        ([*SPD[:5], [0.25] * 5 + ["nan"]], "an entry is not a finite number; give 6 x 6 numbers"),
+        (SPD[:5], "expected 6 lines of 6 numbers, in Voigt's order 11 22 33 23 13 12, found 5"),
+        ([*SPD[:2], SPD[2][:5], *SPD[3:]], ":3: expected 6 numbers, found 5"),
+        ([["C11", *SPD[0][1:]], *SPD[1:]], ":1: expected 6 numbers, found 'C11,0.25"),
+    ],
+)
+def test_a_file_that_holds_no_stiffness_is_named(cube, tmp_path, rows: list, said: str):
+    path = tmp_path / "solid.csv"
+    path.write_text("\n".join(",".join(str(v) for v in row) for row in rows))
+    done = command("stiffness", cube, "--n", 8, "--C", path, "-o", tmp_path / "cell.csv")
+    assert done.returncode == 1 and f"trabecula: {path}:" in done.stderr and said in done.stderr, done.stderr
+    assert done.stderr.splitlines()[-1].startswith("trabecula: ") and not (tmp_path / "cell.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--E", "0"), "argument --E: expected Young's modulus greater than 0, found 0"),
+        (("--nu", "0.5"), "argument --nu: expected Poisson's ratio greater than -1 and less than 0.5 (of an incompressible"),
+        (("--nu", "-1"), "argument --nu: expected Poisson's ratio greater than -1"),
+        (("--nu", "soft"), "argument --nu: expected Poisson's ratio, found 'soft'"),
+        (("--C", "solid.csv", "--E", "2"), "--C is the stiffness of a solid, --E and --nu are those of an isotropic one"),
+        (("--C", "solid.csv", "--nu", "0.3"), "--C is the stiffness of a solid, --E and --nu are those of an isotropic one"),
+        (("--C", "solid.stl"), "argument --C: the name must end in .csv, .txt, .dat; found 'solid.stl'"),
+    ],
+)
+def test_solids_that_are_none_are_wrong_usage(cube, words: tuple, said: str):
+    done = command("stiffness", cube, *words)
+    assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+@pytest.mark.parametrize("words", [("law", "gyroid"), ("volume", "cell.toml", "-o", "cell.inp")])
+def test_poissons_ratio_is_checked_by_all_commands(words: tuple):
+    done = command(*words, "--nu", "0.5")
+    assert done.returncode == 2 and "argument --nu: expected Poisson's ratio greater than -1" in done.stderr, done.stderr
 
 
 def test_a_sweep_has_the_properties_that_are_asked_for(cube):
@@ -341,7 +452,6 @@ def test_a_sweep_has_the_properties_that_are_asked_for(cube):
 @pytest.mark.parametrize(
     ("text", "words", "said"),
     [
-        ("fraction = 0.3", ("--nu", 0.5), "Poisson's ratio must be greater than -1 and less than 0.5"),
         ("fraction = { linear = { along = [1, 0, 0], stops = [[-4, 0.2], [4, 0.4]] } }", (), "no cell is periodic"),
         ("fraction = 0.3", ("--n", 4096), "of memory for 4096 x 4096 x 4096 voxels"),
     ],

@@ -102,7 +102,8 @@ def test_the_command_prints_and_writes(cube, tmp_path):
     report = json.loads(in_process("permeability", cube, "--n", 16, "--json", "-o", name))
     keys = {"k", "k_n", "k_cell", "error", "hydraulic_diameter", "tortuosity", "kozeny", "porosity", "warnings"}
     assert keys <= set(report) and report["n"] == 16
-    assert float(name.read_text().splitlines()[1].split(",")[2]) == report["k"][0][0]
+    entry = name.read_text().splitlines()[1].split(",")
+    assert entry[:3] == ["k", "1", "1"] and float(entry[3]) == report["k"][0][0]
     text = in_process("permeability", cube, "--n", 16, "--side", "upper")
     assert "of the upper side, mm²" in text and "hydraulic" in text and "accuracy" in text
     study = lt.load(cube).to_dict() | {"sweep": {"lattice.core.level.fraction": [0.2, 0.3]}}

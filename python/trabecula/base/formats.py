@@ -16,6 +16,7 @@ __all__ = [
         "CONDUCTIVITY_WRITES",
         "LAW_WRITES",
         "PERMEABILITY_WRITES",
+        "STIFFNESS_READS",
         "STIFFNESS_WRITES",
     ),
     *("CAD_READS", "DESIGNS", "LAYERS", "LAYER_WRITES", "LayerRow", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS"),
@@ -57,6 +58,7 @@ BEAMS = {suffix: (title, writes or suffix == "3mf") for suffix, title, writes in
 BEAM_READS = tuple(BEAMS)
 BEAM_WRITES = tuple(suffix for suffix, row in BEAMS.items() if row[1])
 #: What is found of a periodic cell: tables, the surface of Young's modulus, material cards.
+STIFFNESS_READS = ("csv", "txt", "dat")
 STIFFNESS_WRITES = ("csv", "png", "ply", "vtu", "inp", "bdf", "mac")
 CONDUCTIVITY_WRITES = PERMEABILITY_WRITES = ("csv",)
 #: What a cell does by its fraction: a table, all of it, plots.

@@ -14,7 +14,7 @@ from ..parts import check_parts
 
 __all__ = [
     *("ANGLE", "COUNT", "DPI", "ELEVATION", "FRACTION", "FRAMES", "GIGABYTES", "LENGTH", "MODULUS", "NUMBER", "POINTS"),
-    *("PORT", "PROPERTIES", "SAMPLES", "SECONDS", "SHARE", "TRIANGLES", "VOXELS", "Ending", "cluster", "direction"),
+    *("POISSON", "PORT", "PROPERTIES", "SAMPLES", "SECONDS", "SHARE", "TRIANGLES", "VOXELS", "Ending", "cluster", "direction"),
     *("exposure", "front", "load", "names", "number", "parts", "pixels", "properties", "size"),
 ]
 
@@ -48,6 +48,9 @@ ELEVATION = number("degrees", lambda v: -90 <= v <= 90, " from -90 to 90")
 COUNT = number("a whole number", lambda v: 1 <= v <= 4096, " from 1 to 4096", int)
 MODULUS = number("Young's modulus", lambda v: v > 0, " greater than 0")
 NUMBER = number("a number")
+POISSON = number(
+    "Poisson's ratio", lambda v: -1 < v < 0.5, " greater than -1 and less than 0.5 (of an incompressible solid take 0.49)"
+)
 FRACTION = number("a fraction", lambda v: 0 < v < 1, " between 0 and 1")
 POINTS = number("a whole number", lambda v: 2 <= v <= 1000, " from 2 to 1000", int)
 SHARE = number("a conductivity", lambda v: v >= 0, " of at least 0")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
-from ..base.files import check_place, write_text
+from ..base.files import check_place, read_text, write_text
 from ..base.formats import kind_of
 from ..base.terminal import Progress, figure, say, warn
+from ..errors import Refused, WrongUsage
 from ..io.cards import CARDS
 from ..reports import ConductivityReport, PermeabilityReport, StiffnessReport
 from ..solid import Solid
@@ -30,20 +34,49 @@ AXES = ("11", "22", "33", "23", "13", "12")
 
 def stiffness(args: Namespace) -> StiffnessReport:
     """The stiffness that is asked for; written where a file is named."""
+    if args.C and (args.E, args.nu) != (None, None):
+        raise WrongUsage("--C is the stiffness of a solid, --E and --nu are those of an isotropic one: give one of both")
+    given = stiffness_of_file(args.C) if args.C else None
+    E, nu = 1.0 if args.E is None else args.E, 0.3 if args.nu is None else args.nu
     solid = placed(args)
-    with Progress("stiffness", args.progress) as progress:
-        found = solid.stiffness(args.n, args.E, args.nu, None, args.voxels, args.threads, progress)
+    try:
+        with Progress("stiffness", args.progress) as progress:
+            found = solid.stiffness(args.n, E, nu, given, args.voxels, args.threads, progress)
+    except ValueError as error:
+        if given and str(error).startswith("C: "):
+            raise Refused(f"{args.C}: {str(error)[3:]}") from None
+        raise
     for name in args.output or ():
         kind = kind_of(name)
         if kind in SURFACE_WRITES:
             write_surface(name, found.C)
         else:
-            title = (
-                f"effective stiffness of {args.design}, solid E = {args.E:g}, nu = {args.nu:g}, fraction {found.fraction:.6g}"
-            )
-            write_text(name, CARDS[kind](found, title) if kind in CARDS else table(found.C, AXES, found.C_n))
+            of = f"of the stiffness in {args.C}" if args.C else f"E = {E:g}, nu = {nu:g}"
+            title = f"effective stiffness of {args.design}, solid {of}, fraction {found.fraction:.6g}"
+            write_text(name, CARDS[kind](found, title) if kind in CARDS else table(rows_of_stiffness(found)))
     say_found(found, args)
     return found
+
+
+def stiffness_of_file(name: str) -> list[list[float]]:
+    """Six rows of six numbers by commas, semicolons or spaces, a row on each line; what follows # is a comment.
+
+    Raises Refused with the line of what is none.
+    """
+    rows = []
+    for number, line in enumerate(read_text(name).splitlines(), 1):
+        words = re.split(r"\s*[,;]\s*|\s+", line.partition("#")[0].strip())
+        if words == [""]:
+            continue
+        try:
+            rows.append([float(word) for word in words])
+        except ValueError:
+            raise Refused(f"{name}:{number}: expected 6 numbers, found {line.strip()!r:.80}") from None
+        if len(words) != 6:
+            raise Refused(f"{name}:{number}: expected 6 numbers, found {len(words)}")
+    if len(rows) != 6:
+        raise Refused(f"{name}: expected 6 lines of 6 numbers, in Voigt's order 11 22 33 23 13 12, found {len(rows)}")
+    return rows
 
 
 def conductivity(args: Namespace) -> ConductivityReport:
@@ -52,7 +85,7 @@ def conductivity(args: Namespace) -> ConductivityReport:
     with Progress("conductivity", args.progress) as progress:
         found = solid.conductivity(args.n, args.pore, args.voxels, args.threads, progress)
     for name in args.output or ():
-        write_text(name, table(found.k, "123", found.k_n))
+        write_text(name, table(rows_of_conductivity(found)))
     say_found(found, args)
     return found
 
@@ -63,7 +96,7 @@ def permeability(args: Namespace) -> PermeabilityReport:
     with Progress("permeability", args.progress) as progress:
         found = solid.permeability(args.n, args.side, args.threads, progress)
     for name in args.output or ():
-        write_text(name, table(found.k, "123", found.k_n))
+        write_text(name, table(rows_of_permeability(found)))
     say_found(found, args)
     return found
 
@@ -90,7 +123,8 @@ def placed(args: Namespace) -> Solid:
     """The solid of the design, after the outputs' places have been checked."""
     for name in args.output or ():
         check_place(name)
-        keep_file(args.design, name)
+        for read in filter(None, (args.design, getattr(args, "C", None))):
+            keep_file(read, name)
     return build(args.design, tell=not args.json)
 
 
@@ -102,16 +136,80 @@ def say_found(found: Found, args: Namespace) -> None:
         say(f"{name}: written")
 
 
-def table(limit: Sequence[Sequence[float]], names: Sequence[str], finest: Sequence[Sequence[float]]) -> str:
-    """The tensor and that of the finest grid as CSV: a row for each entry."""
-    import io
+class Row(NamedTuple):
+    """A figure of a report by its name there, and what is known of it; errors are relative."""
 
+    figure: str
+    value: float | None
+    unit: str = ""
+    row: str = ""
+    column: str = ""
+    at_n: float | None = None
+    error: float | None = None
+    bounds: Sequence[float] | None = None
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Figures as CSV, a row for each that there is."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["row", "column", "limit", "at_n"])
-    for i, a in enumerate(names):
-        writer.writerows([a, b, limit[i][j], finest[i][j]] for j, b in enumerate(names))
+    writer.writerow(["figure", "row", "column", "value", "at_n", "error", "lower_bound", "upper_bound", "unit"])
+    for it in rows:
+        if it.value is not None:
+            writer.writerow([it.figure, it.row, it.column, it.value, it.at_n, it.error, *(it.bounds or ("", "")), it.unit])
     return out.getvalue()
+
+
+def entries(
+    figure: str,
+    limit: Sequence[Sequence[float]] | None,
+    finest: Sequence[Sequence[float]] | None,
+    names: Sequence[str],
+    errors: Sequence[float] | None = None,
+    unit: str = "",
+) -> Iterator[Row]:
+    """The entries of a tensor, with those of the finest grid and the errors of the diagonal."""
+    for i, row in enumerate(limit or ()):
+        for j, value in enumerate(row):
+            error = errors[i] if errors and i == j else None
+            yield Row(figure, value, unit, names[i], names[j], finest[i][j] if finest else None, error)
+
+
+def rows_of_stiffness(found: StiffnessReport) -> Iterator[Row]:
+    """C, the constants of engineers, and how sure they are."""
+    yield from entries("C", found.C, found.C_n, AXES)
+    for name, values, errors, of in (
+        ("E", found.E, found.E_error, "123"),
+        ("G", found.G, found.G_error, AXES[3:]),
+        ("nu", found.nu, None, AXES[3:]),
+    ):
+        for i, value in enumerate(values or ()):
+            yield Row(name, value, row=of[i], error=errors[i] if errors else None)
+    yield Row("bulk", found.bulk, bounds=found.bulk_bounds)
+    yield Row("shear", found.shear, bounds=found.shear_bounds)
+    yield from plainly(found, "zener", "anisotropy", "error", "fraction", "n", "residual", "wall_voxels")
+
+
+def rows_of_conductivity(found: ConductivityReport) -> Iterator[Row]:
+    """k, its mean with bounds, and how sure it is."""
+    yield from entries("k", found.k, found.k_n, "123", found.axis_errors)
+    yield Row("mean", sum(found.k[i][i] for i in range(3)) / 3, bounds=found.bounds)
+    yield from plainly(found, "pore", "error", "fraction", "n", "residual", "wall_voxels")
+
+
+def rows_of_permeability(found: PermeabilityReport) -> Iterator[Row]:
+    """k, what else is known of the pore, and how sure it is."""
+    yield from entries("k", found.k, found.k_n, "123", found.axis_errors, "mm²")
+    yield from entries("k_cell", found.k_cell, None, "123")
+    yield from plainly(found, "hydraulic_diameter", unit="mm")
+    yield from plainly(found, "area_per_volume", unit="1/mm")
+    yield from plainly(found, "porosity", "tortuosity", "kozeny", "error", "fraction", "n", "residual", "pore_nodes")
+
+
+def plainly(found: Found, *figures: str, unit: str = "") -> Iterator[Row]:
+    """Figures that are one number."""
+    for name in figures:
+        yield Row(name, getattr(found, name), unit)
 
 
 def matrix(rows: Sequence[Sequence[float]], names: Sequence[str]) -> list[str]:

@@ -16,6 +16,7 @@ from ..base.formats import (
     PERMEABILITY_WRITES,
     STEP_PROTOCOLS,
     STEP_WRITES,
+    STIFFNESS_READS,
     STIFFNESS_WRITES,
     SWEEP_WRITES,
     TET_READS,
@@ -38,6 +39,7 @@ from .arguments import (
     MODULUS,
     NUMBER,
     POINTS,
+    POISSON,
     PROPERTIES,
     SAMPLES,
     SECONDS,
@@ -259,7 +261,7 @@ COMMANDS = {
             "its faces, MPa; may be repeated",
         ),
         option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid in the file (default: 1)"),
-        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
+        option("--nu", type=POISSON, default=0.3, metavar="NU", help="Poisson's ratio of the solid in the file (default: 0.3)"),
         *(THREADS, PROGRESS, JSON, *NOTICES),
     ),
     "voxels": command(
@@ -335,7 +337,11 @@ COMMANDS = {
         option(
             "--front", type=front, metavar="BETTER", help="with the Pareto front: min or max of X and of Y, such as min,max"
         ),
-        option("--new", action="store_true", help="begin anew: rows of an earlier run are not taken up"),
+        option(
+            "--new",
+            action="store_true",
+            help="begin anew: rows of an earlier run are not taken up, and its table is overwritten",
+        ),
         option("--yes", action="store_true", help="make more than a million designs"),
         *(PROGRESS, JSON, NOTICES[0]),
     ),
@@ -428,13 +434,16 @@ COMMANDS = {
         "Find how stiff the periodic cell of a design is, in every direction, and how sure that is.",
         "The cell is that of one lattice under map.affine at one level, or of beams by a unit cell; the region plays no part.\n"
         "C is the limit of three grids, n, n/2 and n/4 voxels along the cell, each voxel by its exact solid fraction.\n"
-        "OUT: .csv, all entries; .png, .ply, .vtu, the surface of Young's modulus by direction; .inp (Abaqus, CalculiX),\n"
-        ".bdf (Nastran), .mac (Ansys), material cards. Several may be named.\n\n"
+        "The solid is isotropic, of --E and --nu, or of any stiffness: --C, six lines of six numbers by commas or spaces, in\n"
+        "Voigt's order 11 22 33 23 13 12 with engineering shears.\n"
+        "OUT: .csv, a row for each figure; .png, .ply, .vtu, the surface of Young's modulus by direction; .inp (Abaqus,\n"
+        "CalculiX), .bdf (Nastran), .mac (Ansys), material cards. Several may be named.\n\n"
         "examples:\n  trabecula stiffness part.toml --E 114000 --nu 0.34\n"
         "  trabecula stiffness part.toml --json --n 96\n  trabecula stiffness part.toml -o cell.inp modulus.png",
         *(DESIGN, *of_cell(STIFFNESS_WRITES), PLAIN),
-        option("--E", type=MODULUS, default=1.0, metavar="E", help="Young's modulus of the solid (default: 1)"),
-        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
+        option("--E", type=MODULUS, metavar="E", help="Young's modulus of the solid (default: 1)"),
+        option("--nu", type=POISSON, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
+        file("--C", STIFFNESS_READS, "stiffness of a solid that is not isotropic, instead of --E and --nu: 6 x 6 numbers"),
     ),
     "conductivity": command(
         "Find how well the periodic cell of a design conducts heat or electricity, relative to its solid.",
@@ -478,7 +487,7 @@ COMMANDS = {
         option("--to", dest="stop", type=FRACTION, default=0.6, metavar="F", help="the greatest fraction (default: 0.6)"),
         option("--count", type=POINTS, default=12, metavar="N", help="fractions (default: 12)"),
         option("--n", type=VOXELS, default=48, metavar="N", help="voxels along the cell's edge (default: 48)"),
-        option("--nu", type=NUMBER, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
+        option("--nu", type=POISSON, default=0.3, metavar="NU", help="Poisson's ratio of the solid (default: 0.3)"),
         option(
             "--properties",
             nargs="+",
