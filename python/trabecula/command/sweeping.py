@@ -84,11 +84,11 @@ def check_finished(name: str, job: Job, points: list[dict[str, Any]]) -> None:
 
 
 def changes(table: dict[str, list], job: Job, points: list[dict[str, Any]]) -> list[str]:
-    """What differs between a finished table and one of these points, as far as the table shows it."""
+    """What differs between a finished table and one of these points, where the table shows it."""
     known = columns_of_job(job, points[0])
-    if other := [column for column in dict.fromkeys([*table, *known]) if (column in table) != (column in known)]:
-        more = f" and {len(other) - 3} more" if len(other) > 3 else ""
-        return [f"columns ({', '.join(other[:3])}{more})"]
+    if apart := [column for column in dict.fromkeys([*table, *known]) if (column in table) != (column in known)]:
+        more = f" and {len(apart) - 3} more" if len(apart) > 3 else ""
+        return [f"columns ({', '.join(apart[:3])}{more})"]
     count = len(table["design"])
     if count != len(points):
         return [f"the number of designs ({count}, now {len(points)})"]

@@ -92,7 +92,7 @@ def _check_scheduler(address: str) -> None:
 
     def ask() -> None:
         try:
-            # A second more than the connection has, so that silence after it is told from there being none.
+            # A second more than the connection has, so that silence after it is distinguished from none.
             found.append(asyncio.run(asyncio.wait_for(_kind(address), PATIENCE + 1)))
         except Exception as error:  # whatever the bytes of something else than Dask end in
             found.append(error)
