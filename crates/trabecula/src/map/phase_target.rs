@@ -66,13 +66,15 @@ impl SolveDomain {
     }
 
     /// How far each node is outside the region, mm, 0 in it; `None` where none is outside. From the nearest node in it, as the field of a
-    /// region may be far less than the distance where a cylinder that makes a hole ends.
+    /// region may be far less than the distance where a cylinder that makes a hole ends. Nodes on the surface are outside if others are in it.
     fn outside(&self) -> Option<Vec<f64>> {
         if !self.inside.contains(&false) {
             return None;
         }
-        let nearest = || distances(&self.inside, self.grid.shape, self.grid.step);
-        Some(if self.inside.contains(&true) { nearest() } else { self.depth.clone() })
+        let reach = reach(&self.bounds);
+        let within: Vec<bool> = self.depth.iter().map(|d| *d < -reach).collect();
+        let counted = [&within, &self.inside].into_iter().find(|nodes| nodes.contains(&true));
+        Some(counted.map_or_else(|| self.depth.clone(), |nodes| distances(nodes, self.grid.shape, self.grid.step)))
     }
 
     /// Where nodes are asked what is wanted.
