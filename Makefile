@@ -8,7 +8,7 @@
 #   make studio  the studio, one page with the core as WebAssembly: build/studio/index.html, and for the next package
 #   make docs    remakes the generated pages and figures under docs/
 #   make site    the pages as a site in build/site
-#   make wheels  packages for other machines in build/dist
+#   make wheels  packages for other machines in build/dist, with the studio
 #   make blender  the extension for Blender in build/blender
 #
 # PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
@@ -71,15 +71,17 @@ $(VENV)/.ruff: $(VENV)/.made
 	@touch $@
 
 # Wheels of Linux to hand out, in build/dist: glibc from 2.17 and musl from 1.2 on, linked by zig. One serves Python 3.10 and later.
+# They have the studio's page, which whoever installs a wheel cannot make.
 TARGETS ?= x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl
 
 wheels: $(addprefix build/dist/.,$(TARGETS))
 	@ls -l build/dist
 
-build/dist/.%: $(VENV)/.zig $(SOURCES)
+build/dist/.%: $(VENV)/.zig $(SOURCES) build/studio/index.html scripts/check_wheels.py
 	@command -v rustup >/dev/null && rustup target add $* || echo "rustup is missing; the Rust of this system has to have $*"
 	PATH="$(abspath $(BIN)):$$PATH" maturin build --quiet --release --zig --target $* --interpreter python3.10 --out build/dist \
 	  --compatibility $(if $(findstring musl,$*),musllinux_1_2,manylinux2014)
+	@$(BIN)/python scripts/check_wheels.py build/dist/trabecula-*.whl
 	@touch $@
 
 $(VENV)/.zig: $(VENV)/.made
@@ -117,9 +119,10 @@ STUDIO_SOURCES := $(shell find crates -type f -not -path '*/tests/*' \( -name '*
 studio: build/studio/index.html
 
 $(WASM): $(STUDIO_SOURCES)
-	@rustc --target wasm32-unknown-unknown --print target-libdir 2>/dev/null | xargs test -d || { \
-	  echo "The studio needs Rust's target wasm32-unknown-unknown; add it and run this again:"; \
-	  echo "  rustup target add wasm32-unknown-unknown"; exit 1; }
+	@rustc --target wasm32-unknown-unknown --print target-libdir 2>/dev/null | xargs test -d || \
+	  rustup target add wasm32-unknown-unknown || { \
+	  echo "The studio's page, which wheels to hand out have, needs Rust's target wasm32-unknown-unknown, and rustup could not"; \
+	  echo "add it; the Rust of this system has to have it."; exit 1; }
 	@echo "building the core as WebAssembly (minutes)"
 	@RUSTFLAGS="-C link-arg=-zstack-size=4194304 -C target-feature=+simd128" cargo build --quiet --locked --release \
 	  --manifest-path crates/trabecula-wasm/Cargo.toml --target wasm32-unknown-unknown --target-dir target/wasm

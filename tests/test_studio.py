@@ -4,9 +4,13 @@ import contextlib
 import difflib
 import hashlib
 import json
+import subprocess
+import sys
 import threading
 import urllib.error
 import urllib.request
+import zipfile
+from pathlib import Path
 
 import pytest
 import trabecula as lt
@@ -67,9 +71,26 @@ def a_page(tmp_path, monkeypatch):
 
 def test_a_package_without_the_page_says_what_to_do(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(studio, "files", lambda _: tmp_path)
-    with pytest.raises(Refused, match="rustup target add wasm32-unknown-unknown` and `make studio`"):
+    with pytest.raises(Refused, match=r"`make studio` there .* next `pip install \.`.* report DESIGN -o part\.html"):
         studio.page()
     assert in_process("studio", "--no-open", status=1) == ""
+
+
+def test_wheels_to_hand_out_have_the_page(tmp_path):
+    script = Path(__file__).parent.parent / "scripts/check_wheels.py"
+
+    def checked(*wheels):
+        return subprocess.run([sys.executable, script, *wheels], capture_output=True, text=True)
+
+    whole, bare = tmp_path / "whole.whl", tmp_path / "bare.whl"
+    for wheel, names in ((whole, ["__init__.py", "command/studio.html"]), (bare, ["__init__.py"])):
+        with zipfile.ZipFile(wheel, "w") as file:
+            for name in names:
+                file.writestr(f"trabecula/{name}", "")
+    assert checked(whole).returncode == 0
+    refused = checked(whole, bare)
+    assert refused.returncode == 1 and refused.stderr.startswith(f"{bare}: no trabecula/command/studio.html; `make studio`")
+    assert checked().returncode == 1
 
 
 def test_a_design_is_served_with_the_files_that_it_names_and_nothing_else(a_page, tmp_path):

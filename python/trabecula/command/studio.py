@@ -23,8 +23,9 @@ def page() -> bytes:
     built = files(__package__).joinpath("studio.html")
     if not built.is_file():
         raise Refused(
-            "this installation has no studio page: in the sources run `rustup target add wasm32-unknown-unknown` and "
-            "`make studio`, then install the package anew"
+            "this package was built from sources without the studio's page; `make studio` there (it needs Rust's target "
+            "wasm32-unknown-unknown) makes it for the next `pip install .`, and wheels of `make wheels` have it. "
+            "`trabecula report DESIGN -o part.html` makes a page with the part to turn"
         )
     return built.read_bytes()
 
