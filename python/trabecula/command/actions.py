@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .. import _core, cell
@@ -366,10 +366,12 @@ def cells(args: Namespace) -> None:
     facts: Callable[[str], dict[str, Any]]
     words: Callable[[dict], Iterator[str]]
     tet, beams = args.tet, args.beams
+    others: dict[str, str] = {}
     if args.name and not (tet or beams) and args.name not in cell.names():
         # A name of one of the other lists says itself which is meant.
         tet = args.name in cell.tet_names()
-        beams = not tet and args.name in {it["name"] for it in unit_cells.cells()}
+        beams = not tet and args.name in unit_cells.names()
+        others = dict.fromkeys(unit_cells.names(), "of beams") | dict.fromkeys(cell.tet_names(), "of tetrahedra")
     if tet:
         names, facts, words = cell.tet_names(), cell.tet_facts, tet_cell_words
     elif beams:
@@ -378,7 +380,7 @@ def cells(args: Namespace) -> None:
     else:
         names, facts, words = cell.names(), cell_facts, cell_words
     if args.name:
-        known_cell(args.name, names)
+        known_cell(args.name, names, others)
         names = [args.name]
     made = [facts(name) for name in names]
     if args.json:
@@ -459,14 +461,17 @@ def doctor(args: Namespace) -> None:
     print("\n".join(words(found)))
 
 
-def known_cell(name: str, known: Sequence[str]) -> None:
-    """Refuses the name of no cell."""
+def known_cell(name: str, known: Sequence[str], others: Mapping[str, str] | None = None) -> None:
+    """Refuses the name of no cell. ``others`` says which kind other names that it may have meant are of."""
     if name not in known:
         from difflib import get_close_matches
 
-        near = get_close_matches(name[:LONGEST], known, 1)
-        hint = _other_name(name) or (f'; did you mean "{near[0]}"?' if near else ".")
-        raise Refused(f'no cell is named "{name:.{LONGEST}}"{hint} There are: {", ".join(known)}')
+        kinds = {**(others or {}), **dict.fromkeys(known, "")}
+        near = get_close_matches(name[:LONGEST], kinds, 1)
+        meant = f'"{near[0]}" {kinds[near[0]]}'.rstrip() if near else ""
+        hint = _other_name(name) or (f"; did you mean {meant}?" if near else ".")
+        more = "; --beams and --tet list others" if others else ""
+        raise Refused(f'no cell is named "{name:.{LONGEST}}"{hint} There are: {", ".join(known)}{more}')
 
 
 def _other_name(name: str) -> str:
