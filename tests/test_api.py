@@ -270,6 +270,22 @@ def test_voxels(tmp_path):
     assert np.array_equal(np.load(tmp_path / "a.npy"), grid.solid)
 
 
+def test_voxels_are_an_array_for_numpy():
+    """Without a copy and read-only unless another type or a copy is asked for."""
+    grid = cube().build().voxels(step=0.5)
+    seen = np.asarray(grid)
+    assert seen.dtype == np.uint8 and seen.shape == grid.shape
+    assert np.shares_memory(seen, grid.solid) and not seen.flags.writeable
+    assert np.mean(grid) == pytest.approx(grid.volume / 8**3)
+    for made in (np.array(grid), np.asarray(grid, dtype=float), np.array(grid, dtype=bool)):
+        assert not np.shares_memory(made, grid.solid) and made.flags.writeable and np.array_equal(made, grid.solid)
+    assert np.shares_memory(np.asarray(grid, dtype="uint8"), grid.solid)
+    if np.lib.NumpyVersion(np.__version__) >= "2.0.0":
+        assert np.shares_memory(np.array(grid, copy=False), grid.solid)
+        with pytest.raises(ValueError, match="voxels are uint8; as float64 they are a copy, which copy=False does not allow"):
+            np.array(grid, dtype=np.float64, copy=False)
+
+
 def test_spartan_is_seed_form():
     """The seven variables: phase rotation, the note's own hand, solid where f ≤ t."""
     three, angles, p = (4.0, 5.0, 6.0), (20.0, 35.0, 50.0), 0.7

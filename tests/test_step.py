@@ -325,6 +325,17 @@ def test_large_lattices_of_equal_hubs_are_assemblies(tmp_path):
     assert (other.parts, other.solids) == (None, 1)
 
 
+def test_parts_of_an_assembly_are_not_loose(tmp_path):
+    """Half-beams touch end to end: nothing warns of solids that do not."""
+    beams = lt.Beams(nodes=[[0, 0, 0], [6, 0, 0], [6, 6, 0]], struts=[[0, 1], [1, 2]], radius=0.5)
+    built = lt.Design(region=ROOM, beams=beams).build()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", lt.DesignWarning)
+        made = built.save_step(tmp_path / "all.step", assembly=True)
+    assert made.parts == made.solids == 3
+    assert made.volume == pytest.approx(built.save_step(tmp_path / "one.step").volume, rel=1e-6)
+
+
 def test_other_maps_and_levels_have_patches(tmp_path):
     turned = cells("diamond", "sheet", map={"rotate": [10, 20, 30]})
     uneven = cells("gyroid", "lower", fraction=lt.grade.linear([1, 0, 0], [[0, 0.3], [10, 0.5]]), wavelength=[6, 8, 10])

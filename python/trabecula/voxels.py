@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import DTypeLike, NDArray
 
 __all__ = ["Voxels"]
 
@@ -37,7 +37,10 @@ def made_of(solid: _core.Solid, step: float, place: tuple[list[float], float] | 
 
 
 class Voxels(Reproducible):
-    """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
+    """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others.
+
+    ``numpy.asarray`` of it is ``solid``, (nx, ny, nz), without a copy.
+    """
 
     _make = staticmethod(made_of)
     _core: _core.Voxels
@@ -65,6 +68,15 @@ class Voxels(Reproducible):
     def solid(self) -> NDArray[np.uint8]:
         """1 where the voxel's centre is solid, indexed [x, y, z]; read-only."""
         return fixed(self._core.solid).transpose(2, 1, 0)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """``solid`` for functions of NumPy, as another type if one is asked for."""
+        found = self.solid
+        if dtype is None or found.dtype == dtype:
+            return found.copy() if copy else found
+        if copy is False:
+            raise ValueError(f"voxels are uint8; as {dtype} they are a copy, which copy=False does not allow")
+        return found.astype(dtype)
 
     def moved(self, vector: Sequence[float]) -> Voxels:
         """The voxels with their origin moved by ``vector`` (three numbers, mm)."""
