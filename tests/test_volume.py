@@ -1,5 +1,6 @@
 """Volume meshes: angles, volume, conformity, sets, domains, periodic pairs."""
 
+import re
 import warnings
 
 import numpy as np
@@ -269,6 +270,49 @@ def test_the_same_bytes_for_any_number_of_threads():
 def test_refused_requests(asked, words):
     with pytest.raises(ValueError, match=words):
         solid().volume_mesh(**asked)
+
+
+@pytest.mark.parametrize(
+    ("part", "fraction", "wavelength", "region", "at"),
+    [
+        ("sheet", "0.15 + 0.002*((x - 1)^2 + (y + 2)^2 + z^2)", 4.0, lt.region.box([12, 12, 12]), (1, -2, 0)),
+        # Outside the region it would be thinner still.
+        ("lower", "0.45 + 0.02*x", 4.0, lt.region.sphere(radius=6), (-6, 0, 0)),
+        ("upper", "0.5 - 0.02*z", 4.0, lt.region.box([20, 8, 8]), (0, 0, 4)),
+    ],
+)
+def test_a_size_too_coarse_says_where_the_wall_is_thinnest(part, fraction, wavelength, region, at):
+    """To the spacing of the places that are looked at, and the middle of those that are as thin but for 2 %."""
+    level = lt.level.fraction(lt.grade.formula(fraction))
+    made = lt.Design(region=region, lattice=lt.Lattice("gyroid", part, lt.map.affine(wavelength), level)).build()
+    with pytest.raises(ValueError, match=r"at lattice\.core about \(.*\) mm; use") as refused:
+        made.volume_mesh(edge=2.5)
+    found = [float(v) for v in re.search(r"about \((.*)\) mm", str(refused.value))[1].split(", ")]
+    assert found == pytest.approx(at, abs=1.0)
+
+
+def test_a_wall_of_one_thickness_has_no_thinnest_place():
+    with pytest.raises(ValueError, match=r"at lattice\.core; use"):
+        solid().volume_mesh(edge=2.0)
+
+
+def test_a_mesh_beyond_memory_says_how_much_and_a_size_that_fits(monkeypatch):
+    """The same above the most tetrahedra that are possible; where memory is boundless that number is said."""
+    part = solid("gyroid", "sheet", 0.3, lt.region.box([8, 8, 8]))
+    monkeypatch.setattr("trabecula._core.free_memory", lambda: 1e9)
+    said = r"needs about .* of memory for about .* tetrahedra, and 1 GB is free; try edge"
+    for edge in (0.02, 0.001):
+        with pytest.raises(ValueError, match=said) as no:
+            part.volume_mesh(edge=edge)
+        better = float(str(no.value).split()[-2])
+        with pytest.raises(ValueError, match="needs about"):
+            part.volume_mesh(edge=better / 1.2)
+    monkeypatch.setattr("trabecula._core.free_memory", lambda: 1.0)
+    with pytest.raises(ValueError, match="even the coarsest useful edge needs more: take a smaller part"):
+        part.volume_mesh(edge=0.02)
+    monkeypatch.setattr("trabecula._core.free_memory", lambda: None)
+    with pytest.raises(ValueError, match=r"makes about .* tetrahedra; at most 3e\+08 are possible; try edge 0\.0"):
+        part.volume_mesh(edge=0.001)
 
 
 def test_periodic_is_refused_where_the_solid_is_not():

@@ -9,8 +9,9 @@ from functools import cached_property
 
 from . import _core
 from .base.given import flag, number, poisson, positive, thread_count, whole
-from .base.machine import fits, rounded_down
+from .base.machine import fits, rounded_down, rounded_up
 from .base.resolution import Resolution, sample_error
+from .base.texts import point
 from .carrier import Carrier
 from .errors import warn_caller
 from .volumes import OF, TET_BYTES, VOXEL_BYTES, BeamMesh, ShellMesh, VolumeMesh, VoxelElements, warn_flaws, warn_sharp
@@ -19,7 +20,8 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any, Literal
 
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from .reports import ConductivityReport, PermeabilityReport, StiffnessReport
 
@@ -37,6 +39,11 @@ PERMEABILITY_BYTES = 1300
 SHORT_EDGE = math.sqrt(0.75)
 #: Most tetrahedra of a volume mesh for which no size was given: about 2 GB.
 MOST_TETS = 5e6
+#: Most tetrahedra of any volume mesh, whose nodes and faces have numbers of 32 bits.
+POSSIBLE_TETS = 3e8
+#: Places along the longest edge of the bounds among which that of the thinnest wall is looked for, and how near to the least
+#: thickness others count as thinnest too.
+PLACES, THINNEST = 40, 1.02
 
 
 def _order(given: int, of: str = "tetrahedra") -> int:
@@ -47,6 +54,9 @@ def _order(given: int, of: str = "tetrahedra") -> int:
 
 class Simulated(Resolution):
     """Solids that are meshed for solvers, or whose cell is solved for."""
+
+    cell_at: Callable[..., dict[str, NDArray[np.float64]]]
+    shares: Callable[..., dict[str, NDArray[np.float64]]]
 
     def volume_mesh(
         self,
@@ -96,8 +106,8 @@ class Simulated(Resolution):
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
         count = 12 * max(part, 0.02) * region / size / size / size
+        usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
         if count > MOST_TETS and edge is None and per_cell is None and wall is None:
-            usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
             used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
             if used > size:
                 warn_caller(
@@ -105,9 +115,13 @@ class Simulated(Resolution):
                     f"{count:.2g} tetrahedra; give an edge to have them",
                 )
                 size, count = used, count * (size / used) ** 3
-        if count > 3e8:
-            raise ValueError(f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most 3e8 are possible")
-        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3)
+        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3, coarsest=usable)
+        if count > POSSIBLE_TETS:
+            better = rounded_up(size * (count / POSSIBLE_TETS) ** (1 / 3))
+            raise ValueError(
+                f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most {POSSIBLE_TETS:g} are possible; try edge "
+                f"{better:g} mm"
+            )
         plan = {"edge": size, "of": of, "order": order, "periodic": periodic, "largest": islands == "drop"}
         made = VolumeMesh(self, plan, threads=thread_count(threads), progress=progress)
         if islands == "error" and (pieces := made.report().pieces) > 1:
@@ -223,6 +237,34 @@ class Simulated(Resolution):
         walls = self._thinnest if self.skin is None else {**self._thinnest, "skin": self.skin}
         return min(walls.items(), key=lambda item: item[1], default=("", math.inf))
 
+    def _thinnest_at(self, where: str) -> str:
+        """About where the wall of a lattice that varies is thinnest, in words; none where it is the same everywhere, or its
+        cells are not known by the point.
+
+        A wall is the thicker the greater the solid fraction and the wavelength, so the product of both is least there.
+        """
+        import numpy as np
+
+        kind, _, name = where.partition(".")
+        lattices = self.report().lattices
+        if kind != "lattice" or lattices[name].tets or not isinstance(lattices[name].thickness, list):
+            return ""
+        low, high = self.bounds
+        step = max(b - a for a, b in zip(low, high, strict=True)) / PLACES
+        axes = [np.linspace(a, b, max(2, round((b - a) / step) + 1)) for a, b in zip(low, high, strict=True)]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        places = places[self._core.region.distance(places) <= 1e-9 * step]
+        if len(lattices) > 1:
+            places = places[self.shares(places)[name] > 0]
+        cell = self.cell_at(places, name)
+        thickness = cell["fraction"] * cell["wavelength"].min(axis=1)
+        known = np.isfinite(thickness)  # the map has no cells on the axis of a cylinder
+        if not known.any():
+            return ""
+        thinnest = places[known & (thickness <= THINNEST * thickness[known].min())]
+        middle = np.linalg.norm(thinnest - thinnest.mean(axis=0), axis=1).argmin()
+        return f" about {point(thinnest[middle].tolist())} mm"
+
     def _volume_edge(self, edge: float | None, per_cell: float | None, wall: float | None) -> float:
         """The edge (mm) of a request for a volume mesh."""
         if sum(v is not None for v in (edge, per_cell, wall)) > 1:
@@ -240,7 +282,7 @@ class Simulated(Resolution):
         if SHORT_EDGE * size > thin:
             raise ValueError(
                 f"an edge of {size:.4g} mm leaves less than one tetrahedron through the thinnest wall, {thin:.4g} mm at "
-                f"{where}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
+                f"{where}{self._thinnest_at(where)}; use {rounded_down(thin / SHORT_EDGE):g} mm or less"
             )
         if size > self.wavelength / 4:
             what = "wavelength" if self.report().lattices else "scale of the beams"
