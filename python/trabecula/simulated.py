@@ -105,7 +105,8 @@ class Simulated(Resolution):
         size = self._volume_edge(edge, per_cell, wall)
         share, region = self._core.expected()
         part = {"solid": share, "all": 1.0, "pore": 1 - share}.get(of, 0.5 * (1 - share))
-        count = 12 * max(part, 0.02) * region / size / size / size
+        filled = 12 * max(part, 0.02) * region
+        count = filled / size / size / size
         usable = min(self._thinnest_wall()[1] / SHORT_EDGE, self.wavelength / 4)
         if count > MOST_TETS and edge is None and per_cell is None and wall is None:
             used = rounded_down(min(size * (count / MOST_TETS) ** (1 / 3), usable))
@@ -115,9 +116,10 @@ class Simulated(Resolution):
                     f"{count:.2g} tetrahedra; give an edge to have them",
                 )
                 size, count = used, count * (size / used) ** 3
-        fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3, coarsest=usable)
+        if math.isfinite(count):
+            fits(TET_BYTES * order * count, f"about {count:.2g} tetrahedra", edge=size, power=3, coarsest=usable)
         if count > POSSIBLE_TETS:
-            better = rounded_up(size * (count / POSSIBLE_TETS) ** (1 / 3))
+            better = rounded_up((filled / POSSIBLE_TETS) ** (1 / 3))
             raise ValueError(
                 f"edge {size:.3g} mm makes about {count:.2g} tetrahedra; at most {POSSIBLE_TETS:g} are possible; try edge "
                 f"{better:g} mm"
