@@ -213,6 +213,37 @@ def test_a_drawing_has_groups_of_contours_and_holes(part, tmp_path):
         assert total == pytest.approx(layer.area, rel=1e-6)
 
 
+def test_a_drawing_of_each_layer_has_its_contours_in_one_frame(part, tmp_path):
+    import xml.etree.ElementTree as tree
+
+    layers = part.layers(0.4)
+    report = layers.save_each(tmp_path / "a.svg")
+    whole = layers.save(tmp_path / "whole.svg")
+    assert report == whole | {"volume": pytest.approx(whole.volume, rel=1e-12)} and len(layers) > 10
+    names = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert names == [f"{i:02}.svg" for i in range(len(layers))]
+    low, high = part.bounds
+    for name, layer in zip(names, layers, strict=True):
+        root = tree.parse(tmp_path / "a" / name).getroot()
+        assert root.get("width") == f"{high[0] - low[0]:.9g}mm"
+        frame = [low[0], -high[1], high[0] - low[0], high[1] - low[1]]
+        assert [float(v) for v in root.get("viewBox").split()] == pytest.approx(frame)
+        drawn = [loop.split("L") for loop in root[0].get("d").replace("M", "").split("Z")[:-1]]
+        loops = [np.array([list(map(float, p.split())) for p in loop]) * [1, -1] for loop in drawn]
+        assert sum(area(np.vstack([loop, loop[:1]])) for loop in loops) == pytest.approx(layer.area, rel=1e-6)
+    with pytest.raises(ValueError, match=r"a exists; drawings of layers go to a new folder"):
+        layers.save_each(tmp_path / "a.svg")
+    with pytest.raises(ValueError, match=r"must end in \.svg; found \.cli"):
+        layers.save_each(tmp_path / "b.cli")
+
+    def stopped(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        layers.save_each(tmp_path / "b.svg", progress=stopped)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "whole.svg"]
+
+
 def test_lib3mf_reads_the_slices(part, tmp_path):
     lib3mf = pytest.importorskip("lib3mf")
     layers = part.layers(0.4)
@@ -363,6 +394,8 @@ def test_the_command_slices_a_design(cube, tmp_path):
     in_process("slice", cube, "-o", stack, "--layer", 2, "--pixel", 0.1, "--size", "100x120")
     wide = np.load(stack)
     assert wide.shape == (100, 120, 4) and not wide[:10].any() and not wide[:, :20].any() and wide[10:90, 20:100].any()
+    each = json.loads(in_process("slice", cube, "-o", tmp_path / "each.svg", "--layer", 2, "--each", "--json"))
+    assert each["layers"] == 4 and sorted(path.name for path in (tmp_path / "each").iterdir())[-1] == "3.svg"
     one = json.loads(in_process("slice", cube, "--z", 1, "-o", tmp_path / "one.svg", "--json"))
     assert one["area"] > 10 and "<path" in (tmp_path / "one.svg").read_text()
 
@@ -370,6 +403,9 @@ def test_the_command_slices_a_design(cube, tmp_path):
 def test_the_command_says_what_is_wrong(cube, tmp_path):
     for words, status, why in [
         ((), 2, "slice needs --layer MM"),
+        (("--layer", 1, "--each", "-o", "a.cli"), 2, "--each writes an .svg for each layer"),
+        (("--layer", 1, "--each", "-o", "a.svg", "--resume"), 2, "--each writes its layers in one run"),
+        (("--z", 1, "--each", "-o", "a.svg"), 2, "--each belongs to --layer"),
         (("--layer", "1"), 2, "slice --layer needs -o OUT"),
         (("--layer", "0", "-o", "a.cli"), 2, "expected a length in mm greater than 0, found 0"),
         (("--layer", "1", "-o", tmp_path / "a.zip"), 2, "add --pixel MM"),

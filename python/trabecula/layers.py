@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from . import _core
-from .base.files import check_place, extension, special, whole_file, write_svg
+from .base.files import check_place, extension, special, whole_file, write_svg, write_text
 from .base.formats import LAYER_WRITES, LAYERS
 from .base.given import number, positive, whole
 from .base.machine import fits
@@ -183,6 +183,41 @@ class Layers(Reproducible, Sequence["Layer"]):
             return ranges.save_layers(self, os.fsdecode(path), file, self._threads, progress, cluster, new)
         with whole_file(path) as temporary:
             return _core.LayerRanges.of(self._core, **file).save(temporary, self._threads, progress)
+
+    def save_each(self, path: str | os.PathLike[str], progress: Progress | None = None) -> LayersReport:
+        """Writes each layer to a drawing of its own and gives their figures; a few layers are held in memory at a time.
+
+        ``path`` ends in .svg. The drawings stand in a new folder with the name of ``path`` without that, which appears when all
+        are there; their names are the numbers of the layers from 0. All are as large as the region's bounds, in mm, so that
+        they lie on each other.
+        """
+        import tempfile
+
+        import numpy as np
+
+        from .reports import LayersReport
+
+        extension(path, ("svg",))
+        folder = os.path.splitext(check_place(path))[0]
+        if os.path.lexists(folder):
+            raise ValueError(f"{folder} exists; drawings of layers go to a new folder of this name")
+        frame, digits = np.array(self._solid.bounds)[:, :2], len(str(len(self) - 1))
+        contours, areas, volumes, points = [], [], [], 0
+        with tempfile.TemporaryDirectory(prefix=f"{os.path.basename(folder)}.", dir=os.path.dirname(folder)) as temporary:
+            unfinished = os.path.join(temporary, "layers")
+            os.mkdir(unfinished)
+            for index, layer in enumerate(self):
+                loops = [loop[:-1] for loop in layer.loops]
+                write_text(os.path.join(unfinished, f"{index:0{digits}}.svg"), outlines_svg(loops, frame))
+                contours.append(len(loops))
+                areas.append(layer.area)
+                volumes.append(layer.area * layer.height)
+                points += sum(map(len, loops))
+                if progress is not None:
+                    progress(index + 1, len(self))
+            os.rename(unfinished, folder)
+        figures = {"contours": sum(contours), "empty": contours.count(0), "largest": max(areas), "layers": len(self)}
+        return LayersReport(figures | {"points": points, "volume": math.fsum(volumes)})
 
     def _raster(self, kind: str, pixel: float | None, size: tuple[int, int] | None) -> Raster:
         """Edge of a pixel, numbers of pixels and the lower left corner of pictures."""

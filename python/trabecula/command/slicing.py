@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from argparse import Namespace
 
@@ -15,8 +16,9 @@ from .inputs import build, keep_file
 
 __all__ = ["slice"]
 
-#: What belongs to layers alone, and the words of those that are others on the command line.
-LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exposure", "resume", "cluster", "new")
+#: What belongs to layers alone, how these are made apart, and the words of those that are others on the command line.
+LAYERED = ("start", "stop", "adaptive", "least", "binary", "pixel", "size", "exposure", "each", "resume", "cluster", "new")
+APART = ("resume", "cluster", "new")
 WORDS = {"start": "from", "stop": "to"}
 
 
@@ -31,6 +33,10 @@ def slice(args: Namespace) -> None:
         raise WrongUsage("--least is for adaptive layers; add --adaptive MM, the greatest height of steps on the surface")
     if args.layer is not None and args.output and LAYERS[kind_of(args.output)].pictures and args.pixel is None:
         raise WrongUsage(f"{args.output} holds pictures; add --pixel MM, the edge of a pixel")
+    if args.each and kind_of(args.output or "") != "svg":
+        raise WrongUsage("--each writes an .svg for each layer; name one with -o")
+    if args.each and any(getattr(args, name) for name in APART):
+        raise WrongUsage("--each writes its layers in one run; leave --resume, --cluster and --new out")
     if args.output:
         if args.z is not None and kind_of(args.output) != "svg":
             raise WrongUsage(f"{args.output}: a section is drawn as .svg; other formats take --layer")
@@ -51,7 +57,9 @@ def layers(solid: Solid, args: Namespace) -> None:
     made = solid.layers(*wanted)
     with Progress("slicing", args.progress) as progress:
         options = ("binary", "pixel", "size", "exposure", "resume", "cluster", "new")
-        report = made.save(args.output, progress=progress, **{name: getattr(args, name) for name in options})
+        given = {name: getattr(args, name) for name in options}
+        report = made.save_each(args.output, progress) if args.each else made.save(args.output, progress=progress, **given)
+    written = os.path.splitext(args.output)[0] if args.each else args.output
     seconds = round(time.perf_counter() - start, 3)
     if args.json:
         return put_json(report.to_dict() | {"seconds": seconds})
@@ -59,7 +67,7 @@ def layers(solid: Solid, args: Namespace) -> None:
     print(f"layers    {counted(report.layers, 'layer')} of {of}" + (f", {report.empty} empty" if report.empty else ""))
     print(f"volume    {figure(report.volume)} mm³, sections in the middle of layers")
     print(f"contours  {report.contours}, of {report.points} points")
-    say(f"{args.output}: written in {seconds:g} s")
+    say(f"{written}: written in {seconds:g} s")
 
 
 def section(solid: Solid, args: Namespace) -> None:

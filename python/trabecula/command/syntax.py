@@ -369,6 +369,7 @@ COMMANDS = {
         option("--adaptive", type=LENGTH, metavar="MM", help="thinner layers by slope: greatest height of steps, mm"),
         option("--least", type=LENGTH, metavar="MM", help="thinnest adaptive layer, mm (default: a quarter of --layer)"),
         option("--binary", action="store_true", help="write .cli as bytes"),
+        option("--each", action="store_true", help="an .svg for each layer, in the new folder OUT without .svg"),
         option("--pixel", type=LENGTH, metavar="MM", help="edge of a pixel of pictures, mm"),
         option("--size", type=pixels, metavar="WxH", help="pixels of pictures, the part in the middle (default: the part)"),
         option("--exposure", type=exposure, metavar="S,S", help="of layers and first ones of .sl1, s (default: 8,35)"),

@@ -9,11 +9,14 @@ if TYPE_CHECKING:
 __all__ = ["outlines_svg"]
 
 
-def outlines_svg(loops: list[NDArray]) -> str:
-    """A drawing in mm of polygons (n, 2), the second coordinate upwards, what they enclose filled."""
+def outlines_svg(loops: list[NDArray], frame: NDArray | None = None) -> str:
+    """A drawing in mm of polygons (n, 2), the second coordinate upwards, what they enclose filled; as large as they, or as the
+    ``frame`` (2, 2), its lower and its upper corner.
+    """
     import numpy as np
 
     corners = np.concatenate(loops) if loops else np.zeros((1, 2))
+    corners = corners if frame is None else frame
     low, high = corners.min(axis=0), corners.max(axis=0)
     width, height = np.maximum(high - low, 1e-6)
     path = " ".join("M " + " L ".join(f"{u:.9g} {-v:.9g}" for u, v in loop) + " Z" for loop in loops)
