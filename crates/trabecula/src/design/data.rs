@@ -330,7 +330,7 @@ pub enum PartSpec {
     #[kind(hints("wall", "shell", "surface", "double", "sheet_network", "thickened"))]
     Sheet,
     /// f ≤ t.
-    #[kind(hints("network", "solid", "solid_network", "skeletal", "skeleton", "strut", "below", "negative"))]
+    #[kind(hints("network", "solid_network", "skeletal", "skeleton", "strut", "below", "negative"))]
     Lower,
     /// f ≥ t.
     #[kind(hints("above", "positive", "over"))]

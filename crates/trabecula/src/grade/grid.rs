@@ -95,7 +95,8 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
         }
         _ => {
             let message = format!(
-                "the name must end in npy, vti or vtk, or in png, tif or dcm for pictures; found \"{}\"",
+                "the name must end in npy, vti or vtk, or in png, tif or dcm for pictures, or in / for a folder of them; \
+                 found \"{}\"",
                 spec.path
             );
             return Err(DesignError::new(at, message).found(&spec.path));

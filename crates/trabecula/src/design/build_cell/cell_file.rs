@@ -54,8 +54,10 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
         (shape, values)
     } else {
         let known = formats::Format::listed();
-        let message =
-            format!("the name must end in npy, {known}, or in png, tif or dcm for pictures; found \"{}\"", spec.path);
+        let message = format!(
+            "the name must end in npy, {known}, or in png, tif or dcm for pictures, or in / for a folder of them; found \"{}\"",
+            spec.path
+        );
         return Err(DesignError::new(at, message).found(&spec.path));
     };
     let [x, y, z] = shape;
