@@ -44,6 +44,13 @@ impl Stack {
         self.heights.len().saturating_sub(1)
     }
 
+    /// The thickness of layers, all alike but for the last one, mm. Heights are sums, so their difference has a rounding that twelve
+    /// digits leave out.
+    fn thickness(&self) -> f64 {
+        let layer = self.heights.windows(2).next().map_or(0.0, |h| h[1] - h[0]);
+        format!("{layer:.11e}").parse().unwrap_or(layer)
+    }
+
     fn raster(&self) -> io::Result<&Raster> {
         self.raster.as_ref().ok_or_else(|| invalid("pictures need the size of a pixel".into()))
     }

@@ -118,7 +118,7 @@ impl Pictures<'_> {
     /// The settings of a print, and those of the printer's display.
     fn settings(&self) -> [(&'static str, String); 2] {
         let stack = self.stack;
-        let layer = stack.heights.windows(2).next().map_or(0.0, |h| h[1] - h[0]);
+        let layer = stack.thickness();
         let volume: f64 = stack.heights.windows(2).zip(&self.areas).map(|(h, a)| (h[1] - h[0]) * a).sum();
         let [exposure, first] = stack.exposure;
         let faded = 10usize.min(stack.layers());

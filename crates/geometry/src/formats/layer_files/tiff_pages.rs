@@ -85,9 +85,7 @@ impl<K: TiffKind> Pages<'_, K> {
         page.write_tag(Tag::YResolution, density())?;
         page.write_tag(Tag::ResolutionUnit, ResolutionUnit::None)?;
         if self.page == 0 {
-            let (count, heights) = (self.stack.layers(), &self.stack.heights);
-            // Layers are of one thickness, but for the last one.
-            let spacing = heights[1] - heights[0];
+            let (count, spacing) = (self.stack.layers(), self.stack.thickness());
             let said =
                 format!("ImageJ=1.54f\nimages={count}\nslices={count}\nunit=mm\nspacing={spacing}\nloop=false\n");
             page.write_tag(Tag::ImageDescription, said.as_str())?;
@@ -124,7 +122,7 @@ mod tests {
     fn written<K: TiffKind>() -> Vec<u8> {
         let raster = Raster { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
         let stack = Stack {
-            heights: vec![0.0, 0.2, 0.3],
+            heights: vec![-4.8526, -4.6526, -4.5],
             bounds: Aabb { min: [0.0; 3], max: [2.0, 1.5, 0.4] },
             title: "part".into(),
             application: "Trabecula ü".into(),
