@@ -175,7 +175,8 @@ impl Slicer {
         outline.separate(&self.grid, self.gap);
         checkpoint();
         let rings = self.rings(&outline, &cells, plane, accuracy);
-        let limits = Limits { tolerance: self.tolerance, accuracy, box_edge: self.grid.step };
+        // Two ends that shortest decimals move by half a unit in the last place, a quarter of the gap, along x and y: √2 / 4 of it.
+        let limits = Limits { tolerance: self.tolerance, accuracy, box_edge: self.grid.step, near: 0.375 * self.gap };
         rings.polygons(plane, limits)
     }
 

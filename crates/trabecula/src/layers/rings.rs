@@ -44,6 +44,8 @@ pub(super) struct Limits {
     pub accuracy: f64,
     /// Edge of the boxes in which intersections are looked for, mm.
     pub box_edge: f64,
+    /// How near contours may come to each other, mm.
+    pub near: f64,
 }
 
 /// Rounds in which polygons that intersect fall back to plain chords.
@@ -60,7 +62,7 @@ impl Rings {
         for round in 0..ROUNDS {
             rings = self.rings(&inner, &excess, &plain, limits.tolerance);
             let segments: Vec<&[Point]> = rings.iter().map(|r| &r.points[..]).collect();
-            let found = conflicts(&segments, limits.box_edge);
+            let found = conflicts(&segments, limits.box_edge, limits.near);
             if found.is_empty() {
                 break;
             }
@@ -69,8 +71,16 @@ impl Rings {
             }
         }
         let least = limits.tolerance * limits.tolerance;
-        let polygons = rings.into_iter().map(|r| r.points);
+        // What is thinner than points are shifted may turn inside out.
+        let turned = |r: &Ring| signed_area(&r.points) * self.roots_area(r.range) <= 0.0;
+        let polygons = rings.into_iter().filter(|r| !turned(r)).map(|r| r.points);
         polygons.filter(|p| p.len() > 2 && signed_area(p).abs() > least).collect()
+    }
+
+    /// The area of the polygon through the ends of a contour's arcs, mm².
+    fn roots_area(&self, [first, end]: [u32; 2]) -> f64 {
+        let ends: Vec<Point> = self.arcs[first as usize..end as usize].iter().map(|a| a.ends[0]).collect();
+        signed_area(&ends)
     }
 
     /// Makes the arcs under a segment of a ring plain chords; later also without their corners.
