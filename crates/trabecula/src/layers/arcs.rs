@@ -184,15 +184,15 @@ impl Work<'_> {
                 far.push(*piece);
             }
         }
-        let corners: Vec<Option<Point>> = if self.creased() { self.creases(&far) } else { vec![None; far.len()] };
+        let corners = if self.creased() { self.creases(&far) } else { far.iter().map(|_| None).collect() };
         let mut middles: Vec<Point> = far.iter().map(Piece::middle).collect();
         let gradients = self.project(&mut middles);
         let mut next = Vec::new();
         for (i, piece) in far.iter().enumerate() {
             let at = 0.5 * (piece.at[0] + piece.at[1]);
             let beyond = (0..2).map(|k| (middles[i][k] - piece.middle()[k]).abs()).fold(0.0, f64::max) > piece.length();
-            let (point, normal, both) = match corners[i] {
-                Some(corner) => (corner, [0.0; 2], piece.gradients),
+            let (point, normal, both) = match &corners[i] {
+                Some(corner) => (corner.point, [0.0; 2], corner.tangents.map(|t| t.1)),
                 // Newton's method went astray, where the gradient vanishes.
                 None if beyond => {
                     excess.push(Excess { arc: piece.arc, at: piece.at[0], area: 0.0 });
@@ -206,30 +206,79 @@ impl Work<'_> {
         next
     }
 
-    /// For each piece the point where the tangents at its ends meet, if it is on the surface: a corner of the section.
-    fn creases(&self, pieces: &[Piece]) -> Vec<Option<Point>> {
-        let guess = |p: &Piece| {
-            let [t, u] = p.gradients.map(|g| tangent(unit(g)));
-            let turn = t[0] * u[1] - t[1] * u[0];
-            let d = [0, 1].map(|k| p.ends[1][k] - p.ends[0][k]);
-            let along = (d[0] * u[1] - d[1] * u[0]) / turn;
-            let back = (d[0] * t[1] - d[1] * t[0]) / turn;
-            let length = p.length();
-            // Bends of less than a degree are curvature, or end soon by halving.
-            let is_corner =
-                turn.abs() > 0.02 && along > 0.0 && back < 0.0 && along < 4.0 * length && -back < 4.0 * length;
-            is_corner.then(|| [0, 1].map(|k| p.ends[0][k] + along * t[k]))
-        };
-        let guesses: Vec<Option<Point>> = pieces.iter().map(guess).collect();
-        let found = self.plane.evaluate(self.surface, guesses.iter().flatten().copied());
+    /// For each piece the corner of the section between its ends, if there is one: where the tangents of both meet, taken ever nearer
+    /// to the corner.
+    fn creases(&self, pieces: &[Piece]) -> Vec<Option<Crease>> {
+        let mut found: Vec<Option<Crease>> = pieces.iter().map(|p| Crease::of(p.ends, p)).collect();
+        for halving in 1..=HALVINGS {
+            let near = |(crease, piece): (&Crease, &Piece)| {
+                let share = 0.5f64.powi(halving);
+                piece.ends.map(|e| [0, 1].map(|k| crease.point[k] + share * (e[k] - crease.point[k])))
+            };
+            let open: Vec<usize> = (0..pieces.len()).filter(|i| found[*i].is_some()).collect();
+            let points: Vec<[Point; 2]> =
+                open.iter().filter_map(|&i| Some(near((found[i].as_ref()?, &pieces[i])))).collect();
+            let values = self.plane.evaluate(self.surface, points.iter().flatten().copied());
+            for (n, (&i, at)) in open.iter().zip(&points).enumerate() {
+                found[i] = found[i].as_ref().and_then(|c| {
+                    let tangents = [0, 1].map(|k| {
+                        let (value, gradient, length) = values.at(2 * n + k);
+                        let foot = [0, 1].map(|a| at[k][a] - value / (length * length) * gradient[a]);
+                        // Beyond the crease it is the other arc's.
+                        let [own, other] = [k, 1 - k].map(|j| dot(unit(gradient), unit(pieces[i].gradients[j])));
+                        if own > other { (foot, gradient) } else { (c.tangents[k].0, c.tangents[k].1) }
+                    });
+                    Crease::between(tangents, &pieces[i])
+                });
+            }
+        }
+        let values = self.plane.evaluate(self.surface, found.iter().flatten().map(|c| c.point));
         let mut n = 0;
-        let mut on_surface = |corner: Point| {
-            let (value, _, length) = found.at(n);
+        let mut on_surface = |_: &Crease| {
+            let (value, _, length) = values.at(n);
             n += 1;
-            (value.abs() <= 0.1 * self.most * length.max(1e-3)).then_some(corner)
+            value.abs() <= 0.1 * self.most * length.max(1e-3)
         };
-        guesses.into_iter().map(|g| g.and_then(&mut on_surface)).collect()
+        found.into_iter().map(|c| c.filter(&mut on_surface)).collect()
     }
+}
+
+/// Times that the tangents of a corner are taken at half the distance: what is left of the curvature of an arc is a thousandth.
+const HALVINGS: i32 = 5;
+/// How far from its ends the corner of a chord may be, in its lengths.
+const FARTHEST: f64 = 16.0;
+
+/// A corner of the section on one surface.
+struct Crease {
+    point: Point,
+    /// A point of each of the two tangents that meet in it, with the gradient there.
+    tangents: [(Point, Point); 2],
+}
+
+impl Crease {
+    /// Where the tangents at the ends of a piece meet.
+    fn of(ends: [Point; 2], piece: &Piece) -> Option<Crease> {
+        Crease::between([0, 1].map(|k| (ends[k], piece.gradients[k])), piece)
+    }
+
+    /// Where two tangents meet, if that is ahead of both ends of a piece.
+    fn between(tangents: [(Point, Point); 2], piece: &Piece) -> Option<Crease> {
+        let [t, u] = tangents.map(|(_, g)| tangent(unit(g)));
+        let turn = t[0] * u[1] - t[1] * u[0];
+        let [p, q] = tangents.map(|(p, _)| p);
+        let d = [q[0] - p[0], q[1] - p[1]];
+        let along = (d[0] * u[1] - d[1] * u[0]) / turn;
+        let point = [0, 1].map(|k| p[k] + along * t[k]);
+        let ahead = |k: usize, t: Point| dot([0, 1].map(|a| point[a] - piece.ends[k][a]), t);
+        let (ahead, behind, most) = (ahead(0, t), -ahead(1, u), FARTHEST * piece.length());
+        // Bends of less than a degree are curvature, or end soon by halving.
+        let is_corner = turn.abs() > 0.02 && ahead > 0.0 && behind > 0.0 && ahead < most && behind < most;
+        is_corner.then_some(Crease { point, tangents })
+    }
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 /// Points of the cubic through an arc's ends with its tangents, where chords need them to be within `most`.

@@ -10,12 +10,19 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::plane_grid::{FINE, LiveBlock, Node, PlaneGrid, lifted};
 use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
+use geometry::math::Aabb;
 
-/// Edge of the smallest cells, in units of the grid.
-const LEAST: u32 = 2;
-/// How far a function may go beyond its values at the corners of a cell, in second differences: an eighth in either direction if
-/// it is smooth, half if it has a crease in the cell.
+/// Edge of the smallest cells, in units of the grid: an eighth of a cell, and a 32nd about creases of one surface, where gaps and
+/// notches narrow.
+const LEAST: u32 = 8;
+const LEAST_CREASED: u32 = 2;
+/// How far a function may go beyond its values at the corners of a cell, in sums of the second differences in either direction at
+/// these: an eighth if it is smooth, half if it has a crease in the cell and is straight elsewhere.
 const DIP: f64 = 0.5;
+/// The same of a surface with creases, in second differences at the nodes around the cell, too, which have what bends away from
+/// the crease: an arc rises by three eighths of its own second difference over the line through its last two nodes, and at a
+/// block's end the crease shows at one node alone.
+const CREASED_DIP: f64 = 1.0;
 
 /// A corner of a polygon: its node and the signs of its block's live surfaces there.
 pub(super) type Corner = (Node, u64);
@@ -36,6 +43,8 @@ pub(super) struct LeafCells<'a> {
     pub blocks: Vec<LiveBlock>,
     /// For each block of the grid its number in `blocks`, or none.
     numbers: Vec<u32>,
+    /// For each live block and live surface, how far it may go beyond its values at the corners of each cell of a row.
+    dips: Vec<Vec<Vec<f32>>>,
     /// For each live block the values at nodes of refined cells.
     extra: Vec<FxHashMap<Node, Vec<f64>>>,
 }
@@ -62,7 +71,12 @@ impl<'a> LeafCells<'a> {
             }
         }
         let extra = blocks.iter().map(|_| FxHashMap::default()).collect();
-        LeafCells { grid, surfaces, z, blocks, numbers, extra }
+        let dips = |of: &LiveBlock| {
+            let of_one = |(f, values): (&usize, &Vec<f32>)| dips(values, of.shape[0], surfaces[*f].has_creases);
+            of.live.iter().zip(&of.samples).map(of_one).collect()
+        };
+        let dips = blocks.iter().map(dips).collect();
+        LeafCells { grid, surfaces, z, blocks, dips, numbers, extra }
     }
 
     /// Calls `found` for each polygon that the boundary may cross, with the number of its block: adjacent ones have whole sides
@@ -130,10 +144,12 @@ impl<'a> LeafCells<'a> {
     /// Lists the cells of a block that are crossed or to be refined.
     fn classify(&self, block: u32, crossed: &mut Vec<Leaf>, refined: &mut Vec<Leaf>) {
         let of = &self.blocks[block as usize];
-        let [nx, ny] = of.shape;
-        let bends: Vec<Vec<f32>> = of.samples.iter().map(|s| second_differences(s, nx)).collect();
-        for j in 0..ny - 1 {
-            let row = classify_row(of, &bends, j);
+        for j in 0..of.shape[1] - 1 {
+            let hides = |f: usize, i: usize| {
+                let at = [of.first[0] + i, of.first[1] + j].map(|n| n as u32 * FINE);
+                self.hides(&Leaf { block, at, size: FINE }, f)
+            };
+            let row = classify_row(of, &self.dips[block as usize], &hides, j);
             let mut left = row.crossed | row.undecided;
             while left != 0 {
                 let i = left.trailing_zeros() as usize;
@@ -160,7 +176,7 @@ impl<'a> LeafCells<'a> {
             let children: Vec<Leaf> = children.collect();
             self.evaluate(children.iter().flat_map(|l| corners(l).map(|n| (l.block, n))));
             let (next, done): (Vec<Leaf>, Vec<Leaf>) =
-                children.into_iter().partition(|l| l.size > LEAST && self.undecided(l));
+                children.into_iter().partition(|l| l.size > LEAST_CREASED && self.undecided(l));
             leaves.extend(done);
             level = next;
         }
@@ -172,30 +188,62 @@ impl<'a> LeafCells<'a> {
         let of = &self.blocks[leaf.block as usize];
         let signs = corners(leaf).map(|n| self.signs(leaf.block, n));
         let (some, all) = (signs.iter().fold(0, |a, b| a | b), signs.iter().fold(u64::MAX, |a, b| a & b));
-        let mut dips = 0u64;
-        for f in (0..of.live.len()).filter(|f| (some ^ all) >> f & 1 == 0) {
-            let least = corners(leaf).map(|n| self.value(leaf.block, n, f).abs()).into_iter().fold(f64::MAX, f64::min);
-            dips |= u64::from(least <= DIP * self.bend(leaf, f)) << f;
-        }
+        let dips = (0..of.live.len()).fold(0, |w, f| w | u64::from(self.hides(leaf, f)) << f);
         let (some, all) = (some | dips, all & !dips);
         let [a, b, c, d] = signs;
         let saddle = !(a ^ c) & !(b ^ d) & (a ^ b);
         let (mut count, mut found) = (0, false);
         of.tree.deciding(1, &|f| some >> f & 1, &|f| all >> f & 1, &mut |f, here| {
             count += here;
-            found |= here == 1 && (saddle | dips) >> f & 1 == 1;
+            let divisible = leaf.size > LEAST || self.surfaces[of.live[f]].has_creases;
+            found |= here == 1 && (saddle | dips) >> f & 1 == 1 && divisible;
         });
-        found || count >= 3
+        found || count >= 3 && leaf.size > LEAST
     }
 
-    /// The greatest second difference of a surface in the cell that a part was divided from, in steps of the part's size.
-    fn bend(&self, leaf: &Leaf, surface: usize) -> f64 {
-        let s = leaf.size;
+    /// How far a surface may go beyond its values at the corners of a cell or a part of one: in proportion to the edge, if it has
+    /// creases; else by second differences in what the part was divided from.
+    fn dip(&self, leaf: &Leaf, surface: usize) -> f64 {
+        let (of, s) = (&self.blocks[leaf.block as usize], leaf.size);
+        if s == FINE || self.surfaces[of.live[surface]].has_creases {
+            let [i, j] = place(of, leaf.at);
+            let whole = self.dips[leaf.block as usize][surface][i + j * of.shape[0]];
+            return f64::from(whole) * f64::from(s) / f64::from(FINE);
+        }
         let first = leaf.at.map(|x| x / (2 * s) * (2 * s));
         let value = |i: u32, j: u32| self.value(leaf.block, [first[0] + i * s, first[1] + j * s], surface);
-        let rows = (0..3).map(|k| value(0, k) - 2.0 * value(1, k) + value(2, k));
-        let columns = (0..3).map(|k| value(k, 0) - 2.0 * value(k, 1) + value(k, 2));
-        rows.chain(columns).fold(0.0, |most, v| v.abs().max(most))
+        let rows = (0..3).map(|k| (value(0, k) - 2.0 * value(1, k) + value(2, k)).abs()).fold(0.0, f64::max);
+        let columns = (0..3).map(|k| (value(k, 0) - 2.0 * value(k, 1) + value(k, 2)).abs()).fold(0.0, f64::max);
+        DIP * (rows + columns)
+    }
+
+    /// Whether a surface may change sign in a cell without a trace at the corners: inside, if it has one sign at all; where there are
+    /// creases also on a side with one sign at its ends.
+    fn hides(&self, leaf: &Leaf, f: usize) -> bool {
+        let nodes = corners(leaf);
+        let values = nodes.map(|n| self.value(leaf.block, n, f));
+        let signs = values.map(|v| v <= 0.0);
+        let surface = &self.surfaces[self.blocks[leaf.block as usize].live[f]];
+        let uniform = signs == [signs[0]; 4];
+        if !(uniform || surface.has_creases) {
+            return false;
+        }
+        let dip = self.dip(leaf, f);
+        // Bounds are dear to ask, and narrow enough to be asked, where there are creases.
+        let varies = |a: Node, b: Node| {
+            let [min, max] = [[0, 1].map(|k| a[k].min(b[k])), [0, 1].map(|k| a[k].max(b[k]))];
+            let [min, max] = [min, max].map(|n| lifted(self.grid.position(n), self.z));
+            let range = surface.field.bound(&Aabb { min, max });
+            range.lo <= 0.0 && range.hi > 0.0
+        };
+        if uniform {
+            let least = values.into_iter().map(f64::abs).fold(f64::MAX, f64::min);
+            return least <= dip && (!surface.has_creases || varies(nodes[0], nodes[2]));
+        }
+        let side = |[i, j]: [usize; 2]| {
+            signs[i] == signs[j] && values[i].abs().min(values[j].abs()) <= dip && varies(nodes[i], nodes[j])
+        };
+        [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().any(side)
     }
 
     /// Evaluates the live surfaces of blocks at nodes that are not nodes of the grid.
@@ -286,7 +334,19 @@ fn boundary(leaf: &Leaf, hanging: &FxHashSet<Node>) -> Vec<Node> {
     out
 }
 
-/// The greater of the second differences along x and y, at each node; at the ends of rows those of the next node.
+/// How far a function may go beyond its values at the corners of cells: for each node, of the cell that begins there.
+fn dips(values: &[f32], nx: usize, creased: bool) -> Vec<f32> {
+    let bends = second_differences(values, nx);
+    let ny = values.len() / nx;
+    let (around, share) = if creased { (1, CREASED_DIP) } else { (0, DIP) };
+    let reach = |i: usize, count: usize| i.saturating_sub(around)..(i + 2 + around).min(count);
+    let along: Vec<f32> =
+        (0..values.len()).map(|n| reach(n % nx, nx).map(|i| bends[n - n % nx + i]).fold(0.0, f32::max)).collect();
+    let of = |n: usize| reach(n / nx, ny).map(|j| along[n % nx + j * nx]).fold(0.0, f32::max);
+    (0..values.len()).map(|n| share as f32 * of(n)).collect()
+}
+
+/// The sum of the second differences along x and y, at each node; at the ends of rows those of the next node.
 fn second_differences(values: &[f32], nx: usize) -> Vec<f32> {
     let ny = values.len() / nx;
     let along = |n: usize, stride: usize, at: usize, count: usize| {
@@ -296,18 +356,12 @@ fn second_differences(values: &[f32], nx: usize) -> Vec<f32> {
         let n = n + stride * usize::from(at == 0) - stride * usize::from(at + 1 == count);
         (values[n - stride] - 2.0 * values[n] + values[n + stride]).abs()
     };
-    let of = |n: usize| along(n, 1, n % nx, nx).max(along(n, nx, n / nx, ny));
+    let of = |n: usize| along(n, 1, n % nx, nx) + along(n, nx, n / nx, ny);
     (0..values.len()).map(of).collect()
 }
 
-/// The greatest value at the corners of a cell.
-fn cell_most(of: &[f32], nx: usize, i: usize, j: usize) -> f32 {
-    let n = i + j * nx;
-    of[n].max(of[n + 1]).max(of[n + nx]).max(of[n + nx + 1])
-}
-
 /// Classifies the cells of a row, 64 at a time.
-fn classify_row(of: &LiveBlock, bends: &[Vec<f32>], j: usize) -> Row {
+fn classify_row(of: &LiveBlock, dip: &[Vec<f32>], hides: &impl Fn(usize, usize) -> bool, j: usize) -> Row {
     let nx = of.shape[0];
     let mask = (1u64 << (nx - 1)) - 1;
     let rows = |f: usize| (of.negative[f][j], of.negative[f][j + 1]);
@@ -318,15 +372,14 @@ fn classify_row(of: &LiveBlock, bends: &[Vec<f32>], j: usize) -> Row {
         some[f] = a | a >> 1 | b | b >> 1;
         all[f] = a & (a >> 1) & b & (b >> 1);
         saddle[f] = (a ^ (a >> 1)) & (b ^ (b >> 1)) & (a ^ b);
-        let (values, bend) = (&of.samples[f], &bends[f]);
-        let mut uniform = !(some[f] ^ all[f]) & mask;
-        while uniform != 0 {
-            let i = uniform.trailing_zeros() as usize;
-            uniform &= uniform - 1;
+        let values = &of.samples[f];
+        for i in 0..nx - 1 {
             let n = i + j * nx;
             let least =
                 values[n].abs().min(values[n + 1].abs()).min(values[n + nx].abs()).min(values[n + nx + 1].abs());
-            dips[f] |= u64::from(least <= DIP as f32 * cell_most(bend, nx, i, j)) << i;
+            if least <= dip[f][n] {
+                dips[f] |= u64::from(hides(f, i)) << i;
+            }
         }
     }
     let crossed = of.tree.possible(&|f| some[f], &|f| all[f]) & !of.tree.certain(&|f| some[f], &|f| all[f]) & mask;

@@ -1,6 +1,6 @@
 //! The sampling grid of a layer: blocks of square cells in a plane, those that bounds dismiss left out.
 //!
-//! Points of the grid and of its refinements have whole numbers for coordinates, in units of a sixteenth of a cell, so that
+//! Points of the grid and of its refinements have whole numbers for coordinates, in units of a 64th of a cell, so that
 //! whatever cells share is found by number and never by comparing positions.
 
 use std::sync::Arc;
@@ -18,7 +18,7 @@ const BLOCKS: [usize; 4] = [40, 20, 10, 5];
 /// Most live surfaces of a block.
 const MOST_LIVE: usize = 64;
 /// Units along the edge of a cell.
-pub(super) const FINE: u32 = 16;
+pub(super) const FINE: u32 = 64;
 
 /// A grid node or a node of a refined cell, in units of the grid.
 pub(super) type Node = [u32; 2];

@@ -1,5 +1,7 @@
 //! Laws of layers: closed forms, volumes, topology, distances.
 
+mod sharp_beams;
+
 use std::sync::Arc;
 
 use geometry::layer::Layer;
