@@ -40,7 +40,8 @@ pub(super) fn filled(
         let tree = zone.surfaces(0.0, &mut surfaces);
         filled.push(CsgSolid { surfaces, tree });
     }
-    if filled.len() > 1 && !is_open(&filled, region, points) {
+    let fields: Vec<&dyn Field> = filled.iter().map(|body| body as &dyn Field).collect();
+    if fields.len() > 1 && !is_open(&fields, region, points) {
         let (path, what) = if d.skin.is_some() {
             ("skin", "the skin and the keep zones")
         } else {
@@ -52,8 +53,8 @@ pub(super) fn filled(
     Ok((filled, thinnest))
 }
 
-/// Whether any sample point of the region is outside the skin and the keep zones.
-fn is_open(filled: &[CsgSolid], region: &Region, points: &[Vec3]) -> bool {
+/// Whether any sample point of the region is outside all of these.
+fn is_open(filled: &[&dyn Field], region: &Region, points: &[Vec3]) -> bool {
     let open = |points: &[Vec3]| {
         let (mut least, mut v) = (vec![f64::INFINITY; points.len()], vec![0.0; points.len()]);
         for body in filled {
@@ -62,7 +63,7 @@ fn is_open(filled: &[CsgSolid], region: &Region, points: &[Vec3]) -> bool {
         }
         least.iter().any(|v| *v > 0.0)
     };
-    // Too few samples for a small cavity: sampled more finely before a warning.
+    // Too few samples for a small cavity: sampled more finely before a refusal.
     open(points) || open(&sample::inside(region, 50 * sample::COUNT).0)
 }
 
@@ -127,7 +128,7 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         None => DesignError::fault("skin", f),
     })?;
     let body = openings.iter().fold(body, outside);
-    if !is_open(std::slice::from_ref(&body), region, points) {
+    if !is_open(&[&body], region, points) {
         return Err(too_thick());
     }
     Ok((body, width.min))
@@ -135,12 +136,12 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
 
 /// Refuses a zone that is disjoint from the region or contains all of it.
 fn check_zone(zone: &Region, region: &Region, points: &[Vec3], path: &str, then: &str) -> Result<(), DesignError> {
-    let mut distance = vec![0.0; points.len()];
-    zone.values(points, &mut distance);
-    if distance.iter().all(|d| *d <= 0.0) {
+    if !is_open(&[&**zone], region, points) {
         let message = format!("it holds the whole region: {then}");
         return Err(DesignError::new(path, message));
     }
+    let mut distance = vec![0.0; points.len()];
+    zone.values(points, &mut distance);
     if distance.iter().any(|d| *d < 0.0) {
         return Ok(());
     }

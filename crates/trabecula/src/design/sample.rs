@@ -61,7 +61,7 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
     let mut kept = Vec::new();
     for first in (from..from + tries).step_by(BATCH) {
         let points: Vec<Vec3> =
-            (first..(first + BATCH).min(from + tries)).map(|i| bounds.at(low_discrepancy(i + 1))).collect();
+            (first..(first + BATCH).min(from + tries)).map(|i| bounds.at(low_discrepancy(i))).collect();
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
         // What regions compute at first use is computed before they are asked in parallel, as in `values`.
         region.value(points[0]);
