@@ -30,10 +30,10 @@ pub(super) fn expected(built: &Built) -> (f64, f64) {
     (solid_share(&points, &built.solid), region.volume().unwrap_or_else(sampled))
 }
 
-/// The solid share of the region; of beams in a blend, if they filled it alone. Within about a thousandth of it where a few hundredths are
+/// The solid share of the region; of beams in a blend, if they filled it alone. Within a few thousandths of it where a few hundredths are
 /// solid.
 fn filling(built: &Built, beams: &Beams) -> f64 {
-    let (points, _) = sample::inside(&built.solid.region, 40 * sample::COUNT);
+    let (points, _) = sample::inside(&built.solid.region, 8 * sample::COUNT);
     match built.blend {
         Some(_) => solid_share(&points, &*beams.field()),
         None => solid_share(&points, &built.solid),
