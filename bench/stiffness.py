@@ -22,14 +22,14 @@ PAIRS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 E, NU, EDGE = 1.0, 0.3, 4.0
 
 
-def by_mugrid(solid):
-    """C of a cube of voxels, 1 where they are solid."""
+def by_mugrid(solid, E=E, nu=NU):
+    """C, 6 x 6 in Voigt's order 11 22 33 23 13 12, of a cube of voxels (n, n, n), 1 where they are solid, of this E and nu."""
     n, world = len(solid), muGrid.Communicator()
     element, spacing = muGrid.FEMElement.q1, [1 / n] * 3
     operator = muGrid.IsotropicStiffnessOperator3D(spacing, element)
     grid = muGrid.FFTEngine([n] * 3, world, nb_ghosts_left=[1] * 3, nb_ghosts_right=[1] * 3)
     lame = [grid.real_space_field(name) for name in ("first", "second")]
-    for field, of_solid in zip(lame, (E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))), strict=True):
+    for field, of_solid in zip(lame, (E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))), strict=True):
         field.p[...] = of_solid * solid
         grid.communicate_ghosts(field)
     moved, load = (grid.real_space_field(name, (3,)) for name in ("moved", "load"))

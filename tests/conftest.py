@@ -55,16 +55,22 @@ def command(*words):
     return subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True, timeout=300)
 
 
-def in_process(*words, status=0):
-    """What the command prints, without the start of another process."""
+def run_in_process(*words):
+    """The command in this process, without the start of another: its status and what it prints."""
     signals = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     handlers = {which: signal.getsignal(which) for which in signals}
     out, err = io.StringIO(), io.StringIO()
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            found = cli.main([str(word) for word in words])
+            status = cli.main([str(word) for word in words])
     finally:
         for which, handler in handlers.items():
             signal.signal(which, handler)
-    assert found == status, err.getvalue()
-    return out.getvalue()
+    return subprocess.CompletedProcess(words, status, out.getvalue(), err.getvalue())
+
+
+def in_process(*words, status=0):
+    """What the command prints, in this process."""
+    done = run_in_process(*words)
+    assert done.returncode == status, done.stderr
+    return done.stdout
