@@ -189,7 +189,7 @@ class Layers(Reproducible, Sequence["Layer"]):
 
         ``path`` ends in .svg. The drawings stand in a new folder with the name of ``path`` without that, which appears when all
         are there; their names are the numbers of the layers from 0. All are as large as the region's bounds, in mm, so that
-        they lie on each other.
+        they lie on each other. Raises ValueError for another suffix, and where there is such a folder.
         """
         import tempfile
 

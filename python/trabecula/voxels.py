@@ -70,7 +70,10 @@ class Voxels(Reproducible):
         return fixed(self._core.solid).transpose(2, 1, 0)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """``solid`` for functions of NumPy, as another type if one is asked for."""
+        """``solid``, (nx, ny, nz) of uint8 and read-only, for functions of NumPy; a copy where another type is asked for.
+
+        Raises ValueError where that needs a copy and ``copy`` is False.
+        """
         found = self.solid
         if dtype is None or found.dtype == dtype:
             return found.copy() if copy else found

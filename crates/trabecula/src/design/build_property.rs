@@ -187,20 +187,15 @@ impl Property<'_> {
         let [low, high] = self.range()?;
         let mut last: Option<[f64; 2]> = None;
         // Values on few voxels are noisy, and steps may not come nearer: the nearest counts.
-        let mut nearest = (f64::INFINITY, at, self.found(at, self.fine())?);
-        let mut found = nearest.2;
-        for step in 0..STEPS[1] {
-            if step > 0 {
-                found = self.found(at, self.fine())?;
-            }
+        let mut nearest = (f64::INFINITY, at, Found { value: f64::NAN, error: f64::NAN });
+        for _ in 0..STEPS[1] {
+            let found = self.found(at, self.fine())?;
             let off = (found.value / asked).ln();
-            if !off.is_finite() {
-                break;
-            }
-            if off.abs() < nearest.0 {
+            // The first one in any case.
+            if off.abs() <= nearest.0 {
                 nearest = (off.abs(), at, found);
             }
-            if off.abs() <= MET[1] {
+            if !off.is_finite() || off.abs() <= MET[1] {
                 break;
             }
             if let Some([x, y]) = last

@@ -39,6 +39,7 @@ mod surface;
 mod surface_frames;
 mod tets;
 mod tets_balance;
+mod tets_fit;
 mod thickness;
 mod tiling;
 mod tiling_amounts;
