@@ -320,7 +320,7 @@ fn extreme(pencil: &Pencil, m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Beam, Fillet, Graph, Hub, Profile};
+    use crate::{Beam, Fillet, Graph, HubBall, Profile};
     use geometry::math::Vec3;
 
     /// Beams of all kinds: length, radii of the balls (mm), profile.
@@ -336,8 +336,8 @@ mod tests {
     fn pair(length: f64, radii: [f64; 2], profile: Profile) -> Quadors {
         let direction: Vec3 = [2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0];
         let hubs = vec![
-            Hub { center: [0.5, -1.0, 2.0], radius: radii[0] },
-            Hub { center: add([0.5, -1.0, 2.0], scale(direction, length)), radius: radii[1] },
+            HubBall { center: [0.5, -1.0, 2.0], radius: radii[0] },
+            HubBall { center: add([0.5, -1.0, 2.0], scale(direction, length)), radius: radii[1] },
         ];
         Quadors::new(&Graph { hubs, beams: vec![Beam { ends: [0, 1], profile }] }, Fillet::None).expect("valid")
     }

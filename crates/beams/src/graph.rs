@@ -23,7 +23,7 @@ pub const MAX_STRUTS: f64 = 1e7;
 
 /// A hub: the ball in which beams meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hub {
+pub struct HubBall {
     /// Centre, mm.
     pub center: Vec3,
     /// Radius, mm; positive and finite.
@@ -58,7 +58,7 @@ pub struct Beam {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
     /// The hubs.
-    pub hubs: Vec<Hub>,
+    pub hubs: Vec<HubBall>,
     /// The beams.
     pub beams: Vec<Beam>,
 }

@@ -23,9 +23,9 @@
 //! [`quador`]. Invalid input is reported as a [`geometry::fault::Fault`] with its path in the graph.
 //!
 //! ```
-//! use beams::{Beam, Fillet, Graph, Hub, Plane, Profile, Quadors};
+//! use beams::{Beam, Fillet, Graph, HubBall, Profile, Quadors, SlicePlane};
 //!
-//! let hub = |x: f64| Hub { center: [x, 0.0, 0.0], radius: 1.0 };
+//! let hub = |x: f64| HubBall { center: [x, 0.0, 0.0], radius: 1.0 };
 //! let graph = Graph {
 //!     hubs: vec![hub(0.0), hub(10.0)],
 //!     beams: vec![Beam { ends: [0, 1], profile: Profile::Cylinder }],
@@ -39,7 +39,7 @@
 //! let pi = std::f64::consts::PI;
 //! assert!((quadors.volume()? - (10.0 + 4.0 / 3.0) * pi).abs() < 1e-8);
 //! // The slice at x = 3 mm is a disc.
-//! let slice = quadors.slice(&Plane::new([3.0, 0.0, 0.0], [1.0, 0.0, 0.0])?)?;
+//! let slice = quadors.slice(&SlicePlane::new([3.0, 0.0, 0.0], [1.0, 0.0, 0.0])?)?;
 //! assert!((slice.area - pi).abs() < 1e-12);
 //! # Ok::<(), geometry::fault::Fault>(())
 //! ```
@@ -53,9 +53,9 @@ pub mod quador;
 mod step;
 
 pub use frusta::{Frusta, JoinedChains, join_chains};
-pub use graph::{Beam, Graph, Hub, Profile, Wireframe};
+pub use graph::{Beam, Graph, HubBall, Profile, Wireframe};
 pub use pattern::{Pattern, PatternField};
-pub use quador::slice::{Plane, Slice};
+pub use quador::slice::{Slice, SlicePlane};
 pub use quador::{Fillet, MassProperties, Pencil, Quadors, Tessellation};
 pub use step::{StepSummary, write_step};
 

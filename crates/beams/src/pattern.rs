@@ -10,7 +10,7 @@ mod pattern_field;
 
 pub use pattern_field::PatternField;
 
-use crate::graph::{Beam, Graph, Hub, Profile};
+use crate::graph::{Beam, Graph, HubBall, Profile};
 use geometry::fault::{Fault, counted, number};
 use geometry::similarity::Similarity;
 
@@ -29,7 +29,7 @@ pub struct Strut {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pattern {
     /// The hubs that are repeated.
-    pub nodes: Vec<Hub>,
+    pub nodes: Vec<HubBall>,
     /// The struts that are repeated, wherever both ends exist.
     pub struts: Vec<Strut>,
     /// U, V, W, and their repeat counts, the original included.
@@ -118,7 +118,7 @@ impl Pattern {
         let home = self.at(index).inverse();
         let ball = |n: u32, index: [u32; 3]| {
             let (at, h) = (home.after(&self.at(index)), self.nodes[n as usize]);
-            Hub { center: at.point(h.center), radius: at.scale() * h.radius }
+            HubBall { center: at.point(h.center), radius: at.scale() * h.radius }
         };
         let mut star = Graph { hubs: vec![ball(node, index)], beams: Vec::new() };
         for s in &self.struts {
@@ -166,9 +166,9 @@ impl Pattern {
         let indices = || (0..w).flat_map(move |k| (0..v).flat_map(move |j| (0..u).map(move |i| [i, j, k])));
         for index in indices() {
             let at = self.at(index);
-            graph
-                .hubs
-                .extend(self.nodes.iter().map(|h| Hub { center: at.point(h.center), radius: at.scale() * h.radius }));
+            graph.hubs.extend(
+                self.nodes.iter().map(|h| HubBall { center: at.point(h.center), radius: at.scale() * h.radius }),
+            );
         }
         for index in indices() {
             for s in &self.struts {

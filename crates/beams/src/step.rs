@@ -15,7 +15,7 @@ use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
 use crate::quador::brep::{Brep, CurveKey, EdgeUse, HubGroup, Surface};
-use crate::quador::slice::Plane;
+use crate::quador::slice::SlicePlane;
 
 /// What a STEP file contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +51,7 @@ const SLIVER: f64 = 1e-5;
 /// cut nothing there, or that leave nothing; closed cavities; failures of the output.
 pub fn write_step(
     quadors: &Quadors,
-    planes: &[Plane],
+    planes: &[SlicePlane],
     title: Title,
     assembly: Option<bool>,
     out: &mut dyn io::Write,
@@ -357,14 +357,15 @@ impl Writer<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{Beam, Graph, Hub, Profile};
+    use crate::graph::{Beam, Graph, HubBall, Profile};
     use crate::quador::Fillet;
 
     /// Three beams of different quadrics that meet in one hub, and a ball.
     fn lattice() -> Quadors {
         let ends = [[8.0, 0.0, 0.0], [0.0, 7.0, 0.0], [0.0, 1.0, 9.0]];
-        let mut hubs = vec![Hub { center: [0.0; 3], radius: 1.0 }, Hub { center: [-20.0, 0.0, 0.0], radius: 2.0 }];
-        hubs.extend(ends.iter().zip([1.0, 0.6, 1.0]).map(|(center, radius)| Hub { center: *center, radius }));
+        let mut hubs =
+            vec![HubBall { center: [0.0; 3], radius: 1.0 }, HubBall { center: [-20.0, 0.0, 0.0], radius: 2.0 }];
+        hubs.extend(ends.iter().zip([1.0, 0.6, 1.0]).map(|(center, radius)| HubBall { center: *center, radius }));
         let profiles = [Profile::Cylinder, Profile::Cone, Profile::Waist(0.5)];
         let beams = profiles.into_iter().zip(2..).map(|(profile, end)| Beam { ends: [0, end], profile }).collect();
         Quadors::new(&Graph { hubs, beams }, Fillet::Auto).expect("a lattice")

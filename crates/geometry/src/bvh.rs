@@ -39,7 +39,7 @@ const PARALLEL: usize = 4096;
 
 /// A node of the tree. The first child of a branch is the next node.
 #[derive(Clone, Copy, Debug)]
-pub struct Node {
+pub struct BvhNode {
     /// The box of its items.
     pub bounds: Aabb,
     /// First item of a leaf (a position in the tree's order); how many nodes on the second child of a branch stands.
@@ -48,7 +48,7 @@ pub struct Node {
     count: u32,
 }
 
-impl Node {
+impl BvhNode {
     /// The positions of a leaf's items in the tree's order; `None` for a branch.
     #[inline]
     pub fn items(&self) -> Option<Range<usize>> {
@@ -68,7 +68,7 @@ impl Node {
 /// of its leaf; the others are found as if it were not there. Infinite boxes are found; they make neighbours dearer to find.
 #[derive(Debug)]
 pub struct Bvh {
-    nodes: Vec<Node>,
+    nodes: Vec<BvhNode>,
     order: Vec<u32>,
 }
 
@@ -79,7 +79,7 @@ impl Bvh {
         match split {
             _ if items.is_empty() => {}
             Split::Median => {
-                nodes = vec![Node { bounds: Aabb::EMPTY, at: 0, count: 0 }; nodes_of_halves(items.len())];
+                nodes = vec![BvhNode { bounds: Aabb::EMPTY, at: 0, count: 0 }; nodes_of_halves(items.len())];
                 build_halves(boxes, &mut items, 0, &mut nodes);
             }
             Split::SurfaceArea => build(boxes, &mut items, [0, 0], &mut nodes),
@@ -88,7 +88,7 @@ impl Bvh {
     }
 
     /// The nodes, each before its children; none without items.
-    pub fn nodes(&self) -> &[Node] {
+    pub fn nodes(&self) -> &[BvhNode] {
         &self.nodes
     }
 
@@ -152,17 +152,17 @@ fn nodes_of_halves(n: usize) -> usize {
 }
 
 /// Builds a tree of halves in place: `nodes` are as many as it has. `first` is the position of the first item.
-fn build_halves(boxes: &[Aabb], order: &mut [u32], first: usize, nodes: &mut [Node]) {
+fn build_halves(boxes: &[Aabb], order: &mut [u32], first: usize, nodes: &mut [BvhNode]) {
     let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
     let n = order.len();
     let Some((node, rest)) = nodes.split_first_mut() else { return };
     if n <= Split::Median.leaf() {
-        *node = Node { bounds, at: first as u32, count: n as u32 };
+        *node = BvhNode { bounds, at: first as u32, count: n as u32 };
         return;
     }
     let middle = halve(boxes, order, longest(&bounds));
     let of_left = nodes_of_halves(middle);
-    *node = Node { bounds, at: 1 + of_left as u32, count: 0 };
+    *node = BvhNode { bounds, at: 1 + of_left as u32, count: 0 };
     let (left, right) = order.split_at_mut(middle);
     let (left_nodes, right_nodes) = rest.split_at_mut(of_left);
     let mut make_left = || build_halves(boxes, left, first, left_nodes);
@@ -176,10 +176,10 @@ fn build_halves(boxes: &[Aabb], order: &mut [u32], first: usize, nodes: &mut [No
 }
 
 /// Builds a tree by the surface-area heuristic: appends its nodes. `first` is the position of the first item.
-fn build(boxes: &[Aabb], order: &mut [u32], [first, depth]: [usize; 2], nodes: &mut Vec<Node>) {
+fn build(boxes: &[Aabb], order: &mut [u32], [first, depth]: [usize; 2], nodes: &mut Vec<BvhNode>) {
     let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
     let here = nodes.len();
-    nodes.push(Node { bounds, at: first as u32, count: order.len() as u32 });
+    nodes.push(BvhNode { bounds, at: first as u32, count: order.len() as u32 });
     if order.len() <= Split::SurfaceArea.leaf() {
         return;
     }

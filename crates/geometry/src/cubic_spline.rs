@@ -2,7 +2,7 @@
 
 /// The condition at both ends of each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Boundary {
+pub enum EndCondition {
     /// The first node follows the last: as many coefficients as nodes.
     Periodic,
     /// Not-a-knot: the third derivative does not jump at the second and the last but one node, so that a cubic is met exactly.
@@ -47,12 +47,12 @@ fn polynomials<const N: usize>(t: f64, by_power: [[f64; 4]; N]) -> [f64; 4] {
 }
 
 /// The coefficients of the spline through `values` (x fastest), axis by axis.
-pub fn coefficients(mut values: Vec<f64>, mut shape: [usize; 3], boundary: Boundary) -> Vec<f64> {
+pub fn coefficients(mut values: Vec<f64>, mut shape: [usize; 3], boundary: EndCondition) -> Vec<f64> {
     for axis in 0..3 {
         let inner: usize = shape[..axis].iter().product();
         let n = shape[axis];
         match boundary {
-            Boundary::Periodic => {
+            EndCondition::Periodic => {
                 let mut line = vec![0.0; n];
                 for lines in values.chunks_mut(inner * n) {
                     for x in 0..inner {
@@ -62,7 +62,7 @@ pub fn coefficients(mut values: Vec<f64>, mut shape: [usize; 3], boundary: Bound
                     }
                 }
             }
-            Boundary::NotAKnot => {
+            EndCondition::NotAKnot => {
                 let mut to = vec![0.0; values.len() / n * (n + 2)];
                 for (from, to) in values.chunks(inner * n).zip(to.chunks_mut(inner * (n + 2))) {
                     not_a_knot(from, to, n, inner);
@@ -152,8 +152,8 @@ mod tests {
         let nodes = [7, 6, 9];
         let mut seed = 3;
         let values: Vec<f64> = (0..7 * 6 * 9).map(|_| random(&mut seed)).collect();
-        let around = coefficients(values.clone(), nodes, Boundary::Periodic);
-        let open = coefficients(values.clone(), nodes, Boundary::NotAKnot);
+        let around = coefficients(values.clone(), nodes, EndCondition::Periodic);
+        let open = coefficients(values.clone(), nodes, EndCondition::NotAKnot);
         assert_eq!((around.len(), open.len()), (7 * 6 * 9, 9 * 8 * 11));
         for (i, v) in values.iter().enumerate() {
             let node = [i % 7, i / 7 % 6, i / 42];

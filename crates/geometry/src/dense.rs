@@ -4,8 +4,8 @@
 //! entries, so that the bits are the same everywhere.
 
 /// A row of a matrix.
-pub trait Row: AsRef<[f64]> + AsMut<[f64]> {}
-impl<T: AsRef<[f64]> + AsMut<[f64]>> Row for T {}
+pub trait MatrixRow: AsRef<[f64]> + AsMut<[f64]> {}
+impl<T: AsRef<[f64]> + AsMut<[f64]>> MatrixRow for T {}
 
 /// Most sweeps of Jacobi's method: convergence is quadratic, six are usual.
 const SWEEPS: usize = 16;
@@ -14,7 +14,7 @@ const SWEEPS: usize = 16;
 /// rows are the orthonormal eigenvectors in the same order. `vectors` may be empty. Entries off the diagonal at most `near` times the
 /// diagonal ones in their row and column count as zero.
 #[inline]
-pub fn diagonalise<R: Row>(a: &mut [R], vectors: &mut [R], near: f64) {
+pub fn diagonalise<R: MatrixRow>(a: &mut [R], vectors: &mut [R], near: f64) {
     let n = a.len();
     for _ in 0..SWEEPS {
         let mut is_diagonal = true;
@@ -71,7 +71,7 @@ pub fn eigen(mut a: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
 /// `pivot(i, rest)` is the entry on the diagonal of L for what is left of that of A: the root of `rest`, `None` if the matrix is not
 /// positive enough. With an infinite pivot the unknown is zero and its equation is left out.
 #[inline]
-pub fn factorise<R: Row>(a: &mut [R], pivot: impl Fn(usize, f64) -> Option<f64>) -> Option<()> {
+pub fn factorise<R: MatrixRow>(a: &mut [R], pivot: impl Fn(usize, f64) -> Option<f64>) -> Option<()> {
     for i in 0..a.len() {
         let (above, rest) = a.split_at_mut(i);
         let row = rest[0].as_mut();
@@ -87,7 +87,7 @@ pub fn factorise<R: Row>(a: &mut [R], pivot: impl Fn(usize, f64) -> Option<f64>)
 
 /// Replaces b by the solution of LLᵀ x = b, for the lower triangle of L.
 #[inline]
-pub fn substitute<R: Row>(l: &[R], x: &mut [f64]) {
+pub fn substitute<R: MatrixRow>(l: &[R], x: &mut [f64]) {
     for i in 0..x.len() {
         let row = l[i].as_ref();
         let s: f64 = row[..i].iter().zip(&*x).map(|(a, b)| a * b).sum();
@@ -116,7 +116,7 @@ pub fn inverse<const N: usize>(m: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
 /// Solves equations by Gauss' elimination with row pivots. A row is an equation: its coefficients, then its right-hand sides, which
 /// are replaced by the solutions. `None` if the equations are dependent to `least` of the largest coefficient, or any is NaN.
 #[inline]
-pub fn solve<R: Row>(rows: &mut [R], least: f64) -> Option<()> {
+pub fn solve<R: MatrixRow>(rows: &mut [R], least: f64) -> Option<()> {
     let n = rows.len();
     let at = |rows: &[R], i: usize, j: usize| rows[i].as_ref()[j];
     let largest = rows.iter().flat_map(|r| &r.as_ref()[..n]).fold(0.0f64, |a, v| a.max(v.abs()));

@@ -16,7 +16,7 @@ pub mod triangle;
 pub mod triangle_bvh;
 pub mod winding;
 
-use normals::Normals;
+use normals::PseudoNormals;
 use triangle::{Feature, Triangle};
 use triangle_bvh::{Candidates, Nearest, TriangleBvh};
 use winding::Winding;
@@ -33,7 +33,7 @@ pub const REACH: f64 = 1.4;
 #[derive(Debug)]
 pub struct MeshDistance {
     tree: TriangleBvh,
-    normals: Normals,
+    normals: PseudoNormals,
     /// Decides the sign where the boundary is not one clean surface; none where it is everywhere.
     winding: Option<Winding>,
     mesh: Mesh,
@@ -71,8 +71,8 @@ impl MeshDistance {
         let faces: Vec<Triangle> = (0..mesh.triangles.len()).map(|i| Triangle::new(mesh.corners(i))).collect();
         let tree = TriangleBvh::new(&faces);
         let (normals, winding) = match pairs {
-            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, tree.order()), None),
-            None => (Normals::of_pieces(&faces, tree.order()), Some(Winding::new(&tree))),
+            Some(pairs) => (PseudoNormals::new(&mesh, &faces, &pairs, tree.order()), None),
+            None => (PseudoNormals::of_pieces(&faces, tree.order()), Some(Winding::new(&tree))),
         };
         MeshDistance { normals, winding, tree, mesh, repaired: done }
     }

@@ -12,10 +12,10 @@ mod poly_faces;
 mod shell_mesh;
 mod surface_load;
 
-pub use beam_mesh::{BeamMesh, Section};
+pub use beam_mesh::{BeamMesh, BeamSection};
 pub use fraction_classes::fraction_classes;
 pub use hex_mesh::{HEX_FACES, HexMesh};
-pub use poly_faces::{Patch, PolyFaces};
+pub use poly_faces::{BoundaryPatch, PolyFaces};
 pub use shell_mesh::ShellMesh;
 pub use surface_load::Load;
 

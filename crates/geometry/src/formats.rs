@@ -36,16 +36,16 @@ pub use element_files::{
     SHELL_FORMATS, ShellFormat,
 };
 pub use elements::Elements;
-pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, Lost, read_graph, write_graph};
+pub use graphs::{BeamGraph, GRAPH_FORMATS, GraphFormat, GraphLoss, read_graph, write_graph};
 pub use indexed::{ByteSpool, Indexed};
-pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, Raster, Stack, Target};
+pub use layer_files::{Encoded, LAYER_FORMATS, LayerFormat, LayerWriter, PixelGrid, Stack, Target};
 pub use npy::{npy_head, read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
 pub use stl::write_pieces as write_stl_pieces;
 pub use text::{column, heading};
 pub use threemf::{BeamLattice, Cap, CompanionMeshes, Frustum, object_names, read_object, write_beam_lattice};
 pub use vti::{pvti, vti_frame, write_vti};
-pub use vtk::{Array, Data, Shape, read_vtk};
+pub use vtk::{Data, DataArray, DataSet, read_vtk};
 pub use vtu::write_vtu;
 
 /// Formats of results on grids and meshes, by the ends of their files' names.
@@ -81,11 +81,11 @@ pub struct Writer {
     pub binary: bool,
     /// Bytes of a file for each triangle and each vertex; those of text for parts of some hundred mm.
     pub bytes: [f64; 2],
-    write: Write,
+    write: WriteMesh,
 }
 
 /// Writes a file.
-enum Write {
+enum WriteMesh {
     /// One in which each triangle has corners of its own.
     Soup(fn(&Mesh, &mut dyn io::Write) -> io::Result<()>),
     /// One with numbered vertices. What follows numbers that are not known yet is put aside.
@@ -102,7 +102,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(Writer {
             binary: true,
             bytes: [50.0, 0.0],
-            write: Write::Soup(|mesh, mut out| stl::write(mesh, &mut out)),
+            write: WriteMesh::Soup(|mesh, mut out| stl::write(mesh, &mut out)),
         }),
     },
     Format {
@@ -110,7 +110,7 @@ pub const FORMATS: &[Format] = &[
         in_mm: true,
         soup: false,
         read: threemf::read,
-        writer: Some(Writer { binary: false, bytes: [7.0, 9.0], write: Write::Indexed(threemf::write) }),
+        writer: Some(Writer { binary: false, bytes: [7.0, 9.0], write: WriteMesh::Indexed(threemf::write) }),
     },
     Format {
         suffix: "ply",
@@ -120,7 +120,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(Writer {
             binary: true,
             bytes: [13.0, 24.0],
-            write: Write::Indexed(|mesh, _, _, out| ply::write(mesh, out)),
+            write: WriteMesh::Indexed(|mesh, _, _, out| ply::write(mesh, out)),
         }),
     },
     Format {
@@ -131,7 +131,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(Writer {
             binary: false,
             bytes: [27.0, 50.0],
-            write: Write::Indexed(|mesh, meta, _, out| obj::write(mesh, meta, out)),
+            write: WriteMesh::Indexed(|mesh, meta, _, out| obj::write(mesh, meta, out)),
         }),
     },
     Format { suffix: "off", in_mm: false, soup: false, read: |bytes| off::read(without_mark(bytes)), writer: None },
@@ -216,8 +216,8 @@ pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out:
     let write = writer(suffix)?;
     check_mesh(mesh)?;
     match write {
-        Write::Soup(write) => write(mesh, out),
-        Write::Indexed(write) => write(mesh, meta, &mut Vec::new(), out),
+        WriteMesh::Soup(write) => write(mesh, out),
+        WriteMesh::Indexed(write) => write(mesh, meta, &mut Vec::new(), out),
     }
 }
 
@@ -234,13 +234,13 @@ pub fn write_indexed(
     out: &mut dyn io::Write,
 ) -> io::Result<()> {
     match writer(suffix)? {
-        Write::Indexed(write) => write(mesh, meta, aside, out),
-        Write::Soup(_) => Err(invalid(format!("{suffix} has no numbered vertices"))),
+        WriteMesh::Indexed(write) => write(mesh, meta, aside, out),
+        WriteMesh::Soup(_) => Err(invalid(format!("{suffix} has no numbered vertices"))),
     }
 }
 
 /// How files with this suffix are written.
-fn writer(suffix: &str) -> io::Result<&'static Write> {
+fn writer(suffix: &str) -> io::Result<&'static WriteMesh> {
     let found = Format::of(suffix).and_then(|f| f.writer.as_ref());
     let written = || FORMATS.iter().filter(|f| f.writer.is_some());
     found.map(|w| &w.write).ok_or_else(|| invalid(unknown(suffix, &suffixes(written()))))

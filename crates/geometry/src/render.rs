@@ -38,7 +38,7 @@ use paper::Paper;
 pub use png::png;
 use raster::{BAND, Projected, Raster};
 use section::SeenSection;
-pub use section::{PlaneGrid, Section};
+pub use section::{PlaneGrid, SectionPlane};
 use shade::{Finish, Shader};
 pub use shares::{Colours, SectionColours, Shares};
 pub use tint::{Amount, Tint};
@@ -70,7 +70,7 @@ pub struct RenderOptions {
     /// Lines, seen through the surface too. A surface without colours is pale then.
     pub lines: Option<Lines>,
     /// What is left out, of a closed surface; what the plane cuts is hatched.
-    pub section: Option<Section>,
+    pub section: Option<SectionPlane>,
     /// The colours of what the plane cuts, where the surface has some.
     pub section_colours: Option<SectionColours>,
     /// Unit normals at the corners of the surface's triangles, three for each, by which it is shaded and its contours are found; those of
@@ -155,10 +155,11 @@ fn picture(
             (None, Some(_)) => Finish::Pale,
             (None, None) => Finish::Plain,
         };
-        let mut body = Layer::new(surface, &camera, size, (finish, options.normals.as_deref()), section);
+        let mut body = DrawnSurface::new(surface, &camera, size, (finish, options.normals.as_deref()), section);
         body.shader.hatched = hatched;
         let tubes = options.lines.as_ref().map(Tubes::of);
-        let lines = tubes.as_ref().map(|t| Layer::new(&t.surface, &camera, size, (Finish::Lines(t), None), section));
+        let lines =
+            tubes.as_ref().map(|t| DrawnSurface::new(&t.surface, &camera, size, (Finish::Lines(t), None), section));
         // Whole bands of the projection and whole rows of pixels.
         let rows = (samples / (size[0] * BAND)).max(1) * BAND;
         for (i, part) in bytes.chunks_mut(rows / OVER * w * channels).enumerate() {
@@ -176,22 +177,22 @@ fn picture(
 }
 
 /// A surface in a picture.
-struct Layer<'a> {
+struct DrawnSurface<'a> {
     surface: &'a SurfaceMesh,
     projected: Projected,
     shader: Shader<'a>,
 }
 
-impl<'a> Layer<'a> {
+impl<'a> DrawnSurface<'a> {
     fn new(
         surface: &'a SurfaceMesh,
         camera: &'a Camera,
         size: [usize; 2],
         finish: (Finish<'a>, Option<&'a [[f32; 3]]>),
-        section: Option<&'a Section>,
-    ) -> Layer<'a> {
+        section: Option<&'a SectionPlane>,
+    ) -> DrawnSurface<'a> {
         let projected = Projected::of(surface, camera, size, section);
-        Layer { surface, projected, shader: Shader::new(surface, camera, size, finish, section) }
+        DrawnSurface { surface, projected, shader: Shader::new(surface, camera, size, finish, section) }
     }
 
     /// What samples see, and their colours, for `rows` rows from a band on.

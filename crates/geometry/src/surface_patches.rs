@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::distance::normals::Normals;
+use crate::distance::normals::PseudoNormals;
 use crate::distance::triangle::{Feature, Triangle, normal};
 use crate::distance::triangle_bvh::{Nearest, TriangleBvh};
 use crate::feature_edges::{Creases, creases};
@@ -27,7 +27,7 @@ const APART: f64 = 2.5;
 #[derive(Debug)]
 pub struct PatchGroup {
     tree: TriangleBvh,
-    normals: Normals,
+    normals: PseudoNormals,
     /// Which corners of each triangle are on the boundary of its patch, in the tree's order.
     at_boundary: Vec<[bool; 3]>,
     /// The creases within its patches: shallow ones, and those that end in a patch.
@@ -180,7 +180,7 @@ impl PatchGroup {
         let tree = TriangleBvh::new(&faces);
         let edges = Edges::of(&mesh.triangles);
         let pairs: Vec<[u32; 2]> = edges.each().filter(|e| e.len() == 2).map(|e| [e[0], e[1]]).collect();
-        let normals = Normals::new(mesh, &faces, &pairs, tree.order());
+        let normals = PseudoNormals::new(mesh, &faces, &pairs, tree.order());
         let mut at_boundary = vec![false; mesh.vertices.len()];
         for e in edges.each().filter(|e| e.len() == 1) {
             ends(&mesh.triangles, e[0]).into_iter().for_each(|v| at_boundary[v as usize] = true);

@@ -70,7 +70,7 @@ pub struct Group {
 
 /// A row of the table: number, setting, short and full Hermann–Mauguin symbol, Hall symbol, and the short symbol before 1992
 /// where the e-glide has changed it.
-struct Row {
+struct SpaceGroupEntry {
     number: u16,
     setting: &'static str,
     short: &'static str,
@@ -80,10 +80,10 @@ struct Row {
 }
 
 /// All settings, in the order of the International Tables; underscores and spaces left out of Hermann–Mauguin symbols.
-fn rows() -> impl Iterator<Item = Row> {
+fn rows() -> impl Iterator<Item = SpaceGroupEntry> {
     include_str!("symmetry/groups.txt").lines().filter_map(|l| {
         let mut fields = l.split('|');
-        Some(Row {
+        Some(SpaceGroupEntry {
             number: fields.next()?.parse().ok()?,
             setting: fields.next()?,
             short: fields.next()?,

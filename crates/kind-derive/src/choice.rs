@@ -47,7 +47,7 @@ pub fn tagged(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> syn::Re
             quote! { &#key }
         };
         checks.push(quote! { #ident::#v(of) => Kind::check(of, #limits).map_err(|f| f.under(#name)) });
-        parts.push(quote! { Open::named::<#ty>(#key, defs) });
+        parts.push(quote! { OpenTable::named::<#ty>(#key, defs) });
         keys.push(quote! { #ident::#v(_) => #name });
         members.push(if boxed(ty) {
             quote! { #ident::#v(of) => &**of }
@@ -95,7 +95,7 @@ pub fn tagged(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> syn::Re
                         out.extend(entries);
                     }
                 }
-                fn open(defs: &mut Defs, out: &mut Open) {
+                fn open(defs: &mut Defs, out: &mut OpenTable) {
                     out.choices(vec![#(#parts),*]);
                 }
             }
@@ -203,8 +203,8 @@ pub fn alternatives(ident: &Ident, outer: &TypeAttributes, data: &DataEnum) -> s
             fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
                 match self { #(#ident::#names(of) => Table::put(of, out)),* }
             }
-            fn open(defs: &mut Defs, out: &mut Open) {
-                out.choices(vec![#(Open::of::<#types>(defs).described(#docs)),*]);
+            fn open(defs: &mut Defs, out: &mut OpenTable) {
+                out.choices(vec![#(OpenTable::of::<#types>(defs).described(#docs)),*]);
             }
         }
         #kind

@@ -116,7 +116,7 @@ pub fn kind_of_table(ident: &Ident, outer: &TypeAttributes, checks: &TokenStream
                 Ok(())
             }
             fn schema(_: &Key, defs: &mut Defs) -> Node {
-                defs.named(#name, |defs| Open::of::<Self>(defs).closed())
+                defs.named(#name, |defs| OpenTable::of::<Self>(defs).closed())
             }
         }
     }
@@ -143,7 +143,7 @@ pub fn named(ident: &Ident, outer: &TypeAttributes, fields: &Punctuated<Field, T
             fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
                 #(#puts)*
             }
-            fn open(defs: &mut Defs, out: &mut Open) {
+            fn open(defs: &mut Defs, out: &mut OpenTable) {
                 #(#schemas)*
             }
         }

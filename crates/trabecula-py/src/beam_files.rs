@@ -79,7 +79,7 @@ pub fn write_graph<'py>(py: Python<'py>, solid: &Solid, path: PathBuf, suffix: &
 }
 
 /// Nodes (n, 3), their radii (n,) or none, beams (m, 2), their radii (m, 2) or none, whether lengths are in mm, remarks.
-type Graph<'py> = (
+type GraphFileArrays<'py> = (
     Bound<'py, PyArray2<f64>>,
     Option<Bound<'py, PyArray1<f64>>>,
     Bound<'py, PyArray2<u32>>,
@@ -90,7 +90,7 @@ type Graph<'py> = (
 
 /// The graph in the bytes of a file whose name ends in `suffix`.
 #[pyfunction]
-pub fn read_graph<'py>(py: Python<'py>, bytes: &[u8], suffix: &str) -> PyResult<Graph<'py>> {
+pub fn read_graph<'py>(py: Python<'py>, bytes: &[u8], suffix: &str) -> PyResult<GraphFileArrays<'py>> {
     let read = run(py, None, None, |_| geometry::formats::read_graph(bytes, suffix))?;
     let graph = read.map_err(|f| PyValueError::new_err(f.to_string()))?;
     let radii = (!graph.radii.is_empty()).then(|| graph.radii.into_pyarray(py));

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use geometry::formats::{BEAM_FORMATS, FeText};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use trabecula::beam_mesh::{MeshedBeams, Options};
+use trabecula::beam_mesh::{BeamMeshOptions, MeshedBeams};
 use trabecula::report::BeamMeshReport;
 
 use crate::arrays::table;
@@ -35,7 +35,7 @@ impl BeamElements {
         largest: bool,
         threads: Option<usize>,
     ) -> PyResult<BeamElements> {
-        let options = Options { edge, quadratic, largest };
+        let options = BeamMeshOptions { edge, quadratic, largest };
         let made = run(py, threads, None, |_| solid.built().beam_mesh(&options))?;
         Ok(BeamElements { made: made.map_err(error::fault)? })
     }

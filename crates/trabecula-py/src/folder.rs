@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use geometry::formats::{Array, Data, Elements, Shape};
+use geometry::formats::{Data, DataArray, DataSet, Elements};
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
@@ -133,14 +133,14 @@ fn result(path: &str, array: &str) -> Result<Data, String> {
         let read = || -> PyResult<Data> {
             let read = py.import("trabecula.io.results")?.getattr("read")?.call1((path, array))?;
             let (points, connectivity, ends, kinds, names, chosen, values): ReadResult<'_> = read.extract()?;
-            let mut arrays: Vec<Array> = names
+            let mut arrays: Vec<DataArray> = names
                 .into_iter()
-                .map(|(name, of_cells, components)| Array { name, of_cells, components, values: Vec::new() })
+                .map(|(name, of_cells, components)| DataArray { name, of_cells, components, values: Vec::new() })
                 .collect();
             if let Some(array) = chosen.and_then(|i| arrays.get_mut(i)) {
                 array.values = values.as_array().to_vec();
             }
-            Ok(Data { shape: Shape::Mesh(made(&points, &connectivity, &ends, &kinds)), arrays })
+            Ok(Data { shape: DataSet::Mesh(made(&points, &connectivity, &ends, &kinds)), arrays })
         };
         read().map_err(|e| words(py, &e))
     })?;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use geometry::fault::Fault;
-use geometry::formats::{Encoded, LayerFormat, Raster, Stack};
+use geometry::formats::{Encoded, LayerFormat, PixelGrid, Stack};
 use geometry::layer::Layer;
 use geometry::progress::{Progress, Stopped};
 use pyo3::exceptions::PyValueError;
@@ -136,7 +136,7 @@ impl LayerRanges {
             title,
             application: format!("Trabecula {}", env!("CARGO_PKG_VERSION")),
             binary,
-            raster: pixel.map(|(pixel, size, origin)| Raster { origin, pixel, size }),
+            raster: pixel.map(|(pixel, size, origin)| PixelGrid { origin, pixel, size }),
             exposure,
         };
         Ok(LayerRanges { layers, format, stack })

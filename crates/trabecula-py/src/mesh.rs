@@ -7,8 +7,8 @@ use geometry::formats;
 use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{
-    Amount, Background, Colours, Lines, Marks, Page, PlaneGrid, Projection, RenderOptions, Section, SectionColours,
-    Shares, Tint, View, line_drawing, line_drawing_fits, png, render,
+    Amount, Background, Colours, Lines, Marks, Page, PlaneGrid, Projection, RenderOptions, SectionColours,
+    SectionPlane, Shares, Tint, View, line_drawing, line_drawing_fits, png, render,
 };
 use geometry::simplify::{Goal, simplify};
 use geometry::smooth::smooth;
@@ -151,7 +151,7 @@ fn render_options(
     RenderOptions {
         colours: scale.or(parts),
         lines: lines.map(|NamedLines { caption, names, lines, radius }| Lines { caption, names, lines, radius }),
-        section: section.map(|(normal, offset)| Section { normal, offset }),
+        section: section.map(|(normal, offset)| SectionPlane { normal, offset }),
         section_colours: inside.map(|GridColours { origin, steps, counts, values }| SectionColours {
             grid: PlaneGrid { origin, steps, counts },
             values,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use beams::quador::slice::{Plane, Slice as Cut};
+use beams::quador::slice::{Slice as Cut, SlicePlane};
 use beams::quador::{Bezier, HubFillets, Quadors as Core, homogeneous_matrix};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -135,7 +135,7 @@ impl Quadors {
 
     /// The slice by the plane through a point with a normal.
     fn slice(&self, py: Python<'_>, point: [f64; 3], normal: [f64; 3]) -> PyResult<Slice> {
-        let plane = Plane::new(point, normal).map_err(error::fault)?;
+        let plane = SlicePlane::new(point, normal).map_err(error::fault)?;
         let cut = run(py, None, None, |_| self.quadors.slice(&plane))?;
         Ok(Slice { cut: cut.map_err(error::fault)? })
     }
@@ -268,7 +268,7 @@ impl Slice {
 
     /// For each loop: control points (n, 3, 2), weights (n,), hubs (n,), conics (n, 6) and where their (u, v) start (n, 2).
     fn loops<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let one = |arcs: &Vec<beams::quador::slice::Arc>| {
+        let one = |arcs: &Vec<beams::quador::slice::ConicArc>| {
             let all: Vec<Bezier<2>> = arcs.iter().flat_map(|a| a.curves.iter().copied()).collect();
             let each = || arcs.iter().flat_map(|a| a.curves.iter().map(move |_| a));
             let d = PyDict::new(py);

@@ -8,9 +8,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use trabecula::design::Built;
-use trabecula::extract::{JoinedRanges, RangeMade, VoxelGrid};
+use trabecula::extract::{JoinedRanges, RangeMade, VoxelCentres};
 use trabecula::report::SurfaceReport;
-use trabecula::surface_maker::Options;
+use trabecula::surface_maker::SurfaceOptions;
 
 use crate::error;
 use crate::report::report;
@@ -119,7 +119,7 @@ impl TileRanges {
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct VoxelRanges {
     solid: Py<Solid>,
-    grid: VoxelGrid,
+    grid: VoxelCentres,
 }
 
 #[pymethods]
@@ -127,7 +127,7 @@ impl VoxelRanges {
     /// Voxels of edge `step` (mm) of a solid.
     #[staticmethod]
     fn of(solid: Py<Solid>, step: f64) -> PyResult<VoxelRanges> {
-        let grid = VoxelGrid::new(solid.get().solid(), step).map_err(error::fault)?;
+        let grid = VoxelCentres::new(solid.get().solid(), step).map_err(error::fault)?;
         Ok(VoxelRanges { solid, grid })
     }
 
@@ -151,7 +151,7 @@ impl VoxelRanges {
 
     /// What precedes and what follows the voxels of the layers from `start` to before `end` in a file, `npy` or `vti`.
     fn frame<'py>(&self, py: Python<'py>, extension: &str, start: usize, end: usize) -> [Bound<'py, PyBytes>; 2] {
-        let (VoxelGrid { origin, step, shape, .. }, layers) = (&self.grid, start..end.max(start));
+        let (VoxelCentres { origin, step, shape, .. }, layers) = (&self.grid, start..end.max(start));
         let [head, tail] = match extension {
             "npy" => [npy_head([shape[0], shape[1], layers.len()]), Vec::new()],
             _ => vti_frame(*origin, *step, *shape, layers),
@@ -219,7 +219,7 @@ impl Joined {
     /// The whole surface: its `reports.SurfaceReport`, its other connected components in words, the triangles that stay as ranges of
     /// their numbers, and how many there are before any are dropped.
     fn finish<'py>(&mut self, py: Python<'py>, edge: f64, islands: &str) -> PyResult<Whole<'py>> {
-        let options = Options { resolution: edge, islands: islands_word(islands)? };
+        let options = SurfaceOptions { resolution: edge, islands: islands_word(islands)? };
         let ranges = self.ranges.take().ok_or_else(joined_already)?;
         let made = py.detach(|| ranges.finish(&options)).map_err(error::stopped)?;
         let kept = made.kept.iter().map(|r| (r.start, r.end)).collect();
@@ -230,7 +230,7 @@ impl Joined {
     /// The figures of the whole surface, in a region of this volume (mm³): as `Solid.measure`.
     fn measured<'py>(&mut self, py: Python<'py>, edge: f64, region: f64) -> PyResult<Measured<'py>> {
         let ranges = self.ranges.take().ok_or_else(joined_already)?;
-        let made = py.detach(|| ranges.measured(&Options::new(edge))).map_err(error::stopped)?;
+        let made = py.detach(|| ranges.measured(&SurfaceOptions::new(edge))).map_err(error::stopped)?;
         measured(py, &made, region)
     }
 }

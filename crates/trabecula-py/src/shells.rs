@@ -6,7 +6,7 @@ use geometry::formats::SHELL_FORMATS;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use trabecula::report::ShellReport;
-use trabecula::shell_mesh::{MeshedShell, Options};
+use trabecula::shell_mesh::{MeshedShell, ShellMeshOptions};
 
 use crate::arrays::table;
 use crate::error;
@@ -35,7 +35,7 @@ impl Shells {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Shells> {
-        let options = Options { edge, quadratic };
+        let options = ShellMeshOptions { edge, quadratic };
         let made = run(py, threads, progress, |p| solid.built().shell_mesh(&options, p))?;
         Ok(Shells { made: made.map_err(error::stopped)?, edge })
     }

@@ -19,7 +19,7 @@ use trabecula::report::{
     DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
 };
 use trabecula::solid::Space;
-use trabecula::surface_maker::{self, Islands, Options, Scratch, SurfaceMaker};
+use trabecula::surface_maker::{self, Islands, ScratchStores, SurfaceMaker, SurfaceOptions};
 use trabecula::truss::Beams;
 
 use crate::arrays::{self, values};
@@ -78,7 +78,7 @@ type CellAt<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 type NamedColumns<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
 
 /// Name, centres (n, 3), radii (n,), ends (m, 2).
-type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
+type BeamArrays<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
 
 /// Reports of a surface, the quality of its triangles, and its other connected components.
 pub type Measured<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>);
@@ -191,7 +191,7 @@ impl Solid {
 
     /// The graphs of beams: name, centres and radii of hubs, the hubs that each beam joins.
     #[getter]
-    fn beams<'py>(&self, py: Python<'py>) -> PyResult<Vec<Graph<'py>>> {
+    fn beams<'py>(&self, py: Python<'py>) -> PyResult<Vec<BeamArrays<'py>>> {
         let graph = |(name, beams): &(String, Beams)| {
             let graph = match beams {
                 Beams::Truss(truss) => truss.graph.clone(),
@@ -340,7 +340,7 @@ impl Solid {
         progress: Option<Py<PyAny>>,
         islands: &str,
     ) -> PyResult<(Mesh, Bound<'py, PyAny>, String)> {
-        let options = Options { resolution: edge, islands: islands_word(islands)? };
+        let options = SurfaceOptions { resolution: edge, islands: islands_word(islands)? };
         let made = run(py, threads, progress, |p| self.built.surface().mesh(&options, p))?.map_err(error::stopped)?;
         let others = report(py, "IslandsReport", &IslandsReport::from(&made.components))?;
         Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
@@ -357,7 +357,7 @@ impl Solid {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Measured<'py>> {
-        let made = run(py, threads, progress, |p| self.built.surface().measure(&Options::new(edge), p))?;
+        let made = run(py, threads, progress, |p| self.built.surface().measure(&SurfaceOptions::new(edge), p))?;
         let made = made.map_err(error::stopped)?;
         measured(py, &made, region)
     }
@@ -426,7 +426,7 @@ impl Solid {
         let made = run(py, threads, None, |p| {
             let beams = self.built.beam_surface().map_err(Stopped::Refused)?;
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
-            beams.stream_stl(&Options::new(chord), &mut out, p)
+            beams.stream_stl(&SurfaceOptions::new(chord), &mut out, p)
         })?;
         report(py, "SurfaceReport", &SurfaceReport::from(&made.map_err(error::stopped)?))
     }
@@ -466,7 +466,7 @@ impl Solid {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Mesh, f64)> {
         let made = run(py, threads, progress, |p| {
-            self.built.beam_surface().map_err(Stopped::Refused)?.mesh(&Options::new(chord), p)
+            self.built.beam_surface().map_err(Stopped::Refused)?.mesh(&SurfaceOptions::new(chord), p)
         })?;
         let made = made.map_err(error::stopped)?;
         Ok((Mesh::new(made.surface, self.design.clone()), made.error.unwrap_or(0.0)))
@@ -488,7 +488,7 @@ impl Solid {
         let (path, extension, title) = file;
         let meta = metadata(title, self.design.clone());
         let summary = run(py, threads, progress, |p| {
-            let (maker, options) = (self.built.surface(), Options { resolution: edge, islands });
+            let (maker, options) = (self.built.surface(), SurfaceOptions { resolution: edge, islands });
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
             if extension == "stl" {
                 // Whole tiles are written at once: a buffer would only copy them.
@@ -496,7 +496,7 @@ impl Solid {
             }
             let aside = |ending| file::nameless(&path, ending).map_err(Stopped::Io);
             let [mut vertices, mut triangles, mut text] = [aside(".1")?, aside(".2")?, aside(".3")?];
-            let scratch: Scratch = [&mut vertices, &mut triangles, &mut text];
+            let scratch: ScratchStores = [&mut vertices, &mut triangles, &mut text];
             let mut out = BufWriter::with_capacity(1 << 20, out);
             surface_maker::stream_mesh(&*maker, &options, (&extension, &meta), scratch, &mut out, p)
         })?;

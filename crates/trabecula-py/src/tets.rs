@@ -10,7 +10,7 @@ use geometry::transform::Transform;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use trabecula::design::{DesignError, Joined, Node, TetFileKind, Tets, Unit};
+use trabecula::design::{BuiltTets, CellJoin, DesignError, Node, TetFileKind, Unit};
 
 use crate::arrays::table;
 use crate::error;
@@ -26,7 +26,7 @@ type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 /// A tetrahedral mesh, checked.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct TetMesh {
-    tets: Tets,
+    tets: BuiltTets,
 }
 
 #[pymethods]
@@ -45,7 +45,7 @@ impl TetMesh {
     ) -> PyResult<TetMesh> {
         let made = run_apart(py, threads, move || {
             let node = if json { Node::from_json(&text)? } else { Node::from_toml(&text)? };
-            Tets::in_design(&node, lattice.as_deref(), &Folder(folder))
+            BuiltTets::in_design(&node, lattice.as_deref(), &Folder(folder))
         })?;
         of(py, made.map_err(|e: DesignError| e.in_file(&file)))
     }
@@ -61,7 +61,7 @@ impl TetMesh {
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
         let node = node(data, 0)?;
-        let made = run_apart(py, threads, move || Tets::in_design(&node, lattice.as_deref(), &Folder(folder)))?;
+        let made = run_apart(py, threads, move || BuiltTets::in_design(&node, lattice.as_deref(), &Folder(folder)))?;
         of(py, made)
     }
 
@@ -71,8 +71,8 @@ impl TetMesh {
     fn read(py: Python<'_>, path: String, folder: PathBuf, unit: Option<&str>, split: bool) -> PyResult<TetMesh> {
         let unit = unit.map(str::parse::<Unit>).transpose();
         let unit = unit.map_err(|e| PyValueError::new_err(format!("unit: {}", e.message)))?;
-        let spec = TetFileKind { path, unit, split, joined: Joined::default() };
-        let made = run_apart(py, None, move || Tets::in_file(&spec, &Folder(folder)))?;
+        let spec = TetFileKind { path, unit, split, joined: CellJoin::default() };
+        let made = run_apart(py, None, move || BuiltTets::in_file(&spec, &Folder(folder)))?;
         of(py, made)
     }
 
@@ -150,7 +150,7 @@ impl TetMesh {
     }
 }
 
-fn of(py: Python<'_>, made: Result<Tets, DesignError>) -> PyResult<TetMesh> {
+fn of(py: Python<'_>, made: Result<BuiltTets, DesignError>) -> PyResult<TetMesh> {
     let tets = made.map_err(|e| error::design(py, &e))?;
     Ok(TetMesh { tets })
 }

@@ -11,7 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::design::CarrierMaterial;
 use trabecula::report::VolumeReport;
-use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
+use trabecula::volume_mesh::{MeshedVolume, VolumeMeshOptions, VolumeTarget};
 
 use crate::arrays::table;
 use crate::error;
@@ -55,7 +55,7 @@ impl VolumeMesh {
         let Some((_, of)) = VolumeTarget::NAMES.into_iter().find(|(name, _)| *name == of) else {
             return Err(PyValueError::new_err(format!("of is \"{of}\"; it must be solid, pore, lower, upper or all")));
         };
-        let options = Options { edge, of, order, periodic, largest };
+        let options = VolumeMeshOptions { edge, of, order, periodic, largest };
         let made = run(py, threads, progress, |p| solid.built().volume_mesh(&options, p))?;
         Ok(VolumeMesh { made: made.map_err(error::stopped)? })
     }

@@ -12,9 +12,9 @@ use serde_json::{Value as Json, json};
 use trabecula::analysis::{thickness_at_vertices, usual_step};
 use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::extract;
-use trabecula::region::{Cuboid, Intersection, Region, Shape};
+use trabecula::region::{Cuboid, Intersection, Region, SignedDistance};
 use trabecula::report::{IslandsReport, MeshReport};
-use trabecula::surface_maker::{Figures, MeshedSurface, Options};
+use trabecula::surface_maker::{Figures, MeshedSurface, SurfaceOptions};
 
 use crate::corners::arrays;
 use crate::edit::{Change, edit};
@@ -267,10 +267,10 @@ impl Session {
 
 fn surface(built: &Built, resolution: Resolution, progress: &dyn Progress) -> Result<MeshedSurface, Refused> {
     Ok(match resolution {
-        Resolution::Grid(edge) => built.surface().mesh(&Options::new(edge), progress)?,
+        Resolution::Grid(edge) => built.surface().mesh(&SurfaceOptions::new(edge), progress)?,
         Resolution::Chord(chord) => {
             let beams = built.beam_surface().map_err(Stopped::Refused)?;
-            trabecula::SurfaceMaker::mesh(&beams, &Options::new(chord), progress)?
+            trabecula::SurfaceMaker::mesh(&beams, &SurfaceOptions::new(chord), progress)?
         }
     })
 }

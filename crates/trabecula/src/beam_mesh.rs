@@ -13,7 +13,7 @@ use beams::{Pencil, Quadors};
 
 /// How beams are divided.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct BeamMeshOptions {
     /// Longest element, mm; else four to a beam.
     pub edge: Option<f64>,
     /// Whether elements are quadratic.
@@ -56,7 +56,7 @@ pub fn beam_mesh(
     quadors: &Quadors,
     region: &Region,
     sets: &[(String, Region)],
-    options: &Options,
+    options: &BeamMeshOptions,
 ) -> Result<MeshedBeams, Fault> {
     let near = NEAR * norm(region.bounds().size());
     let runs: Vec<Vec<[f64; 2]>> =

@@ -9,7 +9,8 @@ use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 
 use crate::surface_maker::{
-    Components, Estimate, Islands, MeshedSurface, Options, Pieces, Resolved, Store, Summary, SurfaceMaker, Totals,
+    Components, Estimate, Islands, MeshedSurface, Resolved, Store, Summary, SurfaceMaker, SurfaceOptions, SurfaceSink,
+    Totals,
 };
 
 /// Triangulates uncut beams; the resolution is the chord error. Hubs that are equal but for their position are triangulated
@@ -18,7 +19,7 @@ pub struct BeamSurface(pub Arc<Quadors>);
 
 impl BeamSurface {
     /// Connected components are not looked for: refuses to drop any. None is small and cut off by a region's boundary.
-    fn check(options: &Options) -> Result<(), Stopped> {
+    fn check(options: &SurfaceOptions) -> Result<(), Stopped> {
         if matches!(options.islands, Islands::Keep | Islands::DropSmall) {
             return Ok(());
         }
@@ -30,7 +31,12 @@ impl BeamSurface {
 
 impl SurfaceMaker for BeamSurface {
     /// The mesh is held in memory.
-    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
+    fn make(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn SurfaceSink,
+        progress: &dyn Progress,
+    ) -> Result<Resolved, Stopped> {
         let made = self.mesh(options, progress)?;
         let SurfaceMesh { mesh, cut } = &made.surface;
         out.add(&mesh.vertices, &mesh.triangles, cut).map_err(Stopped::Io)?;
@@ -46,7 +52,7 @@ impl SurfaceMaker for BeamSurface {
         Ok(Resolved { parts, first: vec![0], walls: Vec::new(), totals, components, error: made.error })
     }
 
-    fn mesh(&self, options: &Options, _: &dyn Progress) -> Result<MeshedSurface, Stopped> {
+    fn mesh(&self, options: &SurfaceOptions, _: &dyn Progress) -> Result<MeshedSurface, Stopped> {
         Self::check(options)?;
         let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;
         let mesh = tessellation.mesh().map_err(Stopped::Refused)?;
@@ -58,7 +64,12 @@ impl SurfaceMaker for BeamSurface {
     }
 
     /// Only distinct hubs are held in memory.
-    fn stream_stl(&self, options: &Options, mut out: &mut dyn Store, _: &dyn Progress) -> Result<Summary, Stopped> {
+    fn stream_stl(
+        &self,
+        options: &SurfaceOptions,
+        mut out: &mut dyn Store,
+        _: &dyn Progress,
+    ) -> Result<Summary, Stopped> {
         Self::check(options)?;
         let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;
         let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| tessellation.hub(i).for_each(put);

@@ -42,11 +42,11 @@ mod windows;
 use std::sync::Arc;
 
 use crate::field::{Block, Field};
-use crate::implicit::{Implicit, Pair};
+use crate::implicit::{Implicit, SurfacePair};
 use geometry::math::{Aabb, Interval, Vec3};
 
 pub use constituent::Constituent;
-pub use sum::{Blend, By};
+pub use sum::{Blend, BlendRule};
 pub use weights::Weights;
 pub use windows::Phases;
 
@@ -128,8 +128,8 @@ impl Implicit for Blend {
         SIDES.map(|side| Arc::new(Blend { side, ..self.clone() }) as Arc<dyn Implicit>).into()
     }
 
-    fn pair(&self) -> Option<Arc<dyn Pair>> {
-        self.is_whole_sheet().then(|| Arc::new(self.clone()) as Arc<dyn Pair>)
+    fn pair(&self) -> Option<Arc<dyn SurfacePair>> {
+        self.is_whole_sheet().then(|| Arc::new(self.clone()) as Arc<dyn SurfacePair>)
     }
 
     fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
@@ -144,7 +144,7 @@ impl Implicit for Blend {
 /// The sides in the order of the parts.
 const SIDES: [Option<BlendBound>; 2] = [Some(BlendBound::High), Some(BlendBound::Low)];
 
-impl Pair for Blend {
+impl SurfacePair for Blend {
     fn fill_both(&self, block: &Block, wanted: &[u64], out: [&mut [f32]; 2]) {
         self.fill_block(SIDES, block, Some(wanted), out);
     }

@@ -19,7 +19,7 @@ mod turned;
 
 pub(crate) use cut::Cut;
 pub use distance::Distance;
-pub use named::{Named, catalogue, named};
+pub use named::{NamedCell, catalogue, named};
 use periodic_components::{Openings, openings};
 pub use periodic_components::{connected, necks};
 pub use pore_level::NoPore;

@@ -14,6 +14,7 @@ mod crease_nodes;
 mod flips;
 mod mending;
 mod node_surfaces;
+mod node_tets;
 mod partition;
 mod patch_cuts;
 mod patched_surface;

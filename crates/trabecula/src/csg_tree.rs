@@ -294,7 +294,7 @@ impl CsgSolid {
     /// The same solid in other coordinates: position = `corner` + `edges` u (mm), the edges as columns.
     pub fn in_frame(mut self, corner: Vec3, edges: Mat3) -> CsgSolid {
         for surface in &mut self.surfaces {
-            surface.field = Arc::new(Framed { field: surface.field.clone(), corner, edges });
+            surface.field = Arc::new(InCellCoordinates { field: surface.field.clone(), corner, edges });
             (surface.pair, surface.plane) = (None, None);
             surface.lipschitz *= spectral_norm(&edges);
         }
@@ -303,19 +303,19 @@ impl CsgSolid {
 }
 
 /// A field in other coordinates.
-struct Framed {
+struct InCellCoordinates {
     field: Arc<dyn Field>,
     corner: Vec3,
     edges: Mat3,
 }
 
-impl Framed {
+impl InCellCoordinates {
     fn place(&self, u: Vec3) -> Vec3 {
         add(self.corner, apply(&self.edges, u))
     }
 }
 
-impl Field for Framed {
+impl Field for InCellCoordinates {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         let points: Vec<Vec3> = points.iter().map(|u| self.place(*u)).collect();
         self.field.values(&points, out);

@@ -72,10 +72,10 @@ use geometry::progress::{Progress, Stopped};
 use geometry::repair::Repaired;
 
 pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
-pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
+pub use crate::kind::{DesignError, LineNumbers, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use crate::region::{CadMesh, FaceLabel, Tessellation};
 pub use build_blend::Blended;
-pub use build_tets::{TetReport, Tets};
+pub use build_tets::{BuiltTets, TetReport};
 pub use cell_zones::CellZone;
 use compensated_grid::CompensatedGrid;
 pub use data::*;
@@ -113,16 +113,16 @@ pub struct Design {
     pub skin: Option<SkinSpec>,
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[kind(default)]
-    pub keep: Keeps,
+    pub keep: KeepZones,
     /// Regions whose surface is a set of volume meshes, to hold or to load, under names of your own.
     #[kind(default, hints("sets", "nset", "group"))]
     pub set: SetSpecs,
     /// What varies where many designs are made of this one; of no effect on this one.
     #[kind(hints("study", "parameters", "vary"))]
-    pub sweep: Option<SweepKind>,
+    pub sweep: Option<StudySweep>,
     /// Line of each key in the file it was read from.
     #[kind(skip)]
-    pub lines: Lines,
+    pub lines: LineNumbers,
 }
 
 /// The unit of length of a design.
@@ -164,7 +164,7 @@ pub struct Tiled {
     /// The solid fraction that the surface of the part is to have on a grid, where that is known, and how far it may be off.
     aim: Option<[f64; 2]>,
     /// How it ends at the part's surface.
-    pub ends: Ends,
+    pub ends: SurfaceEnds,
     /// The least and the greatest radius of the net's rods, or of rounded ends, mm.
     pub radii: Option<[f64; 2]>,
     /// What the net covers.
@@ -181,8 +181,8 @@ impl Tiled {
     /// The field of a design that is this lattice alone, to be meshed with other surfaces.
     fn alone_field(&self) -> Arc<dyn Implicit> {
         match self.ends {
-            Ends::Rounded => self.field.clone(),
-            _ => Arc::new(self.placed.eased()),
+            SurfaceEnds::Rounded => self.field.clone(),
+            _ => Arc::new(self.placed.with_limited_gradient()),
         }
     }
 }
@@ -258,7 +258,7 @@ impl Design {
     }
 
     /// Refuses a sweep over what is no key of the design, or with values that it cannot have.
-    fn check_sweep(sweep: &SweepKind, node: &Node) -> Result<(), DesignError> {
+    fn check_sweep(sweep: &StudySweep, node: &Node) -> Result<(), DesignError> {
         sweep.valid().map_err(|f| DesignError::fault("sweep", f))?;
         let mut base = node.clone();
         if let Value::Table(entries) = &mut base.value {
@@ -457,7 +457,7 @@ impl Built {
 
     /// Whether files of its mesh are to have no caps on the region's boundary.
     pub fn is_open(&self) -> bool {
-        self.tilings.iter().any(|t| t.ends == Ends::Open)
+        self.tilings.iter().any(|t| t.ends == SurfaceEnds::Open)
     }
 
     /// Its volume mesh, with named sets.
@@ -466,10 +466,10 @@ impl Built {
     /// As `volume_mesh::volume_mesh`.
     pub fn volume_mesh(
         &self,
-        options: &volume_mesh::Options,
+        options: &volume_mesh::VolumeMeshOptions,
         progress: &dyn Progress,
     ) -> Result<volume_mesh::MeshedVolume, Stopped> {
-        let named = volume_mesh::Named { bodies: &self.bodies, sets: &self.sets };
+        let named = volume_mesh::SolidNames { bodies: &self.bodies, sets: &self.sets };
         volume_mesh::volume_mesh(&self.solid, &named, options, progress)
     }
 
@@ -502,7 +502,7 @@ impl Built {
     /// As `shell_mesh::shell_mesh`.
     pub fn shell_mesh(
         &self,
-        options: &shell_mesh::Options,
+        options: &shell_mesh::ShellMeshOptions,
         progress: &dyn Progress,
     ) -> Result<shell_mesh::MeshedShell, Stopped> {
         shell_mesh::shell_mesh(&self.solid, &self.sets, options, progress)
@@ -512,7 +512,7 @@ impl Built {
     ///
     /// # Errors
     /// What else the design has; as `beam_mesh::beam_mesh`.
-    pub fn beam_mesh(&self, options: &beam_mesh::Options) -> Result<beam_mesh::MeshedBeams, Fault> {
+    pub fn beam_mesh(&self, options: &beam_mesh::BeamMeshOptions) -> Result<beam_mesh::MeshedBeams, Fault> {
         let quadors = beam_files::written(self)?.quadors;
         beam_mesh::beam_mesh(&quadors, &self.solid.region, &self.sets, options)
     }

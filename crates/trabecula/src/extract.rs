@@ -14,7 +14,8 @@ use rayon::prelude::*;
 use crate::region::Region;
 use crate::solid::Solid;
 use crate::surface_maker::{
-    self, Estimate, Islands, Measured, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, not_empty,
+    self, Estimate, Islands, Measured, Resolved, StlStream, Store, Summary, SurfaceMaker, SurfaceOptions, SurfaceSink,
+    not_empty,
 };
 
 mod block_nodes;
@@ -39,16 +40,16 @@ mod vertex_numbers;
 mod voxelize;
 
 pub use joined_ranges::{JoinedRanges, WholeSurface};
-use sampling_grid::Grid;
+use sampling_grid::SamplingGrid;
 pub use sampling_grid::{MOST_CELLS, MOST_STEPS, TILE};
 pub use spaces::{SpaceMade, spaces};
 use stitched::Stitched;
-use tile::{Scratch, View};
+use tile::{TileBuffers, View};
 use tile_components::{TileComponents, TileSweep};
 use tile_figures::{FigureSums, TileFigures};
 use tile_queue::{borrow, each_tile, give_back};
 pub use tile_ranges::{RangeMade, TileRanges};
-pub use voxelize::{VoxelGrid, voxels};
+pub use voxelize::{VoxelCentres, voxels};
 
 /// Meshes a solid on a grid whose spacing is the resolution.
 pub struct GridSurface<'a>(pub &'a Solid);
@@ -58,7 +59,7 @@ pub struct GridSurface<'a>(pub &'a Solid);
 /// # Errors
 /// As `SurfaceMaker::mesh`.
 pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
-    let options = Options { resolution: edge, islands: Islands::Keep };
+    let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
     Ok(GridSurface(solid).mesh(&options, progress)?.surface)
 }
 
@@ -102,8 +103,13 @@ fn stride(n: usize) -> usize {
 }
 
 impl SurfaceMaker for GridSurface<'_> {
-    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
-        let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+    fn make(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn SurfaceSink,
+        progress: &dyn Progress,
+    ) -> Result<Resolved, Stopped> {
+        let grid = SamplingGrid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
         let mut out = Stitched::new(out);
         each_tile(
@@ -116,8 +122,13 @@ impl SurfaceMaker for GridSurface<'_> {
         out.finish(options)
     }
 
-    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
-        let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+    fn stream_stl(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn Store,
+        progress: &dyn Progress,
+    ) -> Result<Summary, Stopped> {
+        let grid = SamplingGrid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
         let mut sweep = TileSweep::default();
         let mut triangles = 0;
@@ -144,8 +155,8 @@ impl SurfaceMaker for GridSurface<'_> {
     }
 
     /// Measured tile by tile: memory is bounded as when an STL is streamed.
-    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
-        let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+    fn measure(&self, options: &SurfaceOptions, progress: &dyn Progress) -> Result<Measured, Stopped> {
+        let grid = SamplingGrid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
         let (mut sweep, mut sums, mut triangles) = (TileSweep::default(), FigureSums::default(), 0);
         each_tile(
@@ -177,14 +188,14 @@ impl GridSurface<'_> {
     /// there are fewer than `below` by some deviations: the work is bounded, and the same on every machine. The deviation of the mean
     /// is that of the tiles over the root of their number.
     fn sampled(&self, edge: f64, below: f64) -> Result<Estimate, Fault> {
-        let grid = Grid::new(self.0, edge)?;
+        let grid = SamplingGrid::new(self.0, edge)?;
         let total: usize = grid.tiles().iter().product();
         let (most, stride) = (total.min(LOOKED_AT), stride(total));
         let (mut sampled, mut worked, mut found, mut squares) = (0, 0, 0, 0.0);
         while sampled < most && worked < WORKED && found < FOUND {
             let batch = sampled..(sampled + BATCH).min(most);
             sampled = batch.end;
-            let each = batch.into_par_iter().map_init(Scratch::default, |scratch, i| {
+            let each = batch.into_par_iter().map_init(TileBuffers::default, |scratch, i| {
                 let tile = grid.tile((total / 2 + i * stride) % total);
                 tile::count(&grid, tile, scratch)
             });

@@ -99,7 +99,7 @@ fn directed(key: &str, direction: Option<Vec3>) -> Result<(), Fault> {
 }
 
 /// A number that varies in space.
-pub trait Varying: Field {
+pub trait VaryingNumber: Field {
     /// The axes along which it may change: false, where moving along one leaves every bit as it is.
     fn varies(&self) -> [bool; 3] {
         [true; 3]
@@ -117,10 +117,10 @@ pub enum Grade {
     /// The same everywhere.
     Constant(f64),
     /// A function of position.
-    Varying(Arc<dyn Varying>),
+    Varying(Arc<dyn VaryingNumber>),
 }
 
-impl<V: Varying + 'static> From<V> for Grade {
+impl<V: VaryingNumber + 'static> From<V> for Grade {
     fn from(of: V) -> Grade {
         Grade::Varying(Arc::new(of))
     }

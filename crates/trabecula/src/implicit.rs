@@ -32,7 +32,7 @@ pub trait Implicit: Field {
     }
 
     /// The two parts, where they are evaluated faster together.
-    fn pair(&self) -> Option<Arc<dyn Pair>> {
+    fn pair(&self) -> Option<Arc<dyn SurfacePair>> {
         None
     }
 
@@ -44,7 +44,7 @@ pub trait Implicit: Field {
 }
 
 /// The two parts of a field that have all but their last steps in common.
-pub trait Pair: Send + Sync {
+pub trait SurfacePair: Send + Sync {
     /// Fills each of `out` (x fastest) as `fill_where` of that part does.
     fn fill_both(&self, block: &Block, wanted: &[u64], out: [&mut [f32]; 2]);
 }
@@ -55,11 +55,11 @@ pub struct Surface {
     /// The function.
     pub field: Arc<dyn Field>,
     /// Set if it is one of a pair, both of which have it.
-    pub pair: Option<Arc<dyn Pair>>,
+    pub pair: Option<Arc<dyn SurfacePair>>,
     /// A Lipschitz bound of the function, per mm.
     pub lipschitz: f64,
     /// Set if the zero set is a plane normal to a coordinate axis.
-    pub plane: Option<Plane>,
+    pub plane: Option<AxisPlane>,
     /// Whether it belongs to the region: triangles on it are cuts, all others are surface of the lattice.
     pub cut: bool,
     /// Whether its zero set may have creases, as those of distances have. A crease is not curvature.
@@ -74,7 +74,7 @@ pub struct Surface {
 
 /// A plane normal to a coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct AxisPlane {
     /// The axis: 0, 1, 2.
     pub axis: usize,
     /// Its coordinate, mm.
@@ -83,7 +83,7 @@ pub struct Plane {
     pub below: bool,
 }
 
-impl Plane {
+impl AxisPlane {
     /// Whether a move from `p` to `to` leaves the solid half-space.
     pub fn is_left(&self, p: Vec3, to: Vec3) -> bool {
         let sign = if self.below { 1.0 } else { -1.0 };
@@ -94,7 +94,7 @@ impl Plane {
 
 impl Surface {
     /// The plane that bounds the region here, if it is one.
-    pub fn bounding_plane(&self) -> Option<Plane> {
+    pub fn bounding_plane(&self) -> Option<AxisPlane> {
         self.plane.filter(|_| self.cut)
     }
 
@@ -130,13 +130,13 @@ impl Surface {
 
     /// The same surface with the solid on its other side.
     pub fn complement(self) -> Surface {
-        let plane = self.plane.map(|p| Plane { below: !p.below, ..p });
+        let plane = self.plane.map(|p| AxisPlane { below: !p.below, ..p });
         Surface { field: Arc::new(Negated(self.field)), pair: None, plane, ..self }
     }
 
     /// The surface where the function is `by`: the solid grows by that distance (mm) if the function is a distance.
     pub fn offset(self, by: f64) -> Surface {
-        let plane = self.plane.map(|p| Plane { at: p.at + if p.below { by } else { -by }, ..p });
+        let plane = self.plane.map(|p| AxisPlane { at: p.at + if p.below { by } else { -by }, ..p });
         Surface { field: Arc::new(Shifted(self.field, by)), pair: None, plane, mesh: None, ..self }
     }
 }

@@ -15,9 +15,9 @@ mod values;
 
 pub use error::{DesignError, Warning};
 pub use kind_derive::Kind;
-pub use node::{Lines, Node, Value};
+pub use node::{LineNumbers, Node, Value};
 pub(crate) use node_cursor::{Fields, NodeCursor};
-pub(crate) use schema::{Open, any_schema, choice_schema};
+pub(crate) use schema::{OpenTable, any_schema, choice_schema};
 pub(crate) use schema_defs::Defs;
 pub use values::{OneOrThree, OneOrTwo, Unit};
 
@@ -65,7 +65,7 @@ pub(crate) trait Table: Kind {
     fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>);
 
     /// Adds its keys to the schema of a table.
-    fn open(defs: &mut Defs, out: &mut Open);
+    fn open(defs: &mut Defs, out: &mut OpenTable);
 }
 
 /// A key: what is declared of it.

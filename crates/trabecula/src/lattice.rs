@@ -1,14 +1,14 @@
 //! A lattice: cell, map, part, level. The only file where cell and map meet.
 
 mod rows;
-pub(crate) use rows::Rows;
+pub(crate) use rows::LatticeRows;
 
 use std::sync::Arc;
 
 use crate::cell::{Cell, Cut, Distance, Part};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
-use crate::implicit::{Implicit, Pair};
+use crate::implicit::{Implicit, SurfacePair};
 use crate::map::Map;
 use geometry::math::{
     Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm, sub, transpose,
@@ -353,8 +353,8 @@ impl Implicit for Lattice {
         self.cut.sides(|cut| Lattice { cut, ..self.clone() })
     }
 
-    fn pair(&self) -> Option<Arc<dyn Pair>> {
-        (self.cut.halves().is_some()).then(|| Arc::new(self.clone()) as Arc<dyn Pair>)
+    fn pair(&self) -> Option<Arc<dyn SurfacePair>> {
+        (self.cut.halves().is_some()).then(|| Arc::new(self.clone()) as Arc<dyn SurfacePair>)
     }
 
     fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
@@ -369,7 +369,7 @@ impl Implicit for Lattice {
     }
 }
 
-impl Pair for Lattice {
+impl SurfacePair for Lattice {
     fn fill_both(&self, block: &Block, wanted: &[u64], [a, b]: [&mut [f32]; 2]) {
         let [lower, upper] = self.cut.halves().unwrap_or([self.cut; 2]);
         self.fill_cuts(block, Some(wanted), [(lower, a), (upper, b)]);
@@ -379,7 +379,7 @@ impl Pair for Lattice {
 impl Lattice {
     /// Fills the values of cuts. Only a level that varies is evaluated node by node, and only at the nodes in `wanted`.
     fn fill_cuts<const N: usize>(&self, block: &Block, wanted: Option<&[u64]>, mut out: [(Cut, &mut [f32]); N]) {
-        let mut rows = Rows::new(self, block);
+        let mut rows = LatticeRows::new(self, block);
         let [xs, ys, zs] = block.axes;
         let mut core = vec![0f32; xs.len()];
         let mut isos = vec![self.uniform.unwrap_or(0.0) as f32; xs.len()];

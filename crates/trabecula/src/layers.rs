@@ -32,7 +32,7 @@ use leaf_cells::LeafCells;
 use outline::Outline;
 use plane_grid::PlaneGrid;
 use rings::{Limits, Rings};
-use roots::{Plane, solve, solve_intersections};
+use roots::{SurfacesAtHeight, solve, solve_intersections};
 
 /// Most layers of a part, and most cells of a layer.
 const MOST_LAYERS: f64 = 1e7;
@@ -165,7 +165,7 @@ impl Slicer {
 
     /// The contours of the section at a height.
     fn section(&self, z: f64) -> Vec<Vec<geometry::layer::Point>> {
-        let plane = Plane { surfaces: &self.surfaces, z };
+        let plane = SurfacesAtHeight { surfaces: &self.surfaces, z };
         let accuracy = 0.02 * self.tolerance;
         let mut outline = Outline::default();
         let mut cells = LeafCells::new(&self.grid, &self.surfaces, &self.tree, z);
@@ -181,7 +181,7 @@ impl Slicer {
     }
 
     /// The arcs of all contours: chords of one surface, and those of two with the corner between them.
-    fn rings(&self, outline: &Outline, cells: &LeafCells, plane: Plane, accuracy: f64) -> Rings {
+    fn rings(&self, outline: &Outline, cells: &LeafCells, plane: SurfacesAtHeight, accuracy: f64) -> Rings {
         let roots = &outline.roots;
         let position = |r: u32| roots[r as usize].position(&self.grid);
         let chords = outline.chords(cells);

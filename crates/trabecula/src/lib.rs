@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use geometry::progress::Silent;
-//! use trabecula::{Design, NoFiles, Options};
+//! use trabecula::{Design, NoFiles, SurfaceOptions};
 //!
 //! let text = r#"
 //!     schema = 1
@@ -22,7 +22,7 @@
 //!     level.porosity = 0.7
 //! "#;
 //! let built = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design without mistakes");
-//! let made = built.surface().mesh(&Options::new(0.125), &Silent).expect("a surface");
+//! let made = built.surface().mesh(&SurfaceOptions::new(0.125), &Silent).expect("a surface");
 //! let size = geometry::measure::size(&made.surface.mesh);
 //! assert!(size.closed);
 //! assert!((size.volume / 8.0f64.powi(3) - 0.3).abs() < 1e-3); // 2³ whole cells, 30 % solid
@@ -74,4 +74,4 @@ pub use grade::Grade;
 pub use lattice::{Lattice, Level};
 pub use region::Region;
 pub use solid::Solid;
-pub use surface_maker::{Options, SurfaceMaker};
+pub use surface_maker::{SurfaceMaker, SurfaceOptions};

@@ -2,30 +2,31 @@
 
 mod affine;
 mod affine_kind;
+mod angle_weight;
 mod axis;
 pub(crate) mod bent_tets;
 mod branch_cuts;
 mod branched_solve;
 mod cohomology;
-mod columns;
 mod comb;
 mod conjugate_gradients;
 mod core_branches;
-mod core_cover;
-mod covering;
-mod cube_turns;
+mod core_solve;
+mod cube_rotations;
 pub(crate) mod curved_tets;
 mod cut_cells;
 mod distortion;
 mod edge_squares;
 mod fixed_faces;
+mod fold_advice;
 mod frame;
+mod grade_values;
 mod grid_cells;
+mod grid_choice;
 mod integral;
 mod inverse;
 mod load_cases;
 mod multigrid;
-mod pace;
 mod periods;
 mod phase;
 mod phase_candidate;
@@ -38,9 +39,9 @@ mod poisson;
 mod principal;
 mod principal_lengths;
 mod region_holes;
-mod remedy;
 mod round;
 mod round_kind;
+mod singular_core;
 mod singular_lines;
 mod smooth_frames;
 mod solution;
@@ -54,15 +55,13 @@ mod sweep;
 mod sweep_kind;
 pub(crate) mod tet_map;
 mod tets_kind;
-mod tilt;
 mod two_axes;
 mod winding;
 
 pub use affine::{Affine, Skew};
 pub use affine_kind::AffineKind;
 pub use axis::Axis;
-pub use core_cover::{CoreFill, Covering};
-pub use covering::Cores;
+pub use core_solve::Cores;
 pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use load_cases::{CasesBy, Stress};
@@ -70,12 +69,15 @@ pub use periods::Period;
 pub use phase::Phase;
 pub use phase_request::{PhaseRequest, SolverOptions};
 pub use round::Round;
+pub use singular_core::{CoreFill, CoreOptions};
 pub use singular_lines::SingularLine;
 pub use stretch::Stretch;
 pub use surface_frames::Aligned;
 pub use sweep::{Path, Sweep};
-pub use tet_map::Tets;
-pub use tets_kind::{Ends, Joined, LayersSpec, MadeTetsKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind};
+pub use tet_map::CarrierMesh;
+pub use tets_kind::{
+    CellJoin, LayersSpec, MadeTetsKind, MesherKind, Method, NetSpec, SurfaceEnds, TetFileKind, TetsKind,
+};
 pub use two_axes::TwoAxes;
 
 use std::sync::Arc;
@@ -237,7 +239,7 @@ pub trait Mapping: Send + Sync {
     }
 
     /// The phases along the rows of a block.
-    fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
+    fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn PhaseRows + 'a> {
         Box::new(PointRows { map: self, block: *block, layer: 0, points: Vec::new(), phases: Vec::new() })
     }
 }
@@ -246,7 +248,7 @@ pub trait Mapping: Send + Sync {
 pub type Map = Arc<dyn Mapping>;
 
 /// The phases along the rows of a block.
-pub trait Rows {
+pub trait PhaseRows {
     /// Prepares for the rows of layer k.
     fn enter_layer(&mut self, k: usize);
 
@@ -263,7 +265,7 @@ struct PointRows<'a, M: ?Sized> {
     phases: Vec<Vec3>,
 }
 
-impl<M: Mapping + ?Sized> Rows for PointRows<'_, M> {
+impl<M: Mapping + ?Sized> PhaseRows for PointRows<'_, M> {
     fn enter_layer(&mut self, k: usize) {
         self.layer = k;
     }

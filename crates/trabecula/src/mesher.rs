@@ -76,7 +76,7 @@ pub fn background(
     let extent = bounds.size().into_iter().fold(0.0, f64::max);
     // A cube holds twelve tetrahedra: ∛√2 times the edge of the regular tetrahedron of a twelfth of its volume.
     let cube = 2f64.powf(1.0 / 6.0) * largest.min(extent);
-    let grid = bcc_grid::Grid::new(&**region, bounds, fitted(region, bounds, cube), MOST)?;
+    let grid = bcc_grid::BccGrid::new(&**region, bounds, fitted(region, bounds, cube), MOST)?;
     // Less exact ways are for too many surfaces, and for features too fine for their edges to be followed.
     let ways: [&dyn Fn() -> Option<Cuts>; 4] = [
         &|| Cuts::by_surfaces(region, cube, Patched::NARROW),
@@ -148,7 +148,7 @@ impl Cuts {
     fn mesh(
         &self,
         region: &Region,
-        mut grid: bcc_grid::Grid,
+        mut grid: bcc_grid::BccGrid,
         size: &Grade,
         cube: f64,
         layers: Option<&PrismLayers>,

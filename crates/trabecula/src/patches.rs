@@ -29,11 +29,11 @@ mod quad_net;
 mod relaxed_net;
 mod shells;
 
-use bezier::{Curve, Patch, basis, frame, on_side, reversed, sum};
+use bezier::{BicubicPatch, Curve, basis, frame, on_side, reversed, sum};
 use boundary::Boundary;
-use contour_polygons::{Grid, Polygons, crossings, euler};
+use contour_polygons::{ContourPolygons, GridPlanes, crossings, euler};
 use fitted_patches::{ON_SIDE, curve, distances, patch};
-use quad_net::{Net, TooCoarse};
+use quad_net::{QuadNet, TooCoarse};
 use relaxed_net::gradients;
 use shells::Shells;
 
@@ -205,7 +205,7 @@ fn too_many(tolerance: f64) -> Stopped {
 }
 
 /// A grid that ends at the planes of a box, no coarser than `spacing` (mm); none if it has more than `MOST_NODES` nodes.
-fn grid(bounds: &Aabb, spacing: f64) -> Option<Grid> {
+fn grid(bounds: &Aabb, spacing: f64) -> Option<GridPlanes> {
     let nodes: f64 = bounds.size().iter().map(|s| (s / spacing).ceil() + 1.0).product();
     if nodes > MOST_NODES {
         return None;
@@ -217,7 +217,7 @@ fn grid(bounds: &Aabb, spacing: f64) -> Option<Grid> {
         all.push(bounds.max[a]);
         all
     };
-    Some(Grid { axes: [0, 1, 2].map(axis) })
+    Some(GridPlanes { axes: [0, 1, 2].map(axis) })
 }
 
 /// What became of a grid.
@@ -232,7 +232,7 @@ enum Attempt {
 
 fn attempt(
     bounds: &Aabb,
-    grid: &Grid,
+    grid: &GridPlanes,
     surfaces: &[Surface],
     (tolerance, shift, finest): (f64, f64, f64),
     progress: &dyn Progress,
@@ -246,14 +246,14 @@ fn attempt(
     while widest(&fine, bounds) > finest && fine.len() as f64 <= MOST_NODES {
         fine = refined(&fine);
     }
-    let mut net = Net::default();
+    let mut net = QuadNet::default();
     let mut corners = Vec::new();
     for (surface, field) in fields.iter().enumerate() {
         let values = node_values(*field, grid);
         if crossings(grid, &values) as f64 > MOST_FACES {
             return Err(too_many(tolerance));
         }
-        let polygons = Polygons::new(grid, &values);
+        let polygons = ContourPolygons::new(grid, &values);
         if !progress.step(surface as u64, 8) {
             return Err(Stopped::Interrupted);
         }
@@ -287,14 +287,14 @@ fn attempt(
 /// Curves and patches of a net.
 struct Fitted {
     curves: Vec<Curve>,
-    patches: Vec<Patch>,
+    patches: Vec<BicubicPatch>,
     near: Nearness,
 }
 
 /// Spreads the vertices of a net over the surfaces and fits its patches; where they are not near enough to the surfaces asked
 /// for, faces are divided. `fields` are the surfaces fitted to, and those asked for.
 fn fit(
-    net: &mut Net,
+    net: &mut QuadNet,
     bounds: &Aabb,
     [fields, asked]: [&[&dyn Field]; 2],
     (tolerance, spacing): (f64, f64),
@@ -325,7 +325,7 @@ fn fit(
 }
 
 /// The edges across which faces are divided: their longer sides, and the others where these are nearly as long.
-fn across(net: &Net, faces: &[usize]) -> Vec<bool> {
+fn across(net: &QuadNet, faces: &[usize]) -> Vec<bool> {
     let mut divided = vec![false; net.edges.len()];
     for f in faces {
         let sides = net.faces[*f].sides;
@@ -342,31 +342,31 @@ fn across(net: &Net, faces: &[usize]) -> Vec<bool> {
 }
 
 /// The longest edge of a grid's cells (mm).
-fn widest(grid: &Grid, bounds: &Aabb) -> f64 {
+fn widest(grid: &GridPlanes, bounds: &Aabb) -> f64 {
     (0..3).map(|a| bounds.size()[a] / (grid.shape()[a] - 1) as f64).fold(0.0, f64::max)
 }
 
 /// The grid with twice as many cells along each axis.
-fn refined(grid: &Grid) -> Grid {
+fn refined(grid: &GridPlanes) -> GridPlanes {
     let halved = |axis: &Vec<f64>| {
         let mut all: Vec<f64> = axis.windows(2).flat_map(|w| [w[0], 0.5 * (w[0] + w[1])]).collect();
         all.extend(axis.last());
         all
     };
-    Grid { axes: [0, 1, 2].map(|a| halved(&grid.axes[a])) }
+    GridPlanes { axes: [0, 1, 2].map(|a| halved(&grid.axes[a])) }
 }
 
 /// The mean length of a field's gradient at places of a grid that are near its zero set.
-fn mean_slope(field: &dyn Field, grid: &Grid) -> f64 {
+fn mean_slope(field: &dyn Field, grid: &GridPlanes) -> f64 {
     let values = node_values(field, grid);
-    let polygons = Polygons::new(grid, &values);
+    let polygons = ContourPolygons::new(grid, &values);
     let points: Vec<Vec3> = polygons.edges.iter().map(|e| crossing(field, grid, &values, *e)).collect();
     let (_, slopes) = gradients(field, &points);
     slopes.iter().map(|g| norm(*g)).sum::<f64>() / slopes.len().max(1) as f64
 }
 
 /// The values of a field at the nodes of a grid.
-fn node_values(field: &dyn Field, grid: &Grid) -> Vec<f64> {
+fn node_values(field: &dyn Field, grid: &GridPlanes) -> Vec<f64> {
     let [nx, _, _] = grid.shape();
     let mut values = vec![0.0; grid.len()];
     values.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
@@ -377,7 +377,7 @@ fn node_values(field: &dyn Field, grid: &Grid) -> Vec<f64> {
 }
 
 /// Where a grid edge crosses a surface: by linear interpolation, on edges of the box to rounding.
-fn crossing(field: &dyn Field, grid: &Grid, values: &[f64], edge: u64) -> Vec3 {
+fn crossing(field: &dyn Field, grid: &GridPlanes, values: &[f64], edge: u64) -> Vec3 {
     let ends = grid.ends(edge);
     let [a, b] = ends.map(|n| grid.position(n));
     let [va, vb] = ends.map(|n| values[n]);
@@ -398,7 +398,7 @@ fn crossing(field: &dyn Field, grid: &Grid, values: &[f64], edge: u64) -> Vec3 {
     at(t)
 }
 
-fn curves(net: &Net, fields: &[&dyn Field], normals: &[Vec3]) -> Vec<Curve> {
+fn curves(net: &QuadNet, fields: &[&dyn Field], normals: &[Vec3]) -> Vec<Curve> {
     let each = net.edges.par_iter().with_min_len(64);
     let of = |e: &quad_net::Edge| {
         let ends = e.ends.map(|v| net.vertices[v as usize].at);
@@ -408,7 +408,7 @@ fn curves(net: &Net, fields: &[&dyn Field], normals: &[Vec3]) -> Vec<Curve> {
     each.map(of).collect()
 }
 
-fn patches(net: &Net, fields: &[&dyn Field], curves: &[Curve]) -> Vec<Patch> {
+fn patches(net: &QuadNet, fields: &[&dyn Field], curves: &[Curve]) -> Vec<BicubicPatch> {
     let on_edges = net.edges.par_iter().zip(curves).with_min_len(64);
     let normals: Vec<Option<[Vec3; 4]>> = on_edges
         .map(|(edge, curve)| {
@@ -416,7 +416,7 @@ fn patches(net: &Net, fields: &[&dyn Field], curves: &[Curve]) -> Vec<Patch> {
             edge.plane.is_none().then(|| distances(field, &ON_SIDE.map(|t| sum(curve, basis(t)))).1)
         })
         .collect();
-    let of = |face: &quad_net::Face| {
+    let of = |face: &quad_net::QuadFace| {
         let sides = face.sides.map(|(e, forward)| {
             let curve = curves[e as usize];
             if forward { curve } else { reversed(&curve) }
@@ -442,7 +442,7 @@ struct Nearness {
 }
 
 impl Nearness {
-    fn new(net: &Net, fields: &[&dyn Field], patches: &[Patch]) -> Nearness {
+    fn new(net: &QuadNet, fields: &[&dyn Field], patches: &[BicubicPatch]) -> Nearness {
         let each = net.faces.par_iter().zip(patches).with_min_len(16);
         let deviations = each.map(|(face, patch)| deviation(fields[usize::from(face.surface)], patch)).collect();
         Nearness { deviations, angles: angles(net, patches) }
@@ -463,7 +463,7 @@ impl Nearness {
 }
 
 /// The greatest distance (mm) of a patch from its surface, at 49 points; infinite if it is turned away from it.
-fn deviation(field: &dyn Field, patch: &Patch) -> f64 {
+fn deviation(field: &dyn Field, patch: &BicubicPatch) -> f64 {
     let parameters: [[f64; 2]; 49] = core::array::from_fn(|k| [k % 7, k / 7].map(|i| i as f64 / 6.0));
     let frames = parameters.map(|[u, v]| frame(patch, u, v));
     let (off, normals) = distances(field, &frames.map(|f| f[0]));
@@ -475,7 +475,7 @@ fn deviation(field: &dyn Field, patch: &Patch) -> f64 {
 }
 
 /// Of each patch the greatest angle (radians) between its normals and those of adjacent ones along their common edges.
-fn angles(net: &Net, patches: &[Patch]) -> Vec<f64> {
+fn angles(net: &QuadNet, patches: &[BicubicPatch]) -> Vec<f64> {
     const AT: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
     let mut first: Vec<Option<(usize, [Vec3; 5])>> = vec![None; net.edges.len()];
     let mut most = vec![0.0f64; patches.len()];

@@ -173,7 +173,7 @@ impl From<HalfSpace> for OpenSurface {
 
 /// A signed distance function (1-Lipschitz; exact for primitives and meshes, a lower bound of the
 /// absolute distance for combinations), with what a mesher and a report need in addition.
-pub trait Shape: Field {
+pub trait SignedDistance: Field {
     /// Bounds of the solid; infinite along unbounded directions.
     fn bounds(&self) -> Aabb;
 
@@ -255,7 +255,7 @@ fn one_surface(field: Arc<dyn Field>, out: &mut Vec<Surface>) -> CsgTree {
 }
 
 /// A shared region.
-pub type Region = Arc<dyn Shape>;
+pub type Region = Arc<dyn SignedDistance>;
 
 #[cfg(test)]
 pub(crate) mod tests {
@@ -269,7 +269,7 @@ pub(crate) mod tests {
 
     /// The laws of a shape near the origin: 1-Lipschitz, gradient against differences, bounds that hold, solid
     /// within its bounds, volume by sampling, and a fill with the right signs. `exact`: |gradient| there is 1.
-    pub fn check_shape(name: &str, s: &dyn Shape, reach: f64, exact: f64) {
+    pub fn check_shape(name: &str, s: &dyn SignedDistance, reach: f64, exact: f64) {
         let mut seed = 42;
         let mut smooth = 0;
         for _ in 0..4000 {

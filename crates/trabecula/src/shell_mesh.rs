@@ -35,7 +35,7 @@ const STEPS: usize = 24;
 
 /// How a shell is meshed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct ShellMeshOptions {
     /// Grid spacing, mm: edges are about as long.
     pub edge: f64,
     /// Whether triangles are quadratic.
@@ -60,7 +60,7 @@ pub struct MeshedShell {
 pub fn shell_mesh(
     solid: &Solid,
     sets: &[(String, Region)],
-    options: &Options,
+    options: &ShellMeshOptions,
     progress: &dyn Progress,
 ) -> Result<MeshedShell, Stopped> {
     let refuse = |message: &str| Err(Stopped::Refused(Fault::new("of", message)));

@@ -20,10 +20,10 @@ pub use compact::Store;
 pub use components::{CRUMB, Component, Components, DUST, Islands, Resolved, SMALL};
 pub(crate) use components::{ComponentGraph, NONE, Totals};
 pub use measured::{Figures, Measured};
-pub use spool::{Scratch, stream_mesh};
+pub use spool::{ScratchStores, stream_mesh};
 
 /// What takes a surface piece by piece: memory, or files.
-pub trait Pieces: Send {
+pub trait SurfaceSink: Send {
     /// Adds vertices, numbered on from those before, and triangles of any vertices so far, each with whether it is a cut.
     ///
     /// # Errors
@@ -31,7 +31,7 @@ pub trait Pieces: Send {
     fn add(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]], cut: &[bool]) -> io::Result<()>;
 }
 
-impl Pieces for SurfaceMesh {
+impl SurfaceSink for SurfaceMesh {
     fn add(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]], cut: &[bool]) -> io::Result<()> {
         self.mesh.vertices.extend_from_slice(vertices);
         self.mesh.triangles.extend_from_slice(triangles);
@@ -48,13 +48,18 @@ pub trait SurfaceMaker {
     /// # Errors
     /// A resolution at which no mesh can be made; an interruption; more than 2³² vertices; several connected components, if
     /// the options refuse them; failures of `out`.
-    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped>;
+    fn make(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn SurfaceSink,
+        progress: &dyn Progress,
+    ) -> Result<Resolved, Stopped>;
 
     /// The surface, held in memory. Same bytes for any number of threads.
     ///
     /// # Errors
     /// As `make`.
-    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<MeshedSurface, Stopped> {
+    fn mesh(&self, options: &SurfaceOptions, progress: &dyn Progress) -> Result<MeshedSurface, Stopped> {
         let mut surface = SurfaceMesh::default();
         let found = self.make(options, &mut surface, progress)?;
         Ok(MeshedSurface { surface: kept(surface, &found), components: found.components, error: found.error })
@@ -65,13 +70,18 @@ pub trait SurfaceMaker {
     ///
     /// # Errors
     /// As `mesh`; failures of `out`; more triangles than the format can count (2³²).
-    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped>;
+    fn stream_stl(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn Store,
+        progress: &dyn Progress,
+    ) -> Result<Summary, Stopped>;
 
     /// The figures of the surface that `mesh` makes.
     ///
     /// # Errors
     /// As `mesh`.
-    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
+    fn measure(&self, options: &SurfaceOptions, progress: &dyn Progress) -> Result<Measured, Stopped> {
         Ok(Measured::of(&self.mesh(options, progress)?))
     }
 
@@ -92,17 +102,17 @@ pub trait SurfaceMaker {
 
 /// How a surface is to be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct SurfaceOptions {
     /// Grid spacing, or chord error for beams, mm.
     pub resolution: f64,
     /// Treatment of all connected components but the largest.
     pub islands: Islands,
 }
 
-impl Options {
+impl SurfaceOptions {
     /// This resolution (mm), all else as it is by default.
-    pub fn new(resolution: f64) -> Options {
-        Options { resolution, islands: Islands::default() }
+    pub fn new(resolution: f64) -> SurfaceOptions {
+        SurfaceOptions { resolution, islands: Islands::default() }
     }
 }
 

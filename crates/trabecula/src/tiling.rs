@@ -25,11 +25,11 @@ use crate::cell::tet::{Bary, FractionTable, TetCell};
 use crate::cell::{Cut, Part};
 use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
-use crate::map::Tets;
+use crate::map::CarrierMesh;
 use crate::map::bent_tets::within;
 use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm};
 
-pub use crease::Creases;
+pub use crease::CreaseAngles;
 pub use face_grid::FaceGrid;
 pub use node_levels::Amount;
 pub use ports::Ports;
@@ -52,7 +52,7 @@ pub struct Share {
 
 /// The level t.
 #[derive(Clone)]
-pub enum Level {
+pub enum NodalLevel {
     /// The same everywhere.
     Same(f64),
     /// At each node of the mesh, linear between them.
@@ -63,13 +63,13 @@ pub enum Level {
 #[derive(Clone)]
 pub struct Tiling {
     /// The mesh.
-    pub map: Arc<Tets>,
+    pub map: Arc<CarrierMesh>,
     /// The cells whose weighted sum f is.
     pub cells: Vec<Share>,
     /// The part.
     pub part: Part,
     /// The level of f.
-    pub level: Level,
+    pub level: NodalLevel,
     /// For each tetrahedron, a Lipschitz bound of f (per mm).
     lipschitz: Arc<Vec<f64>>,
     /// The part, or one side of it alone.
@@ -77,13 +77,13 @@ pub struct Tiling {
     /// Shares of the blended function in the whole mesh, where tetrahedra of one cell overlap.
     blended: Option<Arc<FractionTable>>,
     /// Factors of its values as a field, if they are lowered anywhere.
-    eased: Option<Arc<Eased>>,
+    eased: Option<Arc<GradientLimiter>>,
     /// What bending the mesh changes, once it is known; the same at all levels.
     bending: Arc<OnceLock<Option<Arc<Bending>>>>,
 }
 
 /// Factors of a field's values at the nodes, linear between them, so that it is hardly steeper in some tetrahedra than in most.
-struct Eased {
+struct GradientLimiter {
     at_nodes: Vec<f64>,
     /// The steepness of the field at its zero set, per mm, at most.
     limit: f64,
@@ -111,13 +111,13 @@ const STEEP: f64 = 4.0;
 
 impl Tiling {
     /// A single cell over a mesh.
-    pub fn new(map: Arc<Tets>, cell: Arc<TetCell>, part: Part, level: Level) -> Tiling {
+    pub fn new(map: Arc<CarrierMesh>, cell: Arc<TetCell>, part: Part, level: NodalLevel) -> Tiling {
         let cell = Share { cell, scale: 1.0, weights: None };
         Tiling::of(map, vec![cell], part, level)
     }
 
     /// Several cells over a mesh.
-    pub fn of(map: Arc<Tets>, cells: Vec<Share>, part: Part, level: Level) -> Tiling {
+    pub fn of(map: Arc<CarrierMesh>, cells: Vec<Share>, part: Part, level: NodalLevel) -> Tiling {
         let steepest = steepest(&cells);
         let corners = cells[0].cell.corners();
         let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
@@ -153,7 +153,7 @@ impl Tiling {
     /// lowered, by factors that are linear in each tetrahedron. Its zero set is the same. Values of the order of one step of a grid then mean
     /// about the same everywhere, by which the extractor keeps surfaces apart.
     #[must_use]
-    pub fn eased(&self) -> Tiling {
+    pub fn with_limited_gradient(&self) -> Tiling {
         let mut order: Vec<usize> = (0..self.map.len()).collect();
         order.sort_unstable_by(|a, b| self.lipschitz[*a].total_cmp(&self.lipschitz[*b]));
         let half = 0.5 * order.iter().map(|t| self.map.volume(*t)).sum::<f64>();
@@ -169,15 +169,15 @@ impl Tiling {
                 at_nodes[n as usize] = at_nodes[n as usize].min(limit / self.lipschitz[t]);
             }
         }
-        let eased = at_nodes.iter().any(|v| *v < 1.0).then(|| Arc::new(Eased { at_nodes, limit }));
+        let eased = at_nodes.iter().any(|v| *v < 1.0).then(|| Arc::new(GradientLimiter { at_nodes, limit }));
         Tiling { eased, ..self.clone() }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.
     fn level_at(&self, t: usize, l: Bary) -> f64 {
         match &self.level {
-            Level::Same(v) => *v,
-            Level::Nodes(of) => self.linear(of, t, l),
+            NodalLevel::Same(v) => *v,
+            NodalLevel::Nodes(of) => self.linear(of, t, l),
         }
     }
 
@@ -215,7 +215,7 @@ impl Tiling {
         for ((k, m), (t, l)) in out.iter_mut().zip(&slopes).zip(at) {
             // Moved back to the overlap from outside, which bounds the linear extrapolation.
             k.t = self.level_at(*t, within(*l, self.map.overlap()));
-            if let Level::Nodes(of) = &self.level {
+            if let NodalLevel::Nodes(of) = &self.level {
                 k.slope_t = linear_slope(m, of, self.map.tet(*t));
             }
             if let Some(eased) = &self.eased {
@@ -317,22 +317,22 @@ impl Tiling {
 
     /// Whether the level or the weights vary.
     pub fn varies(&self) -> bool {
-        matches!(self.level, Level::Nodes(_)) || self.cells.iter().any(|c| c.weights.is_some())
+        matches!(self.level, NodalLevel::Nodes(_)) || self.cells.iter().any(|c| c.weights.is_some())
     }
 
     /// The level, where it does not vary.
     pub fn uniform(&self) -> Option<f64> {
         match self.level {
-            Level::Same(t) => Some(t),
-            Level::Nodes(_) => None,
+            NodalLevel::Same(t) => Some(t),
+            NodalLevel::Nodes(_) => None,
         }
     }
 
     /// The least and greatest level.
     pub fn levels(&self) -> Interval {
         match &self.level {
-            Level::Same(t) => Interval::new(*t, *t),
-            Level::Nodes(of) => self.used(of),
+            NodalLevel::Same(t) => Interval::new(*t, *t),
+            NodalLevel::Nodes(of) => self.used(of),
         }
     }
 
@@ -431,7 +431,7 @@ impl Field for Tiling {
                         Interval::new((k.f - by).max(-most), (k.f + by).min(most))
                     }
                 });
-                if let Level::Nodes(of) = &self.level {
+                if let NodalLevel::Nodes(of) = &self.level {
                     let v = self.map.tet(*n).map(|n| of[n as usize]);
                     let (lo, hi) = v.iter().fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
                     t = t.union(spread(Interval::new(lo, hi)));
@@ -442,9 +442,9 @@ impl Field for Tiling {
             f = all;
         }
         let t = match &self.level {
-            Level::Same(v) => Interval::new(*v, *v),
-            Level::Nodes(_) if t.lo <= t.hi => t,
-            Level::Nodes(_) => spread(self.levels()),
+            NodalLevel::Same(v) => Interval::new(*v, *v),
+            NodalLevel::Nodes(_) if t.lo <= t.hi => t,
+            NodalLevel::Nodes(_) => spread(self.levels()),
         };
         let all = self.cut.bound(f, t);
         let Some(eased) = &self.eased else { return all };

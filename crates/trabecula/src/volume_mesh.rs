@@ -25,7 +25,7 @@ mod domains;
 mod mid_nodes;
 mod named_sets;
 
-use body_centred::Cubes;
+use body_centred::CubeGrid;
 pub use carrier::{CarrierContext, carrier};
 pub(crate) use cyclic_nodes::PLANES;
 use domains::Domains;
@@ -41,7 +41,7 @@ const BACKGROUNDS: usize = 8;
 
 /// How a volume mesh is made.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct VolumeMeshOptions {
     /// Edge of the background's cubes (mm): the longest edges of tetrahedra; twelve tetrahedra fill a cube.
     pub edge: f64,
     /// What is meshed.
@@ -78,7 +78,7 @@ type Planes = [[Option<usize>; 2]; 3];
 
 /// What has names in a solid.
 #[derive(Clone, Copy)]
-pub struct Named<'a> {
+pub struct SolidNames<'a> {
     /// Names of what is solid whatever the lattice says, in the order of the solid.
     pub bodies: &'a [String],
     /// Regions whose surface is a set, by name.
@@ -92,15 +92,15 @@ pub struct Named<'a> {
 /// an interruption.
 pub fn volume_mesh(
     solid: &Solid,
-    named: &Named,
-    options: &Options,
+    named: &SolidNames,
+    options: &VolumeMeshOptions,
     progress: &dyn Progress,
 ) -> Result<MeshedVolume, Stopped> {
     let by_patches = (!options.periodic).then_some(options.edge);
     let domains = Domains::new(solid, options.of, by_patches).map_err(Stopped::Refused)?;
     let bounds = solid.region.bounds();
     let planes = bounding_planes(&domains, &bounds);
-    let mut cubes = Cubes::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);
+    let mut cubes = CubeGrid::new(&bounds, planes.map(|p| p.map(|p| p.is_some())), options.edge);
     if cubes.count.iter().map(|n| *n as f64).product::<f64>() > CUBES {
         let m = format!(
             "an edge of {} mm makes more than four thousand million cubes; use a greater one",
@@ -195,7 +195,7 @@ fn bounding_planes(domains: &Domains, bounds: &Aabb) -> Planes {
 }
 
 /// The background where a domain may be, on the inner side of the bounding planes.
-fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Partition<'a> {
+fn background<'a>(domains: &'a Domains, cubes: &CubeGrid, planes: &Planes) -> Partition<'a> {
     let matters = |b: &Aabb| domains.trees.iter().any(|t| t.bound(&|s| domains.surfaces[s].field.bound(b)).lo <= 0.0);
     let (nodes, tets) = cubes.tetrahedra(&cubes.active(&matters));
     let mut on = vec![0; nodes.len()];
@@ -219,9 +219,9 @@ fn background<'a>(domains: &'a Domains, cubes: &Cubes, planes: &Planes) -> Parti
 /// Periodic where the solid is not; an interruption.
 fn cut<'a>(
     domains: &'a Domains,
-    cubes: &Cubes,
+    cubes: &CubeGrid,
     planes: &Planes,
-    options: &Options,
+    options: &VolumeMeshOptions,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<Partition<'a>, Stopped> {
     let mut partition = background(domains, cubes, planes);
@@ -245,9 +245,9 @@ fn cut<'a>(
 fn assembled(
     shaping: Shaping,
     domains: &Domains,
-    (planes, bounds, cubes): (&Planes, &Aabb, &Cubes),
-    named: &Named,
-    options: &Options,
+    (planes, bounds, cubes): (&Planes, &Aabb, &CubeGrid),
+    named: &SolidNames,
+    options: &VolumeMeshOptions,
 ) -> Result<MeshedVolume, Fault> {
     let Shaping { surfaces, mut nodes, mut on, next, tets, domain, .. } = shaping;
     let mut order: Vec<u32> = (0..tets.len() as u32).filter(|t| tets[*t as usize] != GONE).collect();

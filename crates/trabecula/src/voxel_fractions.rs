@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use crate::csg_tree::{CsgSolid, CsgTree, Sign};
 use crate::implicit::Surface;
 pub use finite_elements::voxel_elements;
-use plane_cut::{Plane, below, patch};
+use plane_cut::{LinearFunction, below, patch};
 use simplex_volume::volume;
 
 /// A grid of voxels.
@@ -57,7 +57,7 @@ pub fn voxel_fractions(solid: &CsgSolid, grid: &VoxelGrid, progress: &dyn Progre
             }
             let first = [i % blocks[0], i / blocks[0] % blocks[1], i / blocks[0] / blocks[1]].map(|b| b * BLOCK);
             let size = [0, 1, 2].map(|a| BLOCK.min(grid.shape[a] - first[a]));
-            let mut block = Block { solid, grid, first, size, out: vec![0.0; size.iter().product()] };
+            let mut block = VoxelBlock { solid, grid, first, size, out: vec![0.0; size.iter().product()] };
             block.fill([0; 3], size, &solid.tree);
             block.out
         })
@@ -79,7 +79,7 @@ pub fn voxel_fractions(solid: &CsgSolid, grid: &VoxelGrid, progress: &dyn Progre
 }
 
 /// A block of voxels.
-struct Block<'a> {
+struct VoxelBlock<'a> {
     solid: &'a CsgSolid,
     grid: &'a VoxelGrid,
     first: [usize; 3],
@@ -87,7 +87,7 @@ struct Block<'a> {
     out: Vec<f64>,
 }
 
-impl Block<'_> {
+impl VoxelBlock<'_> {
     /// Fills the voxels from `low` to `high` where the solid is `tree`.
     fn fill(&mut self, low: [usize; 3], high: [usize; 3], tree: &CsgTree) {
         let corner =
@@ -138,7 +138,7 @@ fn fraction(surfaces: &[Surface], tree: &CsgTree, bounds: &Aabb, depth: usize) -
     tree.for_each(&mut |i| names.push(i));
     names.sort_unstable();
     names.dedup();
-    let cuts: Vec<Cut> = names.iter().map(|i| Cut::new(&surfaces[*i], bounds)).collect();
+    let cuts: Vec<SurfaceCut> = names.iter().map(|i| SurfaceCut::new(&surfaces[*i], bounds)).collect();
     let name = |i: usize| names.binary_search(&i).unwrap_or(0);
     if (depth == DEPTH || cuts.iter().all(|c| !c.is_bent()))
         && let Some(sum) = apart(tree, &cuts, &name)
@@ -146,7 +146,7 @@ fn fraction(surfaces: &[Surface], tree: &CsgTree, bounds: &Aabb, depth: usize) -
         return sum;
     }
     if depth == DEPTH {
-        let planes: Vec<Plane> = cuts.iter().map(|c| c.plane).collect();
+        let planes: Vec<LinearFunction> = cuts.iter().map(|c| c.plane).collect();
         return volume(&planes, &|signs| tree.solid(&|i| if signs[name(i)] { u64::MAX } else { 0 }) & 1 == 1);
     }
     let half = bounds.size().map(|s| 0.5 * s);
@@ -163,20 +163,20 @@ fn fraction(surfaces: &[Surface], tree: &CsgTree, bounds: &Aabb, depth: usize) -
 }
 
 /// A surface in a box.
-struct Cut {
-    plane: Plane,
+struct SurfaceCut {
+    plane: LinearFunction,
     /// Greatest deviation of the function from its plane at the corners.
     deviation: f64,
     /// Volume fraction of the negative side.
     negative: f64,
 }
 
-impl Cut {
-    fn new(surface: &Surface, bounds: &Aabb) -> Cut {
+impl SurfaceCut {
+    fn new(surface: &Surface, bounds: &Aabb) -> SurfaceCut {
         let (center, half) = (bounds.center(), bounds.size().map(|s| 0.5 * s));
         let (mut value, mut gradient) = ([0.0], [[0.0; 3]]);
         surface.field.gradients(&[center], &mut value, &mut gradient);
-        let plane = Plane { value: value[0], slope: [0, 1, 2].map(|a| gradient[0][a] * half[a]) };
+        let plane = LinearFunction { value: value[0], slope: [0, 1, 2].map(|a| gradient[0][a] * half[a]) };
         let at = |p: Vec3| [0, 1, 2].map(|a| center[a] + half[a] * p[a]);
         let corners: [Vec3; 8] = std::array::from_fn(|i| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 1.0 } else { -1.0 }));
         let mut found = [0.0; 8];
@@ -192,7 +192,7 @@ impl Cut {
             let moved: f64 = values.iter().zip(&weights).map(|(f, w)| f * w).sum();
             negative = (negative - moved / (8.0 * plane.steepness())).clamp(0.0, 1.0);
         }
-        Cut { plane, deviation, negative }
+        SurfaceCut { plane, deviation, negative }
     }
 
     /// Whether the plane is no good approximation: the surface bends, or it may pass where the plane does not.
@@ -205,7 +205,7 @@ impl Cut {
 
 /// The solid fraction where the surfaces' empty sides (in an intersection) or solid sides (in a union) do not overlap: then
 /// they add up. `None` if they may.
-fn apart(tree: &CsgTree, cuts: &[Cut], name: &impl Fn(usize) -> usize) -> Option<f64> {
+fn apart(tree: &CsgTree, cuts: &[SurfaceCut], name: &impl Fn(usize) -> usize) -> Option<f64> {
     let (of, all) = match tree {
         CsgTree::Leaf(i) => return Some(cuts[name(*i)].negative),
         CsgTree::Outside(i) => return Some(1.0 - cuts[name(*i)].negative),
@@ -218,7 +218,7 @@ fn apart(tree: &CsgTree, cuts: &[Cut], name: &impl Fn(usize) -> usize) -> Option
         CsgTree::Outside(i) => Some((&cuts[name(*i)], !all)),
         _ => None,
     };
-    let sides: Vec<(&Cut, bool)> = of.iter().map(side).collect::<Option<_>>()?;
+    let sides: Vec<(&SurfaceCut, bool)> = of.iter().map(side).collect::<Option<_>>()?;
     for (n, (a, up)) in sides.iter().enumerate() {
         for (b, other) in &sides[..n] {
             if !a.plane.oriented(*up).excludes(&b.plane.oriented(*other)) {

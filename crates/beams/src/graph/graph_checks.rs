@@ -15,7 +15,7 @@ impl Graph {
 
     /// Bounding box of all hubs, mm.
     pub fn bounds(&self) -> Aabb {
-        let ball = |b: Aabb, h: &super::Hub| b.union(Aabb { min: h.center, max: h.center }.grown(h.radius));
+        let ball = |b: Aabb, h: &super::HubBall| b.union(Aabb { min: h.center, max: h.center }.grown(h.radius));
         self.hubs.iter().fold(Aabb::EMPTY, ball)
     }
 
@@ -69,11 +69,11 @@ impl Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{Beam, Hub};
+    use crate::graph::{Beam, HubBall};
 
     fn line(stations: &[[f64; 2]], beams: &[[u32; 2]], profile: Profile) -> Graph {
         Graph {
-            hubs: (stations.iter()).map(|[x, radius]| Hub { center: [*x, 0.0, 0.0], radius: *radius }).collect(),
+            hubs: (stations.iter()).map(|[x, radius]| HubBall { center: [*x, 0.0, 0.0], radius: *radius }).collect(),
             beams: beams.iter().map(|e| Beam { ends: *e, profile }).collect(),
         }
     }

@@ -1,7 +1,7 @@
 //! Radii for a wireframe: beam radii and hub radii.
 
 use super::wireframe::{GivenRadii, Wireframe};
-use super::{Beam, Graph, Hub, Profile};
+use super::{Beam, Graph, HubBall, Profile};
 use crate::quador::Pencil;
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, add, scale};
@@ -70,7 +70,7 @@ pub fn with_radii<V>(
         let length = wireframe.length(*ends);
         own.struts.get(i).map_or(Profile::Cone, |r| given_profile(*r, hubs, length))
     };
-    let hub = |(center, radius): (&Vec3, f64)| Hub { center: *center, radius };
+    let hub = |(center, radius): (&Vec3, f64)| HubBall { center: *center, radius };
     let beam = |(i, ends): (usize, &[u32; 2])| Beam {
         ends: *ends,
         profile: match (radii.profile, &beam_radii) {

@@ -13,7 +13,7 @@
 
 use geometry::math::{Vec3, add, apply, cross, determinant, dot, eigen, scale, sub, unit};
 
-use super::complex::{Complex, Face};
+use super::complex::{Complex, QuadricFace};
 use super::conic::Conic;
 use super::hub::{HalfBeam, Hub};
 use super::hub_quadric::Quadric;
@@ -81,7 +81,7 @@ impl BoundaryForm {
     pub(super) fn new(
         hub: &Hub,
         complex: &Complex,
-        face: &Face,
+        face: &QuadricFace,
         (middles, ends): (&[Vec3], &[f64]),
     ) -> Option<BoundaryForm> {
         let q = &face.quadric;

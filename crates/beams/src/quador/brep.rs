@@ -12,7 +12,7 @@ use geometry::union_find::{find, unite};
 use super::Quadors;
 use super::bezier::Bezier;
 use super::hub_quadric::Quadric;
-use super::slice::Plane;
+use super::slice::SlicePlane;
 use super::stereographic::Stereographic;
 
 mod cuts;
@@ -97,7 +97,7 @@ pub(crate) struct Frame {
 
 /// A face.
 #[derive(Clone, Debug)]
-pub(crate) struct Face {
+pub(crate) struct BrepFace {
     /// Its frame.
     pub frame: Frame,
     /// Its quadric.
@@ -120,7 +120,7 @@ pub(crate) struct Brep<'a> {
     pub corners: Vec<Corner>,
     edges: Vec<Edge>,
     /// The faces.
-    pub faces: Vec<Face>,
+    pub faces: Vec<BrepFace>,
 }
 
 impl Quadors {
@@ -129,7 +129,7 @@ impl Quadors {
     /// # Errors
     /// Beams that intersect without a common hub or overlap too far, hubs whose seams do not close, and faces that
     /// have no rational form; planes that touch the boundary and cut nothing there.
-    pub(crate) fn brep(&self, planes: &[Plane]) -> Result<Brep<'_>, Fault> {
+    pub(crate) fn brep(&self, planes: &[SlicePlane]) -> Result<Brep<'_>, Fault> {
         self.require_brep()?;
         let mut brep =
             Brep { quadors: self, origin: [0.0; 3], corners: Vec::new(), edges: Vec::new(), faces: Vec::new() };
@@ -174,7 +174,7 @@ impl Brep<'_> {
     }
 
     /// The boundary loops of a face, where edges that were divided are replaced by their parts.
-    pub(crate) fn loops(&self, face: &Face) -> Vec<Vec<EdgeUse>> {
+    pub(crate) fn loops(&self, face: &BrepFace) -> Vec<Vec<EdgeUse>> {
         let whole = |l: &Vec<EdgeUse>| {
             let mut out = Vec::with_capacity(l.len());
             let mut todo: Vec<EdgeUse> = l.iter().rev().copied().collect();

@@ -12,7 +12,7 @@ use geometry::fault::Fault;
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
 
 use super::Quadors;
-use super::complex::{Complex, Face};
+use super::complex::{Complex, QuadricFace};
 use super::conic::Conic;
 use super::foot::{PrincipalAxes, feet_on_conic, outward};
 use super::hub::Hub;
@@ -45,7 +45,7 @@ struct QuadricFaces {
 }
 
 /// Bounds of a face: the control points of its seams, and its axis-extreme points in between.
-fn bounds(hub: &Hub, complex: &Complex, face: &Face) -> Aabb {
+fn bounds(hub: &Hub, complex: &Complex, face: &QuadricFace) -> Aabb {
     let arcs = face.loops.iter().flatten();
     let seams = arcs.flat_map(|&(a, _)| complex.arcs[a as usize].curves());
     let points = seams.flat_map(|c| c.points);

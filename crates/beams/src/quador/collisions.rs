@@ -122,10 +122,10 @@ mod tests {
     use super::super::Fillet;
     use super::super::tests::Random;
     use super::*;
-    use crate::graph::{Beam, Graph, Hub, Profile};
+    use crate::graph::{Beam, Graph, HubBall, Profile};
 
     fn lone(ends: &[[Vec3; 2]]) -> Quadors {
-        let hubs = ends.iter().flatten().map(|&center| Hub { center, radius: 0.5 });
+        let hubs = ends.iter().flatten().map(|&center| HubBall { center, radius: 0.5 });
         let beams = (0..ends.len() as u32).map(|i| Beam { ends: [2 * i, 2 * i + 1], profile: Profile::Cone });
         let graph = Graph { hubs: hubs.collect(), beams: beams.collect() };
         Quadors::new(&graph, Fillet::None).expect("beams")

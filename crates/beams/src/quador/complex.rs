@@ -39,7 +39,7 @@ struct Key {
 
 /// A seam between two vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arc {
+pub struct SeamArc {
     /// Its vertices; equal if it is closed.
     pub ends: [u32; 2],
     /// The labels on its left and right, seen from outside.
@@ -50,7 +50,7 @@ pub struct Arc {
     pub(crate) plane: AffineFunction,
 }
 
-impl Arc {
+impl SeamArc {
     /// The conic as rational quadratic Bézier curves, from the first to the second vertex.
     pub fn curves(&self) -> Vec<Bezier<3>> {
         curves(&self.conic, 0.0, self.conic.end)
@@ -59,7 +59,7 @@ impl Arc {
 
 /// A face: a connected piece of one quadric.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Face {
+pub struct QuadricFace {
     /// The active half-beams, as a bit mask: none on the ball, one on a half-beam, two on a fillet, more in a corner.
     pub label: u64,
     /// The quadric, in the hub's frame.
@@ -76,9 +76,9 @@ pub struct Complex {
     /// The vertices.
     pub vertices: Vec<Vertex>,
     /// The arcs.
-    pub arcs: Vec<Arc>,
+    pub arcs: Vec<SeamArc>,
     /// The faces.
-    pub faces: Vec<Face>,
+    pub faces: Vec<QuadricFace>,
 }
 
 /// Length below which an arc is collapsed to a point, in hub radii: far above the perturbation, far below any feature.
@@ -127,7 +127,7 @@ impl Complex {
 
 impl Complex {
     /// The centre of a spherical face with one boundary loop: of a cap, or of the complement of a cap.
-    pub(super) fn pole(&self, face: &Face) -> Vec3 {
+    pub(super) fn pole(&self, face: &QuadricFace) -> Vec3 {
         let (mut sum, mut arrow) = ([0.0; 3], [0.0; 3]);
         for &(arc, forward) in face.loops.iter().flatten() {
             let conic = &self.arcs[arc as usize].conic;
@@ -172,7 +172,7 @@ impl Complex {
         for (i, a) in self.arcs.iter().enumerate() {
             if !short[i] {
                 new_arc[i] = arcs.len() as u32;
-                arcs.push(Arc { ends: a.ends.map(|v| new_vertex[find(&mut to, v) as usize]), ..*a });
+                arcs.push(SeamArc { ends: a.ends.map(|v| new_vertex[find(&mut to, v) as usize]), ..*a });
             }
         }
         let mut faces = self.faces;

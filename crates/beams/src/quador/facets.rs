@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::complex::{Arc, CoincidentArc, Complex};
+use super::complex::{CoincidentArc, Complex, SeamArc};
 use super::hub::Hub;
 use ear_clipping::strip;
 
@@ -242,7 +242,7 @@ impl<'a> Facets<'a> {
 
     /// The parameters at which an arc is divided, its end included: uniform in the integral of the square root of
     /// normal curvature, with a limited turning angle.
-    fn division(&self, arc: &Arc, turns: f64) -> Vec<f64> {
+    fn division(&self, arc: &SeamArc, turns: f64) -> Vec<f64> {
         let conic = &arc.conic;
         let at = |k: usize| {
             let (x, dx) = conic.with_derivative(conic.end * k as f64 / SAMPLES as f64);

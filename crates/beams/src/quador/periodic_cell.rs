@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::{Fillet, Quadors};
-use crate::graph::{Beam, Graph, Hub, PeriodicBeam, PeriodicGraph, Profile};
+use crate::graph::{Beam, Graph, HubBall, PeriodicBeam, PeriodicGraph, Profile};
 use geometry::fault::Fault;
 use geometry::math::{Mat3, Vec3, add, determinant, scale};
 
@@ -41,8 +41,8 @@ impl PeriodicCell<'_> {
         (0..3).fold([0.0; 3], |sum, a| add(sum, scale(self.edges[a], phase[a])))
     }
 
-    fn hub(&self, node: usize, cell: [i32; 3], radius: f64) -> Hub {
-        Hub { center: self.place(add(self.graph.nodes[node], cell.map(f64::from))), radius }
+    fn hub(&self, node: usize, cell: [i32; 3], radius: f64) -> HubBall {
+        HubBall { center: self.place(add(self.graph.nodes[node], cell.map(f64::from))), radius }
     }
 
     fn profile(&self, radius: f64) -> Profile {

@@ -10,7 +10,7 @@ use core::f64::consts::TAU;
 use geometry::math::{Vec3, add, apply, cross, dot, norm, scale, sub, unit};
 
 use super::bezier::{Bezier, Path, curves, section_tangent};
-use super::complex::{Complex, Face};
+use super::complex::{Complex, QuadricFace};
 use super::hub::{HalfBeam, Hub};
 use super::hub_quadric::Quadric;
 use super::stereographic::{Stereographic, opposite_poles};
@@ -138,7 +138,7 @@ impl Complex {
         (out, left)
     }
 
-    fn face_patches(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<RationalPatch>> {
+    fn face_patches(&self, hub: &Hub, number: u32, face: &QuadricFace) -> Option<Vec<RationalPatch>> {
         let q = face.quadric;
         if let Some(half_beam) = face.end_circle {
             let half_beam = &hub.half_beams[half_beam as usize];
@@ -195,7 +195,7 @@ impl Complex {
 /// the seam crosses a meridian plane backwards.
 fn sectors(
     complex: &Complex,
-    face: &Face,
+    face: &QuadricFace,
     half_beam: &HalfBeam,
     count: usize,
     first: f64,

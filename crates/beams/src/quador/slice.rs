@@ -21,7 +21,7 @@ use section::{Chain, DiscSection, Section};
 
 /// A plane with coordinates (u, v): right-handed, u × v is the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct SlicePlane {
     /// The point of the plane nearest to the world origin, mm; the origin of (u, v).
     pub origin: Vec3,
     /// Unit vectors along u and v.
@@ -30,13 +30,13 @@ pub struct Plane {
     pub normal: Vec3,
 }
 
-impl Plane {
+impl SlicePlane {
     /// The plane through a point (mm). u is the projection of the x axis, or of the y axis if the normal is close to x:
     /// for planes of constant z, (u, v) are (x, y).
     ///
     /// # Errors
     /// A zero normal, and numbers that are not finite.
-    pub fn new(point: Vec3, normal: Vec3) -> Result<Plane, Fault> {
+    pub fn new(point: Vec3, normal: Vec3) -> Result<SlicePlane, Fault> {
         if !point.iter().all(|v| v.is_finite()) {
             return Err(Fault::new("point", format!("position must be three finite numbers (mm), found {point:?}")));
         }
@@ -50,7 +50,7 @@ impl Plane {
         let normal = scale(normal, 1.0 / length);
         let pole = if normal[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let u = unit(sub(pole, scale(normal, dot(pole, normal))));
-        Ok(Plane { origin: scale(normal, dot(point, normal)), axes: [u, cross(normal, u)], normal })
+        Ok(SlicePlane { origin: scale(normal, dot(point, normal)), axes: [u, cross(normal, u)], normal })
     }
 
     /// The position in space of (u, v), mm.
@@ -63,14 +63,14 @@ impl Plane {
         [dot(x, self.axes[0]), dot(x, self.axes[1])]
     }
 
-    pub(super) fn moved(&self, by: f64) -> Plane {
-        Plane { origin: add(self.origin, scale(self.normal, by)), ..*self }
+    pub(super) fn moved(&self, by: f64) -> SlicePlane {
+        SlicePlane { origin: add(self.origin, scale(self.normal, by)), ..*self }
     }
 }
 
 /// An arc of a slice: part of one conic.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Arc {
+pub struct ConicArc {
     /// Index of the hub.
     pub hub: u32,
     /// The active half-beams of the hub, as a bit mask.
@@ -88,11 +88,11 @@ pub struct Arc {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
     /// The plane, after displacement.
-    pub plane: Plane,
+    pub plane: SlicePlane,
     /// Displacement of the plane along its normal, mm: 0 unless the plane touches the surface without cutting it.
     pub moved: f64,
     /// Closed loops with the solid on their left; each arc starts where the one before it ends, to the last bit.
-    pub loops: Vec<Vec<Arc>>,
+    pub loops: Vec<Vec<ConicArc>>,
     /// Area of the solid, mm².
     pub area: f64,
     /// Number of hubs examined.
@@ -102,7 +102,7 @@ pub struct Slice {
 impl Slice {
     /// The loops as polygons within `chord` (mm) of them; the first point is not repeated.
     pub fn polygons(&self, chord: f64) -> Vec<Vec<[f64; 2]>> {
-        let polygon = |arcs: &Vec<Arc>| {
+        let polygon = |arcs: &Vec<ConicArc>| {
             let mut out = Vec::new();
             for c in arcs.iter().flat_map(|a| &a.curves) {
                 c.flatten(chord, &mut out);
@@ -114,7 +114,7 @@ impl Slice {
 }
 
 /// The signed area of a loop, relative to its first point, which preserves digits far from the origin.
-fn area(arcs: &[Arc]) -> f64 {
+fn area(arcs: &[ConicArc]) -> f64 {
     let Some(o) = arcs.first().and_then(|a| a.curves.first()).map(|c| c.points[0]) else {
         return 0.0;
     };
@@ -133,7 +133,7 @@ impl Quadors {
     ///
     /// # Errors
     /// Beams of these hubs that overlap too far for closed forms, and hubs of more than 64 beams.
-    pub fn slice(&self, plane: &Plane) -> Result<Slice, Fault> {
+    pub fn slice(&self, plane: &SlicePlane) -> Result<Slice, Fault> {
         let mut failed = 0;
         for fraction in DISPLACEMENTS {
             let by = fraction * self.scale;
@@ -172,7 +172,7 @@ impl Quadors {
     }
 
     /// The hubs whose bounds the plane reaches, sorted.
-    fn hubs_at(&self, plane: &Plane, level: f64) -> Vec<u32> {
+    fn hubs_at(&self, plane: &SlicePlane, level: f64) -> Vec<u32> {
         let reached = |b: &Aabb| {
             let half = scale(b.size(), 0.5);
             let reach = (0..3).map(|a| half[a] * plane.normal[a].abs()).sum::<f64>();
@@ -208,7 +208,7 @@ impl Quadors {
 
     /// The intersection of a plane and the end circle of a half-beam, relative to its hub; computed from the beam
     /// alone, so that both hubs agree.
-    fn disc_section(&self, hub: usize, half_beam: usize, plane: &Plane, level: f64) -> DiscSection {
+    fn disc_section(&self, hub: usize, half_beam: usize, plane: &SlicePlane, level: f64) -> DiscSection {
         let s = &self.hub(hub).half_beams[half_beam];
         let (p, ends) = (&self.pencils[s.beam as usize], self.ends[s.beam as usize]);
         let along = sub(self.balls[ends[1] as usize].center, self.balls[ends[0] as usize].center);
@@ -235,7 +235,7 @@ impl Quadors {
     }
 
     /// The intersection of a plane and a hub's part; `None` if it cannot be resolved.
-    fn section(&self, hub: usize, plane: &Plane, level: f64) -> Option<Vec<Chain>> {
+    fn section(&self, hub: usize, plane: &SlicePlane, level: f64) -> Option<Vec<Chain>> {
         let of = self.hub(hub);
         let disc_sections: Vec<DiscSection> =
             (0..of.half_beams.len()).map(|i| self.disc_section(hub, i, plane, level)).collect();
@@ -248,7 +248,12 @@ impl Quadors {
 }
 
 /// Joins the sections of hubs at their end circles; the error is the hub at which it fails.
-fn join(plane: &Plane, quadors: &Quadors, hubs: &[u32], cut: Vec<Vec<Chain>>) -> Result<Vec<Vec<Arc>>, usize> {
+fn join(
+    plane: &SlicePlane,
+    quadors: &Quadors,
+    hubs: &[u32],
+    cut: Vec<Vec<Chain>>,
+) -> Result<Vec<Vec<ConicArc>>, usize> {
     let half_beam = |h: usize, i: u32| {
         let s = &quadors.hub(hubs[h] as usize).half_beams[i as usize];
         (s.beam, s.end)
@@ -294,7 +299,7 @@ fn join(plane: &Plane, quadors: &Quadors, hubs: &[u32], cut: Vec<Vec<Chain>>) ->
 }
 
 /// Snaps the start of each curve to the end of the one before it; `None` if they differ by more than rounding.
-fn close(arcs: &mut [Arc], slack: f64) -> Option<()> {
+fn close(arcs: &mut [ConicArc], slack: f64) -> Option<()> {
     let mut before = arcs.last()?.curves.last()?.points[2];
     for c in arcs.iter_mut().flat_map(|a| &mut a.curves) {
         let gap = (c.points[0][0] - before[0]).hypot(c.points[0][1] - before[1]);

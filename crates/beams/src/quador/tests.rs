@@ -26,10 +26,10 @@ impl Random {
 
 /// A hub at the origin and one hub at the end of each beam.
 pub(super) fn star(radius: f64, ends: &[(Vec3, f64, f64)], profile: impl Fn(usize) -> Profile) -> Graph {
-    let mut hubs = vec![graph::Hub { center: [0.0; 3], radius }];
+    let mut hubs = vec![graph::HubBall { center: [0.0; 3], radius }];
     let mut beams = Vec::new();
     for (i, &(along, length, r)) in ends.iter().enumerate() {
-        hubs.push(graph::Hub { center: scale(along, length), radius: r });
+        hubs.push(graph::HubBall { center: scale(along, length), radius: r });
         beams.push(Beam { ends: [0, i as u32 + 1], profile: profile(i) });
     }
     Graph { hubs, beams }
@@ -201,7 +201,7 @@ pub(super) fn cubic(n: usize, jitter: f64) -> Graph {
         for y in 0..m {
             for x in 0..m {
                 let center = [x, y, z].map(|v| 10.0 * v as f64 + jitter * (random.next() - 0.5));
-                hubs.push(graph::Hub { center, radius: 1.0 + 0.2 * jitter * random.next() });
+                hubs.push(graph::HubBall { center, radius: 1.0 + 0.2 * jitter * random.next() });
                 for (e, to) in [(x, [x + 1, y, z]), (y, [x, y + 1, z]), (z, [x, y, z + 1])] {
                     if e < n {
                         beams.push(Beam { ends: [id(x, y, z), id(to[0], to[1], to[2])], profile: Profile::Cone });

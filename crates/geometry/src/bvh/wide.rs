@@ -18,14 +18,14 @@ const SLACK: f64 = 1e-5;
 
 /// A node: the boxes of its children, less the tree's origin, and their numbers.
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct WideNode {
     min: [[f32; WIDTH]; 3],
     max: [[f32; WIDTH]; 3],
     child: [u32; WIDTH],
 }
 
-const EMPTY: Node =
-    Node { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3], child: [NONE; WIDTH] };
+const EMPTY: WideNode =
+    WideNode { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3], child: [NONE; WIDTH] };
 
 /// A tree for nearest-item queries.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub struct WideBvh {
     origin: Vec3,
     /// By how much boxes are larger, mm.
     grown: f64,
-    nodes: Vec<Node>,
+    nodes: Vec<WideNode>,
 }
 
 impl WideBvh {
@@ -117,7 +117,7 @@ impl WideBvh {
     }
 
     /// The same below a node. Recursion is no deeper than the tree, which has fewer than a hundred levels.
-    fn below(&self, node: &Node, at: [f32; 3], limit: &mut f32, visit: &mut impl FnMut(usize) -> f64) {
+    fn below(&self, node: &WideNode, at: [f32; 3], limit: &mut f32, visit: &mut impl FnMut(usize) -> f64) {
         let squares = square_distances(node, at);
         // Numbers that are not negative are ordered as their bits are.
         let of = |i: usize| u64::from(squares[i].to_bits()) << 32 | u64::from(node.child[i]);
@@ -150,7 +150,7 @@ fn sorted([a, b, c, d]: [u64; WIDTH]) -> [u64; WIDTH] {
 
 /// Squared distances of a point from the boxes of a node. A function of its own, so that it becomes vector arithmetic.
 #[inline(never)]
-fn square_distances(node: &Node, p: [f32; 3]) -> [f32; WIDTH] {
+fn square_distances(node: &WideNode, p: [f32; 3]) -> [f32; WIDTH] {
     // One instruction, unlike `f32::max`.
     let larger = |a: f32, b: f32| if a > b { a } else { b };
     let along = |a: usize| -> [f32; WIDTH] {

@@ -17,7 +17,7 @@ const LOW: f64 = 1e-5;
 
 /// Outward normals (any length) of each triangle's edges and corners, in the tree's order.
 #[derive(Debug)]
-pub struct Normals {
+pub struct PseudoNormals {
     /// Whether each triangle's own normal is to be trusted; empty for all.
     faces: Vec<bool>,
     /// Empty where there are none to trust, and so are the corners.
@@ -25,9 +25,9 @@ pub struct Normals {
     corners: Vec<[Vec3; 3]>,
 }
 
-impl Normals {
+impl PseudoNormals {
     /// The normals of a closed mesh, whose half-edges `pairs` gives; `order` is that of the tree.
-    pub fn new(mesh: &Mesh, faces: &[Triangle], pairs: &Pairs, order: &[u32]) -> Normals {
+    pub fn new(mesh: &Mesh, faces: &[Triangle], pairs: &Pairs, order: &[u32]) -> PseudoNormals {
         let mut edges = vec![[[0.0; 3]; 3]; faces.len()];
         for [a, b] in pairs {
             let [a, b] = [*a as usize, *b as usize];
@@ -46,7 +46,7 @@ impl Normals {
             }
         }
         let of = |i: &u32| mesh.triangles[*i as usize].map(|v| corners[v as usize]);
-        Normals {
+        PseudoNormals {
             faces: Vec::new(),
             edges: order.iter().map(|i| edges[*i as usize]).collect(),
             corners: order.iter().map(of).collect(),
@@ -56,14 +56,14 @@ impl Normals {
     /// The normals of pieces that need not match: those of triangles that are not slivers, and none of edges and
     /// corners. Another piece may rest on those from the other side, so that the nearest point is on both; within a
     /// triangle only a line of places has such a point nearest.
-    pub fn of_pieces(faces: &[Triangle], order: &[u32]) -> Normals {
+    pub fn of_pieces(faces: &[Triangle], order: &[u32]) -> PseudoNormals {
         let sound = |i: &u32| {
             let [a, b, c] = faces[*i as usize].corners;
             let longest = [sub(b, a), sub(c, b), sub(a, c)].map(|e| dot(e, e));
             let longest = longest.into_iter().fold(0.0, f64::max);
             norm(cross(sub(b, a), sub(c, a))) > LOW * longest
         };
-        Normals { faces: order.iter().map(sound).collect(), edges: Vec::new(), corners: Vec::new() }
+        PseudoNormals { faces: order.iter().map(sound).collect(), edges: Vec::new(), corners: Vec::new() }
     }
 
     /// Outward normal (any length) at the nearest point; not numbers where there is none to trust.

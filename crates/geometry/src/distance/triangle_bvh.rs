@@ -2,7 +2,7 @@
 
 use super::disc::Disc;
 use super::triangle::{Feature, Triangle};
-use crate::bvh::{Bvh, Node, Split, WideBvh};
+use crate::bvh::{Bvh, BvhNode, Split, WideBvh};
 use crate::math::{Aabb, Vec3, norm, sub};
 
 /// The nearest point of a mesh.
@@ -56,7 +56,7 @@ impl TriangleBvh {
     }
 
     /// The nodes, each before its children.
-    pub fn nodes(&self) -> &[Node] {
+    pub fn nodes(&self) -> &[BvhNode] {
         self.bvh.nodes()
     }
 

@@ -201,7 +201,7 @@ impl Lanes {
 
 /// Sets of triangles side by side.
 #[derive(Clone, Debug)]
-struct Node {
+struct MultipoleNode {
     /// Their middles.
     center: [[f64; WIDE]; 3],
     /// One over their radii.
@@ -215,7 +215,7 @@ struct Node {
     used: usize,
 }
 
-impl Node {
+impl MultipoleNode {
     /// Squared distances of the middles in radii, and the expansions' values there:
     /// K·∫n + ∂K:∫xn + ½ ∂∂K:∫xxn with K = r/(4π|r|³), r = middle − point.
     ///
@@ -244,7 +244,7 @@ impl Node {
 /// The moments of sets of oriented triangles, in a tree with eight children a node.
 #[derive(Debug)]
 pub struct Winding {
-    nodes: Vec<Node>,
+    nodes: Vec<MultipoleNode>,
 }
 
 impl Winding {
@@ -263,7 +263,7 @@ impl Winding {
             nodes.par_iter().zip(&range).map(|(n, r)| Moments::of(&tree.triangles()[r.clone()], &n.bounds)).collect();
         // The sets of each node, by their numbers in the tree; those that are parted have a node of their own.
         let mut sets: Vec<Vec<usize>> = vec![vec![0]];
-        let mut out: Vec<Node> = Vec::new();
+        let mut out: Vec<MultipoleNode> = Vec::new();
         while let Some(all) = sets.get(out.len()) {
             let mut all = all.clone();
             // The largest is parted first, so that sets side by side are about as large.
@@ -278,7 +278,7 @@ impl Winding {
                 all[k] = first;
                 all.push(second);
             }
-            let mut node = Node {
+            let mut node = MultipoleNode {
                 center: [[0.0; WIDE]; 3],
                 per: [0.0; WIDE],
                 terms: [Lanes([0.0; WIDE]); TERMS],

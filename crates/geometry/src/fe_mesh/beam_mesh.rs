@@ -21,7 +21,7 @@ pub struct BeamMesh {
 
 /// Elements with one section.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Section {
+pub struct BeamSection {
     /// Radius, mm, to five digits: areas are right to 10⁻⁴.
     pub radius: f64,
     /// A direction that none of the elements has: no angle to it is below 30 degrees.
@@ -61,9 +61,9 @@ impl BeamMesh {
     }
 
     /// The sections, in the order of their first elements.
-    pub fn sections(&self) -> Vec<Section> {
+    pub fn sections(&self) -> Vec<BeamSection> {
         let mut number = rustc_hash::FxHashMap::default();
-        let mut sections: Vec<Section> = Vec::new();
+        let mut sections: Vec<BeamSection> = Vec::new();
         for (i, radius) in self.radii.iter().enumerate() {
             let radius: f64 = format!("{radius:.4e}").parse().unwrap_or(*radius);
             // Of z and x the one farther from the beam's direction.
@@ -71,7 +71,7 @@ impl BeamMesh {
             let is_upright = along[2].abs() > along[0].abs();
             let at = *number.entry((radius.to_bits(), is_upright)).or_insert_with(|| {
                 let across = if is_upright { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
-                sections.push(Section { radius, across, elements: Vec::new() });
+                sections.push(BeamSection { radius, across, elements: Vec::new() });
                 sections.len() - 1
             });
             sections[at].elements.push(i as u32);

@@ -20,12 +20,12 @@ pub struct PolyFaces {
     /// The tetrahedron on the other side of each internal face.
     pub neighbour: Vec<u32>,
     /// What boundary faces make up, in their order.
-    pub patches: Vec<Patch>,
+    pub patches: Vec<BoundaryPatch>,
 }
 
 /// A patch of boundary faces.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Patch {
+pub struct BoundaryPatch {
     /// Its name: that of a set.
     pub name: String,
     /// The number of its first face.
@@ -106,7 +106,7 @@ impl FeMesh {
                 .collect();
             // Stable: others stay in the order of tetrahedra.
             faces.sort_by_key(|f| f.0);
-            made.patches.push(Patch { name, start: made.faces.len(), count: faces.len(), cyclic });
+            made.patches.push(BoundaryPatch { name, start: made.faces.len(), count: faces.len(), cyclic });
             made.faces.extend(faces.iter().map(|f| f.1));
             made.owner.extend(faces.iter().map(|f| f.2));
         }

@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use rustc_hash::FxHashMap;
 
 use super::elements::Elements;
-use super::text::{Lines, shown};
-use super::vtk::{Array, Data, Shape, fault};
+use super::text::{NumberedLines, shown};
+use super::vtk::{Data, DataArray, DataSet, fault};
 use crate::fault::{Fault, counted};
 
 /// Most components of a result.
@@ -22,8 +22,8 @@ const COMPONENTS: usize = 64;
 /// **Errors**: binary files; lines that are not as the format says (with their numbers); a result that is missing at a node of an
 /// element.
 pub(super) fn read(bytes: &[u8], name: &str) -> Result<Data, Fault> {
-    let mut file = File { name, ..File::default() };
-    let mut lines = Lines::new(bytes);
+    let mut file = FrdFile { name, ..FrdFile::default() };
+    let mut lines = NumberedLines::new(bytes);
     while let Some((number, line)) = lines.next() {
         let at = |f: Fault| fault(format!("line {number}: {}", f.message));
         match field(line, 0, 6) {
@@ -73,20 +73,20 @@ fn number(line: &[u8], from: usize, at: usize) -> Result<f64, Fault> {
 }
 
 #[derive(Default)]
-struct File<'a> {
+struct FrdFile<'a> {
     /// The array that is wanted.
     name: &'a str,
     elements: Elements,
     /// Index of each node by its number.
     index: FxHashMap<u32, u32>,
     /// The arrays of all steps, without numbers.
-    arrays: Vec<(u32, Array)>,
+    arrays: Vec<(u32, DataArray)>,
     /// The array that is wanted, of the last step that has it.
-    found: Option<Array>,
+    found: Option<DataArray>,
 }
 
-impl File<'_> {
-    fn nodes(&mut self, lines: &mut Lines, wide: bool) -> Result<(), Fault> {
+impl FrdFile<'_> {
+    fn nodes(&mut self, lines: &mut NumberedLines, wide: bool) -> Result<(), Fault> {
         let digits = if wide { 10 } else { 5 };
         for (at, line) in lines.take_while(|(_, l)| field(l, 0, 3) != b"-3") {
             let node = self.named(line, digits, at)?;
@@ -100,7 +100,7 @@ impl File<'_> {
         Ok(())
     }
 
-    fn elements(&mut self, lines: &mut Lines, wide: bool) -> Result<(), Fault> {
+    fn elements(&mut self, lines: &mut NumberedLines, wide: bool) -> Result<(), Fault> {
         let digits = if wide { 10 } else { 5 };
         let (mut corners, mut left) = (&[][..], 0);
         for (at, line) in lines.take_while(|(_, l)| field(l, 0, 3) != b"-3") {
@@ -143,9 +143,9 @@ impl File<'_> {
         whole(text).ok_or_else(|| fault(format!("line {at}: the number of a node was expected, found {}", shown(text))))
     }
 
-    fn result(&mut self, lines: &mut Lines, wide: bool, step: u32) -> Result<(), Fault> {
+    fn result(&mut self, lines: &mut NumberedLines, wide: bool, step: u32) -> Result<(), Fault> {
         let digits = if wide { 10 } else { 5 };
-        let mut array = Array { name: String::new(), of_cells: false, components: 0, values: Vec::new() };
+        let mut array = DataArray { name: String::new(), of_cells: false, components: 0, values: Vec::new() };
         let (mut node, mut component) = (None, 0);
         for (at, line) in lines.take_while(|(_, l)| field(l, 0, 3) != b"-3") {
             match field(line, 0, 3) {
@@ -180,7 +180,7 @@ impl File<'_> {
                 }
             }
         }
-        self.arrays.push((step, Array { values: Vec::new(), ..array.clone() }));
+        self.arrays.push((step, DataArray { values: Vec::new(), ..array.clone() }));
         if self.wants(&array.name, step) {
             self.found = Some(array);
         }
@@ -194,7 +194,7 @@ impl File<'_> {
     }
 
     /// Refuses an array that has no numbers at a node of an element; other nodes get zero.
-    fn complete(&self, array: &mut Array) -> Result<(), Fault> {
+    fn complete(&self, array: &mut DataArray) -> Result<(), Fault> {
         // Another length comes of a block without a line of numbers, and of nodes that follow a result.
         if array.values.len() != array.components * self.elements.points.len() {
             let nodes = counted(self.elements.points.len(), "node");
@@ -222,10 +222,10 @@ impl File<'_> {
 
     fn finish(mut self) -> Result<Data, Fault> {
         let steps = self.arrays.iter().map(|a| a.0).collect::<BTreeSet<u32>>();
-        let mut arrays: Vec<Array> = Vec::new();
+        let mut arrays: Vec<DataArray> = Vec::new();
         for (step, array) in core::mem::take(&mut self.arrays) {
             if steps.len() > 1 {
-                arrays.push(Array { name: format!("{}@{step}", array.name), ..array.clone() });
+                arrays.push(DataArray { name: format!("{}@{step}", array.name), ..array.clone() });
             }
             // The last step has the plain name.
             arrays.retain(|a| a.name != array.name);
@@ -234,10 +234,10 @@ impl File<'_> {
         if let Some(mut found) = self.found.take() {
             self.complete(&mut found)?;
             arrays.retain(|a| a.name != self.name);
-            arrays.push(Array { name: self.name.to_string(), ..found });
+            arrays.push(DataArray { name: self.name.to_string(), ..found });
         }
         self.elements.check()?;
-        Ok(Data { shape: Shape::Mesh(self.elements), arrays })
+        Ok(Data { shape: DataSet::Mesh(self.elements), arrays })
     }
 }
 
@@ -319,7 +319,7 @@ mod tests {
             let text = file(wide);
             for (name, step) in [("STRESS", 2), ("STRESS@1", 1), ("STRESS@2", 2)] {
                 let data = read(text.as_bytes(), name).expect("file");
-                let Shape::Mesh(elements) = &data.shape else { panic!("a mesh") };
+                let DataSet::Mesh(elements) = &data.shape else { panic!("a mesh") };
                 assert_eq!((elements.points.len(), &elements.kinds[..]), (14, &[12, 12, 13][..]));
                 let array = data.arrays.iter().find(|a| a.name == name).expect(name);
                 assert_eq!(array.components, 6);

@@ -39,7 +39,7 @@ pub struct BeamGraph {
 /// Reads a graph from the bytes of a file.
 type Read = fn(&[u8]) -> Result<BeamGraph, Fault>;
 /// Writes a graph to a file.
-type Write = fn(&BeamGraph, &mut dyn io::Write) -> io::Result<()>;
+type WriteGraph = fn(&BeamGraph, &mut dyn io::Write) -> io::Result<()>;
 
 /// A format of graphs. A new one is a file in this folder and a row in [`GRAPH_FORMATS`].
 pub struct GraphFormat {
@@ -48,14 +48,14 @@ pub struct GraphFormat {
     /// What it is.
     pub title: &'static str,
     read: Option<Read>,
-    write: Option<Write>,
+    write: Option<WriteGraph>,
     /// What of a graph is lost in it.
-    pub lost: Lost,
+    pub lost: GraphLoss,
 }
 
 /// What of a graph is lost in a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lost {
+pub enum GraphLoss {
     /// Nothing.
     Nothing,
     /// All radii.
@@ -73,77 +73,77 @@ pub const GRAPH_FORMATS: &[GraphFormat] = &[
         title: "3MF beam lattice",
         read: Some(threemf::read_beam_lattice),
         write: None,
-        lost: Lost::Nothing,
+        lost: GraphLoss::Nothing,
     },
     GraphFormat {
         suffix: "ltcx",
         title: "lattice graph of nTopology",
         read: Some(ltcx::read),
         write: Some(ltcx::write),
-        lost: Lost::Beams,
+        lost: GraphLoss::Beams,
     },
     GraphFormat {
         suffix: "csv",
         title: "table of end points and radii",
         read: Some(text_graphs::read_table),
         write: Some(text_graphs::write_table),
-        lost: Lost::Balls,
+        lost: GraphLoss::Balls,
     },
     GraphFormat {
         suffix: "json",
         title: "nodes and beams",
         read: Some(json_graph::read),
         write: Some(json_graph::write),
-        lost: Lost::Nothing,
+        lost: GraphLoss::Nothing,
     },
     GraphFormat {
         suffix: "obj",
         title: "lines of Wavefront OBJ",
         read: Some(line_graphs::read_obj),
         write: Some(line_graphs::write_obj),
-        lost: Lost::Radii,
+        lost: GraphLoss::Radii,
     },
     GraphFormat {
         suffix: "vtu",
         title: "lines of VTK",
         read: Some(line_graphs::read_vtk_lines),
         write: Some(line_graphs::write_vtu_lines),
-        lost: Lost::Nothing,
+        lost: GraphLoss::Nothing,
     },
     GraphFormat {
         suffix: "vtk",
         title: "lines of VTK, legacy",
         read: Some(line_graphs::read_vtk_lines),
         write: None,
-        lost: Lost::Nothing,
+        lost: GraphLoss::Nothing,
     },
     GraphFormat {
         suffix: "inp",
         title: "Abaqus B31 with circular sections",
         read: Some(abaqus_beams::read),
         write: Some(abaqus_beams::write),
-        lost: Lost::Balls,
+        lost: GraphLoss::Balls,
     },
     GraphFormat {
         suffix: "bdf",
         title: "Nastran CBAR with rods as sections",
         read: Some(nastran_beams::read),
         write: Some(nastran_beams::write),
-        lost: Lost::Balls,
+        lost: GraphLoss::Balls,
     },
     GraphFormat {
         suffix: "nas",
         title: "Nastran CBAR",
         read: Some(nastran_beams::read),
         write: None,
-        lost: Lost::Balls,
+        lost: GraphLoss::Balls,
     },
     GraphFormat {
         suffix: "txt",
         title: "GRID and STRUT rows",
         read: Some(text_graphs::read_grid),
         write: None,
-        lost: Lost::Balls,
+        lost: GraphLoss::Balls,
     },
 ];
 
@@ -338,16 +338,16 @@ mod tests {
             assert_eq!((&back.beams, back.nodes.len()), (&graph.beams, 3), "{}", format.suffix);
             let constant = matches!(format.suffix, "inp" | "bdf");
             match format.lost {
-                Lost::Nothing => assert_eq!((&back.radii, &back.beam_radii), (&graph.radii, &graph.beam_radii)),
-                Lost::Radii => assert!(back.radii.is_empty() && back.beam_radii.is_empty()),
-                Lost::Beams => assert!(back.radii == graph.radii && back.beam_radii.is_empty()),
-                Lost::Balls if constant => {
+                GraphLoss::Nothing => assert_eq!((&back.radii, &back.beam_radii), (&graph.radii, &graph.beam_radii)),
+                GraphLoss::Radii => assert!(back.radii.is_empty() && back.beam_radii.is_empty()),
+                GraphLoss::Beams => assert!(back.radii == graph.radii && back.beam_radii.is_empty()),
+                GraphLoss::Balls if constant => {
                     let mean = graph.beam_radii.iter().map(|[a, b]| [0.5 * (a + b); 2]).collect::<Vec<_>>();
                     for (a, b) in back.beam_radii.iter().flatten().zip(mean.iter().flatten()) {
                         assert!((a - b).abs() <= exact * b, "{}: {a} {b}", format.suffix);
                     }
                 }
-                Lost::Balls => assert!(back.beam_radii == graph.beam_radii && back.radii.is_empty()),
+                GraphLoss::Balls => assert!(back.beam_radii == graph.beam_radii && back.radii.is_empty()),
             }
         }
     }

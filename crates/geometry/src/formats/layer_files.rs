@@ -4,7 +4,7 @@
 
 use std::io::{self, Seek, Write};
 
-use super::threemf::Piece;
+use super::threemf::DeflatedChunk;
 use super::{ByteSpool, invalid};
 use crate::layer::{Layer, Point};
 use crate::math::Aabb;
@@ -17,7 +17,7 @@ mod slice_stack;
 mod svg_layers;
 mod tiff_pages;
 
-pub use coverage::Raster;
+pub use coverage::PixelGrid;
 
 /// What a file of layers is about.
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ pub struct Stack {
     /// Whether a format that has both is written as bytes rather than as text.
     pub binary: bool,
     /// The pixels of pictures.
-    pub raster: Option<Raster>,
+    pub raster: Option<PixelGrid>,
     /// Exposure of a layer and of the first ones, s, where a format says it.
     pub exposure: [f64; 2],
 }
@@ -51,7 +51,7 @@ impl Stack {
         format!("{layer:.11e}").parse().unwrap_or(layer)
     }
 
-    fn raster(&self) -> io::Result<&Raster> {
+    fn raster(&self) -> io::Result<&PixelGrid> {
         self.raster.as_ref().ok_or_else(|| invalid("pictures need the size of a pixel".into()))
     }
 }
@@ -61,7 +61,7 @@ pub enum Encoded {
     /// Bytes of the file.
     Bytes(Vec<u8>),
     /// A deflated piece of a part of an archive.
-    Deflated(Piece),
+    Deflated(DeflatedChunk),
 }
 
 impl Encoded {
@@ -80,7 +80,7 @@ impl Encoded {
     pub fn of_parts(bytes: Vec<u8>, about: Option<[u64; 2]>) -> Encoded {
         match about {
             None => Encoded::Bytes(bytes),
-            Some(about) => Encoded::Deflated(Piece::of_parts(bytes, about)),
+            Some(about) => Encoded::Deflated(DeflatedChunk::of_parts(bytes, about)),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use super::join::Joiner;
 use super::number::push_u32;
-use super::text::{Lines, at_line, parse, position, shown, words};
+use super::text::{NumberedLines, at_line, parse, position, shown, words};
 use super::{Indexed, Metadata, in_order, invalid};
 use crate::fault::Fault;
 use crate::mesh::Mesh;
@@ -51,7 +51,7 @@ pub fn write(mesh: &dyn Indexed, meta: &Metadata, out: &mut dyn Write) -> io::Re
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut vertices = Vec::new();
     let mut unknown = None;
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let mut w = words(text);
         match w.next() {
             Some(b"v") => vertices.push(position(line, w)?),
@@ -66,7 +66,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     }
     let mut joiner = Joiner::default();
     let (mut so_far, mut polygon) = (0i64, Vec::new());
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let mut w = words(text);
         match w.next() {
             Some(b"v") => so_far += 1,

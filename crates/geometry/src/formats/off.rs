@@ -3,13 +3,13 @@
 //! Source: Geomview manual, OFF files.
 
 use super::join::Joiner;
-use super::text::{Lines, at_line, parse, position, shown, words};
+use super::text::{NumberedLines, at_line, parse, position, shown, words};
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
 /// Reads text OFF with or without normals, colours and texture coordinates (NOFF, COFF, STOFF), which are dropped.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let mut lines = Lines::new(bytes)
+    let mut lines = NumberedLines::new(bytes)
         .map(|(n, l)| (n, l.split(|b| *b == b'#').next().unwrap_or_default()))
         .filter(|(_, l)| words(l).next().is_some());
     let Some((mut line, mut text)) = lines.next() else {

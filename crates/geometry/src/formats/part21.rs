@@ -153,7 +153,7 @@ struct Shared {
 
 /// The shape of a product.
 #[derive(Clone, Copy)]
-pub struct Shape {
+pub struct ProductShape {
     definition: Id,
     representation: Id,
 }
@@ -184,13 +184,13 @@ impl Product {
     }
 
     /// Writes what follows the solids.
-    pub fn finish(&self, file: &mut Part21, solids: &[Id]) -> io::Result<Shape> {
+    pub fn finish(&self, file: &mut Part21, solids: &[Id]) -> io::Result<ProductShape> {
         let items = list([self.shared.placement].iter().chain(solids));
         self.shape(file, "ADVANCED_BREP_SHAPE_REPRESENTATION", &items)
     }
 
     /// Makes it an assembly of others, each with its positions, mm.
-    pub fn assemble(&self, file: &mut Part21, parts: &[(Shape, Vec<Vec3>)]) -> io::Result<Shape> {
+    pub fn assemble(&self, file: &mut Part21, parts: &[(ProductShape, Vec<Vec3>)]) -> io::Result<ProductShape> {
         let mut placements = Vec::new();
         for at in parts.iter().flat_map(|(_, positions)| positions) {
             placements.push(placement(file, *at)?);
@@ -214,10 +214,10 @@ impl Product {
         Ok(whole)
     }
 
-    fn shape(&self, file: &mut Part21, kind: &str, items: &str) -> io::Result<Shape> {
+    fn shape(&self, file: &mut Part21, kind: &str, items: &str) -> io::Result<ProductShape> {
         let representation = file.entity(&format!("{kind}('',{items},{})", self.context))?;
         file.entity(&format!("SHAPE_DEFINITION_REPRESENTATION({},{representation})", self.shape))?;
-        Ok(Shape { definition: self.definition, representation })
+        Ok(ProductShape { definition: self.definition, representation })
     }
 }
 

@@ -47,7 +47,7 @@ enum Encoding {
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum PropertyType {
     I8,
     U8,
     I16,
@@ -58,27 +58,27 @@ enum Kind {
     F64,
 }
 
-impl Kind {
-    fn named(word: &[u8]) -> Option<Kind> {
+impl PropertyType {
+    fn named(word: &[u8]) -> Option<PropertyType> {
         Some(match word {
-            b"char" | b"int8" => Kind::I8,
-            b"uchar" | b"uint8" => Kind::U8,
-            b"short" | b"int16" => Kind::I16,
-            b"ushort" | b"uint16" => Kind::U16,
-            b"int" | b"int32" => Kind::I32,
-            b"uint" | b"uint32" => Kind::U32,
-            b"float" | b"float32" => Kind::F32,
-            b"double" | b"float64" => Kind::F64,
+            b"char" | b"int8" => PropertyType::I8,
+            b"uchar" | b"uint8" => PropertyType::U8,
+            b"short" | b"int16" => PropertyType::I16,
+            b"ushort" | b"uint16" => PropertyType::U16,
+            b"int" | b"int32" => PropertyType::I32,
+            b"uint" | b"uint32" => PropertyType::U32,
+            b"float" | b"float32" => PropertyType::F32,
+            b"double" | b"float64" => PropertyType::F64,
             _ => return None,
         })
     }
 
     fn size(self) -> usize {
         match self {
-            Kind::I8 | Kind::U8 => 1,
-            Kind::I16 | Kind::U16 => 2,
-            Kind::I32 | Kind::U32 | Kind::F32 => 4,
-            Kind::F64 => 8,
+            PropertyType::I8 | PropertyType::U8 => 1,
+            PropertyType::I16 | PropertyType::U16 => 2,
+            PropertyType::I32 | PropertyType::U32 | PropertyType::F32 => 4,
+            PropertyType::F64 => 8,
         }
     }
 }
@@ -86,8 +86,8 @@ impl Kind {
 struct Property {
     name: Vec<u8>,
     /// Type of the length that precedes a list.
-    list: Option<Kind>,
-    kind: Kind,
+    list: Option<PropertyType>,
+    kind: PropertyType,
 }
 
 struct Element {
@@ -115,7 +115,8 @@ fn header(bytes: &[u8]) -> Result<(Header, usize), Fault> {
         let all: Vec<&[u8]> = words(text).collect();
         let wrong = || at_line(line, format!("{} is not a line of a PLY header", shown(text)));
         let count = |w| parse::<usize>(w).ok_or_else(wrong);
-        let kind = |w| Kind::named(w).ok_or_else(|| at_line(line, format!("unknown property type {}", shown(w))));
+        let kind =
+            |w| PropertyType::named(w).ok_or_else(|| at_line(line, format!("unknown property type {}", shown(w))));
         match all.as_slice() {
             [b"ply"] if line == 1 => {}
             _ if line == 1 => break,
@@ -160,7 +161,7 @@ struct Numbers<'a> {
 }
 
 impl Numbers<'_> {
-    fn next(&mut self, kind: Kind, what: &dyn Fn() -> String) -> Result<f64, Fault> {
+    fn next(&mut self, kind: PropertyType, what: &dyn Fn() -> String) -> Result<f64, Fault> {
         let cut = |at: usize| Fault::new("", format!("the file ends at byte {at}, within {}", what()));
         if self.encoding == Encoding::Text {
             let rest = &self.bytes[self.at..];
@@ -182,19 +183,19 @@ impl Numbers<'_> {
         }
         let [b0, b1, b2, b3, ..] = b;
         Ok(match kind {
-            Kind::I8 => f64::from(b0 as i8),
-            Kind::U8 => f64::from(b0),
-            Kind::I16 => f64::from(i16::from_le_bytes([b0, b1])),
-            Kind::U16 => f64::from(u16::from_le_bytes([b0, b1])),
-            Kind::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
-            Kind::U32 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
-            Kind::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
-            Kind::F64 => f64::from_le_bytes(b),
+            PropertyType::I8 => f64::from(b0 as i8),
+            PropertyType::U8 => f64::from(b0),
+            PropertyType::I16 => f64::from(i16::from_le_bytes([b0, b1])),
+            PropertyType::U16 => f64::from(u16::from_le_bytes([b0, b1])),
+            PropertyType::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
+            PropertyType::U32 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
+            PropertyType::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
+            PropertyType::F64 => f64::from_le_bytes(b),
         })
     }
 
     /// A whole number from zero on, such as a list's length or an index.
-    fn whole(&mut self, kind: Kind, what: &dyn Fn() -> String) -> Result<usize, Fault> {
+    fn whole(&mut self, kind: PropertyType, what: &dyn Fn() -> String) -> Result<usize, Fault> {
         let v = self.next(kind, what)?;
         if v >= 0.0 && v.fract() == 0.0 && v <= f64::from(u32::MAX) {
             Ok(v as usize)
@@ -316,7 +317,7 @@ impl Parts {
         &mut self,
         role: Role,
         n: usize,
-        kind: Kind,
+        kind: PropertyType,
         numbers: &mut Numbers,
         what: &dyn Fn() -> String,
     ) -> Result<(), Fault> {

@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 
 use super::join::Joiner;
-use super::text::{Lines, at_line, position, shown, words};
+use super::text::{NumberedLines, at_line, position, shown, words};
 use super::{in_order, invalid};
 use crate::fault::Fault;
 use crate::math::Vec3;
@@ -127,7 +127,7 @@ fn ascii(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut corners = Vec::new();
     let mut facet = false;
     let mut last = 0;
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         last = line;
         let mut rest = words(text).peekable();
         while let Some(word) = rest.next() {

@@ -3,19 +3,19 @@
 use crate::fault::Fault;
 
 /// The lines of a file, numbered from one. A backslash at a line's end joins the next line to it.
-pub struct Lines<'a> {
+pub struct NumberedLines<'a> {
     rest: &'a [u8],
     line: usize,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> NumberedLines<'a> {
     /// The lines of `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Lines { rest: bytes, line: 0 }
+        NumberedLines { rest: bytes, line: 0 }
     }
 }
 
-impl<'a> Iterator for Lines<'a> {
+impl<'a> Iterator for NumberedLines<'a> {
     type Item = (usize, &'a [u8]);
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn lines_end_in_any_of_the_three_ways_and_join_by_backslash() {
         let got: Vec<_> =
-            Lines::new(b"a\r\nb\rc\n\nd \\\n e\nf").map(|(n, l)| (n, words(l).count(), l.len())).collect();
+            NumberedLines::new(b"a\r\nb\rc\n\nd \\\n e\nf").map(|(n, l)| (n, words(l).count(), l.len())).collect();
         assert_eq!(got, [(1, 1, 1), (2, 1, 1), (3, 1, 1), (4, 0, 0), (5, 2, 6), (7, 1, 1)]);
     }
 

@@ -18,8 +18,8 @@ mod placed_beams;
 mod read;
 
 pub use beam_lattice::{BeamLattice, Cap, CompanionMeshes, Frustum, write_beam_lattice};
+pub use package::DeflatedChunk;
 use package::Entry;
-pub use package::Piece;
 pub use placed_beams::read_beam_lattice;
 pub use read::{object_names, read, read_object};
 
@@ -55,30 +55,30 @@ pub fn write_objects(
     if objects.iter().any(|o| o.1.counts().iter().any(|n| *n >= i32::MAX as usize)) {
         return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
-    let mut model = Model::new(aside);
-    let mut head = Model::head(" xmlns:trabecula=\"urn:trabecula:design\"");
+    let mut model = ModelWriter::new(aside);
+    let mut head = ModelWriter::head(" xmlns:trabecula=\"urn:trabecula:design\"");
     head.push_str(&meta.elements());
     head.push_str("<resources>\n");
     let mut tail = String::from("</resources>\n<build>\n");
     for (id, (name, mesh)) in (1..).zip(objects) {
         let name = if name.is_empty() { String::new() } else { format!(" name=\"{}\"", quoted(name)) };
         head.push_str(&format!("<object id=\"{id}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n"));
-        model.push(Piece::of(head.as_bytes()))?;
+        model.push(DeflatedChunk::of(head.as_bytes()))?;
         push_mesh(&mut model, *mesh)?;
         head = "</triangles>\n</mesh>\n</object>\n".into();
         tail.push_str(&format!("<item objectid=\"{id}\"/>\n"));
     }
-    model.push(Piece::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()))?;
+    model.push(DeflatedChunk::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()))?;
     model.finish(out)
 }
 
 /// The model of a package, made piece by piece.
-pub struct Model<'a>(Entry<'a>);
+pub struct ModelWriter<'a>(Entry<'a>);
 
-impl<'a> Model<'a> {
+impl<'a> ModelWriter<'a> {
     /// An empty model, whose pieces are put aside.
-    pub fn new(aside: &'a mut dyn ByteSpool) -> Model<'a> {
-        Model(Entry::new(MODEL, aside))
+    pub fn new(aside: &'a mut dyn ByteSpool) -> ModelWriter<'a> {
+        ModelWriter(Entry::new(MODEL, aside))
     }
 
     /// How its text begins, with more attributes of the model.
@@ -89,7 +89,7 @@ impl<'a> Model<'a> {
     }
 
     /// Adds a piece of its text.
-    pub fn push(&mut self, piece: Piece) -> io::Result<()> {
+    pub fn push(&mut self, piece: DeflatedChunk) -> io::Result<()> {
         self.0.push(piece)
     }
 
@@ -97,9 +97,9 @@ impl<'a> Model<'a> {
     pub fn finish(mut self, out: &mut (impl Write + ?Sized)) -> io::Result<()> {
         let (mut first, mut second) = (Vec::new(), Vec::new());
         let mut types = Entry::new("[Content_Types].xml", &mut first);
-        types.push(Piece::of(TYPES.as_bytes()))?;
+        types.push(DeflatedChunk::of(TYPES.as_bytes()))?;
         let mut relations = Entry::new("_rels/.rels", &mut second);
-        relations.push(Piece::of(RELATIONS.as_bytes()))?;
+        relations.push(DeflatedChunk::of(RELATIONS.as_bytes()))?;
         package::write(&mut [types, relations, self.0.lent()], package::LIMIT, &mut &mut *out)
     }
 }
@@ -120,7 +120,7 @@ fn quoted(text: &str) -> String {
 
 /// Adds rows of vertices.
 fn push_vertices<'a>(
-    model: &mut Model,
+    model: &mut ModelWriter,
     count: usize,
     positions: impl Fn(std::ops::Range<usize>) -> io::Result<std::borrow::Cow<'a, [Vec3]>> + Sync,
 ) -> io::Result<()> {
@@ -136,17 +136,17 @@ fn push_vertices<'a>(
             push_f32(&mut text, z);
             text.extend_from_slice(b"\"/>\n");
         }
-        Ok(Piece::of(&text))
+        Ok(DeflatedChunk::of(&text))
     };
     in_order(count, 1 << 14, rows, |piece| model.push(piece))
 }
 
 /// Adds the vertices and triangles of a mesh.
-fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
+fn push_mesh(model: &mut ModelWriter, mesh: &dyn Indexed) -> io::Result<()> {
     let [vertices, triangles] = mesh.counts();
     push_vertices(model, vertices, |r| mesh.positions(r))?;
     let mut put = |piece| model.push(piece);
-    put(Piece::of(b"</vertices>\n<triangles>\n"))?;
+    put(DeflatedChunk::of(b"</vertices>\n<triangles>\n"))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 56);
         for [a, b, c] in mesh.corners(r)?.iter() {
@@ -158,7 +158,7 @@ fn push_mesh(model: &mut Model, mesh: &dyn Indexed) -> io::Result<()> {
             push_u32(&mut text, *c);
             text.extend_from_slice(b"\"/>\n");
         }
-        Ok(Piece::of(&text))
+        Ok(DeflatedChunk::of(&text))
     };
     in_order(triangles, 1 << 14, faces, &mut put)
 }

@@ -21,7 +21,7 @@ use image::{ALONG, Axis, Image, along};
 
 /// A named array with a fixed count of numbers for each point or cell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Array {
+pub struct DataArray {
     /// Its name.
     pub name: String,
     /// Whether it belongs to cells rather than points.
@@ -34,7 +34,7 @@ pub struct Array {
 
 /// Where arrays are given.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
+pub enum DataSet {
     /// Nodes of a grid along the axes, x fastest.
     Image {
         /// The first node, mm.
@@ -52,9 +52,9 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Data {
     /// Where.
-    pub shape: Shape,
+    pub shape: DataSet,
     /// What.
-    pub arrays: Vec<Array>,
+    pub arrays: Vec<DataArray>,
 }
 
 impl Data {
@@ -62,11 +62,11 @@ impl Data {
     /// pass.
     pub fn check(&self) -> Result<(), Fault> {
         let (points, cells) = match &self.shape {
-            Shape::Mesh(elements) => {
+            DataSet::Mesh(elements) => {
                 elements.check()?;
                 (elements.points.len(), elements.kinds.len())
             }
-            Shape::Image { nodes, .. } => {
+            DataSet::Image { nodes, .. } => {
                 let product = |n: [usize; 3]| n.into_iter().fold(1, usize::saturating_mul);
                 (product(*nodes), product(nodes.map(|n| n.saturating_sub(1).max(1))))
             }
@@ -121,7 +121,7 @@ fn find(bytes: &[u8], what: &[u8]) -> Option<usize> {
 }
 
 /// What the elements before the appended data say.
-struct File<'a> {
+struct XmlVtkFile<'a> {
     layout: Layout<'a>,
     kind: String,
     extent: Option<[i64; 6]>,
@@ -136,7 +136,7 @@ struct File<'a> {
 }
 
 fn xml(bytes: &[u8]) -> Result<Data, Fault> {
-    let file = File::read(bytes)?;
+    let file = XmlVtkFile::read(bytes)?;
     if file.kind.is_empty() {
         return Err(fault("no VTK file: it begins neither with \"# vtk\" nor has an element VTKFile"));
     }
@@ -151,7 +151,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
             ("Cells", "connectivity") => drop(grid.insert("connectivity", values)),
             ("Cells", "offsets") => drop(grid.insert("offsets", values)),
             ("Cells", "types") => drop(grid.insert("cell types", values)),
-            ("PointData" | "CellData", _) => arrays.push(Array {
+            ("PointData" | "CellData", _) => arrays.push(DataArray {
                 name: r.name.clone(),
                 of_cells: r.section == "CellData",
                 components: r.components.max(1),
@@ -188,12 +188,12 @@ fn three(tag: &BytesStart, name: &str) -> Result<Option<Vec3>, Fault> {
     v.try_into().map(Some).map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
 }
 
-impl<'a> File<'a> {
-    fn read(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
+impl<'a> XmlVtkFile<'a> {
+    fn read(bytes: &'a [u8]) -> Result<XmlVtkFile<'a>, Fault> {
         let start = find(bytes, b"<AppendedData");
         // What comes after may be raw bytes and is no XML.
         let head = &bytes[..start.unwrap_or(bytes.len())];
-        let mut file = File {
+        let mut file = XmlVtkFile {
             layout: Layout::default(),
             kind: String::new(),
             extent: None,
@@ -287,7 +287,7 @@ impl<'a> File<'a> {
     }
 
     /// The elements of an unstructured grid, with the numbers of its points and cells.
-    fn mesh(&self, mut grid: HashMap<&str, Vec<f64>>) -> Result<(Shape, usize, usize), Fault> {
+    fn mesh(&self, mut grid: HashMap<&str, Vec<f64>>) -> Result<(DataSet, usize, usize), Fault> {
         let mut take = |what: &str| grid.remove(what).ok_or_else(|| fault(format!("the grid has no {what}")));
         let (place, connectivity) = (take("points")?, take("connectivity")?);
         let (offsets, types) = (take("offsets")?, take("cell types")?);
@@ -299,12 +299,12 @@ impl<'a> File<'a> {
                 types.len()
             )));
         }
-        Ok((Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?), points, cells))
+        Ok((DataSet::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?), points, cells))
     }
 }
 
 /// Refuses arrays that do not have a tuple for each point or cell.
-pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(), Fault> {
+pub(super) fn check(arrays: &[DataArray], points: usize, cells: usize) -> Result<(), Fault> {
     for a in arrays {
         let (count, what) = if a.of_cells { (cells, "cells") } else { (points, "points") };
         if count.checked_mul(a.components) != Some(a.values.len()) {
@@ -474,7 +474,7 @@ mod tests {
     #[test]
     fn a_hexahedron_is_cut_into_its_whole_volume() {
         let data = read_vtk(HEX.as_bytes()).unwrap();
-        let Shape::Mesh(elements) = &data.shape else { panic!("mesh") };
+        let DataSet::Mesh(elements) = &data.shape else { panic!("mesh") };
         let (points, (tets, of)) = (&elements.points, elements.tets());
         let volume: f64 = tets
             .iter()

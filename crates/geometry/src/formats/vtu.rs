@@ -23,13 +23,13 @@ pub(crate) struct Cells<'a> {
     /// The number of cells.
     pub count: usize,
     /// Arrays of the cells by name.
-    pub data: &'a [(&'a str, Array<'a>)],
+    pub data: &'a [(&'a str, ArrayValues<'a>)],
     /// Further fields of nodes and cells.
     pub fields: &'a [FeField],
 }
 
 /// An array of numbers.
-pub(crate) enum Array<'a> {
+pub(crate) enum ArrayValues<'a> {
     /// Labels.
     Labels(&'a [u8]),
     /// Whole numbers.
@@ -47,9 +47,10 @@ pub fn write_vtu<W: Write>(mesh: &TetMesh, arrays: &[(&str, Vec<f64>)], out: &mu
     if let Some((name, of)) = arrays.iter().find(|(_, of)| of.len() != count) {
         return Err(super::invalid(format!("array \"{name}\" has {} numbers for {count} tetrahedra", of.len())));
     }
-    let mut data: Vec<(&str, Array)> = arrays.iter().map(|(name, of)| (*name, Array::Numbers(of))).collect();
+    let mut data: Vec<(&str, ArrayValues)> =
+        arrays.iter().map(|(name, of)| (*name, ArrayValues::Numbers(of))).collect();
     if !mesh.zones.is_empty() {
-        data.push(("zone", Array::Integers(&mesh.zones)));
+        data.push(("zone", ArrayValues::Integers(&mesh.zones)));
     }
     // 10 is VTK_TETRA.
     let cells = Cells {
@@ -98,9 +99,9 @@ impl Cells<'_> {
         }
         for (name, array) in self.data {
             head += &match array {
-                Array::Labels(_) => header("UInt8", name, 1, count),
-                Array::Integers(_) => header("Int64", name, 1, 8 * count),
-                Array::Numbers(_) => header("Float64", name, 1, 8 * count),
+                ArrayValues::Labels(_) => header("UInt8", name, 1, count),
+                ArrayValues::Integers(_) => header("Int64", name, 1, 8 * count),
+                ArrayValues::Numbers(_) => header("Float64", name, 1, 8 * count),
             };
         }
         for f in of(false) {
@@ -130,9 +131,9 @@ impl Cells<'_> {
         bulk().try_for_each(|set| block(flags(&set.elements, count)))?;
         for (_, array) in self.data {
             block(match array {
-                Array::Labels(of) => of.to_vec(),
-                Array::Integers(of) => of.iter().flat_map(|v| v.to_le_bytes()).collect(),
-                Array::Numbers(of) => bytes(of),
+                ArrayValues::Labels(of) => of.to_vec(),
+                ArrayValues::Integers(of) => of.iter().flat_map(|v| v.to_le_bytes()).collect(),
+                ArrayValues::Numbers(of) => bytes(of),
             })?;
         }
         of(false).try_for_each(|f| block(bytes(&f.values)))?;
@@ -148,7 +149,7 @@ impl Cells<'_> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::formats::{Shape, read_vtk};
+    use crate::formats::{DataSet, read_vtk};
 
     #[test]
     fn what_is_written_is_read_back() {
@@ -160,7 +161,7 @@ mod tests {
         let mut bytes = Vec::new();
         write_vtu(&mesh, &[("angle", vec![0.3, 1e-9])], &mut bytes).unwrap();
         let data = read_vtk(&bytes).unwrap();
-        let Shape::Mesh(elements) = &data.shape else { panic!("mesh") };
+        let DataSet::Mesh(elements) = &data.shape else { panic!("mesh") };
         let (read, of) = elements.tet_mesh(false).unwrap();
         assert_eq!((read.nodes, read.tets, of), (mesh.nodes.clone(), mesh.tets.clone(), vec![0, 1]));
         assert_eq!(data.arrays[0].values, [0.3, 1e-9]);

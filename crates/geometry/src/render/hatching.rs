@@ -1,13 +1,13 @@
 //! Parallel lines within closed polygons.
 
-use super::visible_parts::Point;
+use super::visible_parts::PicturePoint;
 
 /// Segments at 45°, `spacing` apart, of the area within closed polygons, by the even-odd rule. Lines that run through a corner count it once.
-pub(super) fn hatching(loops: &[Vec<Point>], spacing: f64) -> Vec<[Point; 2]> {
+pub(super) fn hatching(loops: &[Vec<PicturePoint>], spacing: f64) -> Vec<[PicturePoint; 2]> {
     let half = core::f64::consts::FRAC_1_SQRT_2;
     // Along the lines, and across them.
-    let turned = |[x, y]: Point| [(x - y) * half, (x + y) * half];
-    let back = |[u, v]: Point| [(u + v) * half, (v - u) * half];
+    let turned = |[x, y]: PicturePoint| [(x - y) * half, (x + y) * half];
+    let back = |[u, v]: PicturePoint| [(u + v) * half, (v - u) * half];
     let mut hits: Vec<(i64, f64)> = Vec::new();
     for polygon in loops {
         for (i, p) in polygon.iter().enumerate() {

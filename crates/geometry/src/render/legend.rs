@@ -6,7 +6,7 @@ use super::paper::{Colour, INK, Paper};
 use super::{RenderOptions, Tint, View};
 
 /// A row of a legend.
-pub(super) enum Row<'a> {
+pub(super) enum LegendRow<'a> {
     /// A scale with the numbers at its ends.
     Scale(&'a Tint),
     /// Names, each with a patch of its colour before it.
@@ -21,13 +21,13 @@ pub(super) enum Row<'a> {
 const ROW: usize = 3;
 
 /// The rows for a picture, from the top; none where it is too small for them.
-pub(super) fn rows<'a>(options: &'a RenderOptions, view: &View, paper: &Paper) -> Vec<Row<'a>> {
+pub(super) fn rows<'a>(options: &'a RenderOptions, view: &View, paper: &Paper) -> Vec<LegendRow<'a>> {
     let mut found = Vec::new();
     if paper.size[0] < 180 || paper.size[1] < 8 * paper.letter() {
         return found;
     }
     let wide = paper.size[0] as f64 / paper.letter() as f64;
-    found.extend(SeenMarks::new(options.marks, view, wide).map(Row::Marks));
+    found.extend(SeenMarks::new(options.marks, view, wide).map(LegendRow::Marks));
     if let Some(colours) = &options.colours {
         colours.legend(paper, &mut found);
     }
@@ -42,12 +42,12 @@ pub(super) fn rows<'a>(options: &'a RenderOptions, view: &View, paper: &Paper) -
 }
 
 /// Words, if there are some.
-pub(super) fn words(text: &str) -> Option<Row<'_>> {
-    (!text.is_empty()).then_some(Row::Words(text))
+pub(super) fn words(text: &str) -> Option<LegendRow<'_>> {
+    (!text.is_empty()).then_some(LegendRow::Words(text))
 }
 
 /// Names in as many rows as they need.
-pub(super) fn names<'a>(names: impl Iterator<Item = &'a str>, palette: &[Colour], paper: &Paper) -> Vec<Row<'a>> {
+pub(super) fn names<'a>(names: impl Iterator<Item = &'a str>, palette: &[Colour], paper: &Paper) -> Vec<LegendRow<'a>> {
     let mut made: Vec<Vec<(&str, Colour)>> = Vec::new();
     for (i, name) in names.enumerate() {
         let entry = (name, colour(palette, i));
@@ -56,7 +56,7 @@ pub(super) fn names<'a>(names: impl Iterator<Item = &'a str>, palette: &[Colour]
             _ => made.push(vec![entry]),
         }
     }
-    made.into_iter().map(Row::Names).collect()
+    made.into_iter().map(LegendRow::Names).collect()
 }
 
 /// Pixels across of a name with its patch and the gap behind it.
@@ -69,27 +69,27 @@ fn wide(row: &[(&str, Colour)], paper: &Paper) -> usize {
 }
 
 /// Pixels of the foot of a picture that the rows take.
-pub(super) fn height(rows: &[Row], paper: &Paper) -> usize {
+pub(super) fn height(rows: &[LegendRow], paper: &Paper) -> usize {
     if rows.is_empty() { 0 } else { (rows.iter().map(row_height).sum::<usize>() + 2) * paper.letter() / 2 }
 }
 
 /// Half letters of a row and the gap below it.
-fn row_height(row: &Row) -> usize {
+fn row_height(row: &LegendRow) -> usize {
     match row {
-        Row::Marks(marks) => (2.0 * marks.height()).ceil() as usize + ROW - 2,
+        LegendRow::Marks(marks) => (2.0 * marks.height()).ceil() as usize + ROW - 2,
         _ => ROW,
     }
 }
 
 /// Draws the rows; `per_mm` is how many pixels a mm is, where that is one number.
-pub(super) fn draw(rows: &[Row], paper: &mut Paper, per_mm: Option<f64>) {
+pub(super) fn draw(rows: &[LegendRow], paper: &mut Paper, per_mm: Option<f64>) {
     let letter = paper.letter();
     for (row, y) in places(rows, paper) {
         match row {
-            Row::Words(text) => paper.write(text, paper.size[0] / 2, y, 0.5, INK),
-            Row::Scale(tint) => tint.scale(paper, y),
-            Row::Marks(marks) => draw_marks(marks, paper, y, per_mm),
-            Row::Names(entries) => {
+            LegendRow::Words(text) => paper.write(text, paper.size[0] / 2, y, 0.5, INK),
+            LegendRow::Scale(tint) => tint.scale(paper, y),
+            LegendRow::Marks(marks) => draw_marks(marks, paper, y, per_mm),
+            LegendRow::Names(entries) => {
                 for (name, colour, x) in along(entries, paper) {
                     paper.fill([x, y], [x + letter, y + letter], colour);
                     paper.write(name, x + 3 * letter / 2, y, 0.0, INK);
@@ -100,10 +100,10 @@ pub(super) fn draw(rows: &[Row], paper: &mut Paper, per_mm: Option<f64>) {
 }
 
 /// The rows, and where each begins: pixels from the top.
-pub(super) fn places<'a, 'b>(rows: &'b [Row<'a>], paper: &Paper) -> Vec<(&'b Row<'a>, usize)> {
+pub(super) fn places<'a, 'b>(rows: &'b [LegendRow<'a>], paper: &Paper) -> Vec<(&'b LegendRow<'a>, usize)> {
     let letter = paper.letter();
     let mut y = paper.size[1].saturating_sub(height(rows, paper)) + letter / 2;
-    let mut place = |row: &Row| {
+    let mut place = |row: &LegendRow| {
         let at = y;
         y += row_height(row) * letter / 2;
         at

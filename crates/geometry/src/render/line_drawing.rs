@@ -10,7 +10,7 @@ use super::raster::Projected;
 use super::section::SeenSection;
 use super::space_lines::{LineKind, SpaceLine, space_lines};
 use super::svg_path::path;
-use super::visible_parts::{Point, Seen, simpler};
+use super::visible_parts::{PicturePoint, PictureSamples, simpler};
 use super::{BAND, Background, Camera, Marks, OVER, RenderOptions, View, legend, picture, png, svg_legend};
 use crate::surface_mesh::SurfaceMesh;
 use std::borrow::Cow;
@@ -51,7 +51,7 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, options: &RenderOptions,
     let samples = paper.size;
     // Pixels of the drawing for each sample.
     let part = size[0] / samples[0] as f64;
-    let mut groups: [Vec<Vec<Point>>; 3] = Default::default();
+    let mut groups: [Vec<Vec<PicturePoint>>; 3] = Default::default();
     let mut hatched = Vec::new();
     let legend = legend::rows(options, view, &paper);
     let foot = legend::height(&legend, &paper);
@@ -67,8 +67,8 @@ pub fn line_drawing(surface: &SurfaceMesh, view: &View, options: &RenderOptions,
         let scale = camera.samples_per_mm(1.0 / camera.distance);
         let lines =
             space_lines(surface, options.normals.as_deref(), &camera, section, CRUMB * samples[0] as f64 / scale);
-        let seen = Seen { camera: &camera, raster: &raster };
-        let parts: Vec<(LineKind, Vec<Vec<Point>>)> =
+        let seen = PictureSamples { camera: &camera, raster: &raster };
+        let parts: Vec<(LineKind, Vec<Vec<PicturePoint>>)> =
             lines.par_iter().map(|line| (line.kind, seen.parts(line))).collect();
         for (kind, lines) in parts {
             groups[kind as usize].extend(lines);
@@ -128,17 +128,23 @@ pub fn line_drawing_fits(options: &RenderOptions, view: &View) -> bool {
 }
 
 /// The outlines of the section in the picture.
-fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<Point>> {
+fn polygons(lines: &[SpaceLine], camera: &Camera) -> Vec<Vec<PicturePoint>> {
     let closed = lines.iter().filter(|line| line.kind == LineKind::Section);
-    let place = |line: &SpaceLine| -> Vec<Point> {
+    let place = |line: &SpaceLine| -> Vec<PicturePoint> {
         let placed = line.points.iter().map(|p| camera.project(p.at));
-        simpler(&placed.map(|[x, y, _]| [x, y]).collect::<Vec<Point>>())
+        simpler(&placed.map(|[x, y, _]| [x, y]).collect::<Vec<PicturePoint>>())
     };
     closed.map(place).collect()
 }
 
 /// The file.
-fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, behind: &str, foot: &str, page: &Page) -> String {
+fn text(
+    groups: &[Vec<Vec<PicturePoint>>; 3],
+    hatched: &Vec<Vec<PicturePoint>>,
+    behind: &str,
+    foot: &str,
+    page: &Page,
+) -> String {
     let [contours, edges, section] = groups;
     let Page { size: [w, h], unit, line_width } = *page;
     let widest = line_width.unwrap_or(STROKES[0] * w);
@@ -169,7 +175,7 @@ fn text(groups: &[Vec<Vec<Point>>; 3], hatched: &Vec<Vec<Point>>, behind: &str, 
 #[cfg(test)]
 mod tests {
     use super::super::tests::{contour, sphere};
-    use super::super::{Projection, Section};
+    use super::super::{Projection, SectionPlane};
     use super::*;
     use crate::mesh::Mesh;
 
@@ -180,7 +186,7 @@ mod tests {
     }
 
     /// The points of a path by its name.
-    fn lines(svg: &str, name: &str) -> Vec<Vec<Point>> {
+    fn lines(svg: &str, name: &str) -> Vec<Vec<PicturePoint>> {
         let Some(at) = svg.find(&format!("id=\"{name}\"")) else {
             return Vec::new();
         };
@@ -191,7 +197,7 @@ mod tests {
             .map(|p| {
                 let numbers: Vec<f64> =
                     p.trim_end_matches('Z').split(['L', ' ']).map(|v| v.parse().expect("number")).collect();
-                let mut points: Vec<Point> = numbers.chunks(2).map(|c| [c[0], c[1]]).collect();
+                let mut points: Vec<PicturePoint> = numbers.chunks(2).map(|c| [c[0], c[1]]).collect();
                 if p.ends_with('Z') {
                     points.push(points[0]);
                 }
@@ -275,7 +281,7 @@ mod tests {
                 &RenderOptions { normals, ..RenderOptions::default() },
                 &page([400.0, 300.0], "px"),
             );
-            let long = |line: &Vec<Point>| (line[0][0] - line[line.len() - 1][0]).abs() > 200.0;
+            let long = |line: &Vec<PicturePoint>| (line[0][0] - line[line.len() - 1][0]).abs() > 200.0;
             lines(&svg, name).iter().filter(|line| long(line)).count()
         };
         assert!(along(None, "edges") >= 3);
@@ -288,7 +294,7 @@ mod tests {
     fn a_section_is_hatched() {
         let surface = sphere(40);
         let eye = View { azimuth: 0.0, elevation: 0.0, ..VIEW };
-        let section = Some(Section { normal: [1.0, 0.0, 0.0], offset: 0.5 });
+        let section = Some(SectionPlane { normal: [1.0, 0.0, 0.0], offset: 0.5 });
         let options = RenderOptions { section, ..RenderOptions::default() };
         let svg = line_drawing(&surface, &eye, &options, &page([400.0, 300.0], "px"));
         let outline = lines(&svg, "section");

@@ -28,7 +28,7 @@ const THICK: f64 = 0.17;
 
 /// Marks as lines and words: places to the right and down from the top left of their row, lengths in heights of a letter.
 #[derive(Debug, Default)]
-pub(super) struct Drawn {
+pub(super) struct MarkShapes {
     /// From, to, colour.
     pub arms: Vec<([f64; 2], [f64; 2], Colour)>,
     /// Half the width of arms.
@@ -68,9 +68,9 @@ impl SeenMarks {
     }
 
     /// In a row of this width, with a bar if it is known how long a mm is.
-    pub fn drawn(&self, width: f64, per_mm: Option<f64>) -> Drawn {
+    pub fn drawn(&self, width: f64, per_mm: Option<f64>) -> MarkShapes {
         let (height, [left, right]) = (self.height(), self.reach(0));
-        let mut made = Drawn { thin: THIN, ..Drawn::default() };
+        let mut made = MarkShapes { thin: THIN, ..MarkShapes::default() };
         let origin = [GAP - left, self.reach(1)[1]];
         for (k, end) in self.arms.iter().flatten().enumerate() {
             let to = [origin[0] + end[0], origin[1] - end[1]];

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::raster::{INSIDE, Projected, Raster, weights};
-use super::shading_normals::{Normals, area};
-use super::{Camera, SAMPLES, Section};
+use super::shading_normals::{ShadingNormals, area};
+use super::{Camera, SAMPLES, SectionPlane};
 use crate::math::{Vec3, dot, scale, sub};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -30,10 +30,10 @@ impl Occlusion {
     /// Of a picture of `size` samples across and down.
     pub(super) fn of(
         surface: &SurfaceMesh,
-        normals: &Normals,
+        normals: &ShadingNormals,
         camera: &Camera,
         size: [usize; 2],
-        section: Option<&Section>,
+        section: Option<&SectionPlane>,
     ) -> Occlusion {
         let samples = (size[0] * size[1]) as f64;
         let most = SAMPLES as f64 / (STRIDE * STRIDE);
@@ -63,7 +63,7 @@ impl Occlusion {
 }
 
 /// The normal that a point of a triangle is shaded by, on the side of the eye. By those of its facets a curved surface would have scales.
-fn facing(surface: &SurfaceMesh, normals: &Normals, camera: &Camera, triangle: u32, p: Vec3) -> Vec3 {
+fn facing(surface: &SurfaceMesh, normals: &ShadingNormals, camera: &Camera, triangle: u32, p: Vec3) -> Vec3 {
     let n = normals.within(surface, triangle, weights(surface, triangle, p));
     if dot(area(surface, triangle as usize), camera.to_eye(p)) < 0.0 { scale(n, -1.0) } else { n }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Camera, Section, SeenSection};
+use super::{Camera, SectionPlane, SeenSection};
 use crate::math::sub;
 use crate::surface_mesh::SurfaceMesh;
 
@@ -37,7 +37,12 @@ pub(super) struct Projected {
 
 impl Projected {
     /// Projects into a picture of `size` samples across and down.
-    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2], section: Option<&Section>) -> Projected {
+    pub(super) fn of(
+        surface: &SurfaceMesh,
+        camera: &Camera,
+        size: [usize; 2],
+        section: Option<&SectionPlane>,
+    ) -> Projected {
         const CHUNK: usize = 1 << 16;
         let mesh = &surface.mesh;
         let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();

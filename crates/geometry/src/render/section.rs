@@ -6,14 +6,14 @@ use crate::mesh::Mesh;
 
 /// A plane; what lies where `normal` · p > `offset` is left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub struct SectionPlane {
     /// A unit vector.
     pub normal: Vec3,
     /// Distance from the origin along the normal (mm).
     pub offset: f64,
 }
 
-impl Section {
+impl SectionPlane {
     /// Height of a point above the plane (mm).
     pub(super) fn height(&self, p: Vec3) -> f64 {
         dot(self.normal, p) - self.offset
@@ -21,8 +21,8 @@ impl Section {
 
     /// The plane a hair before: by 1/100 000 of the diagonal of these bounds, which no picture shows, but more than the rounding of depths.
     /// A face that lies in the plane is then cut as a whole, where it would be in part.
-    pub(super) fn before_faces(&self, bounds: &Aabb) -> Section {
-        Section { offset: self.offset - 1e-5 * norm(bounds.size()), ..*self }
+    pub(super) fn before_faces(&self, bounds: &Aabb) -> SectionPlane {
+        SectionPlane { offset: self.offset - 1e-5 * norm(bounds.size()), ..*self }
     }
 
     /// The vertices of a mesh that are kept, and the points where the plane cuts its edges; all vertices if the plane leaves out all.
@@ -87,7 +87,7 @@ pub(super) struct SeenSection {
 }
 
 impl SeenSection {
-    pub(super) fn new(section: &Section, camera: &Camera) -> SeenSection {
+    pub(super) fn new(section: &SectionPlane, camera: &Camera) -> SeenSection {
         let [right, up, out] = camera.axes.map(|a| dot(section.normal, a));
         let (across, down) = (right / camera.focal, -up / camera.focal);
         let constant = -out - across * camera.middle[0] - down * camera.middle[1];

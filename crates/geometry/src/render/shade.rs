@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::lines::Tubes;
 use super::occlusion::Occlusion;
 use super::raster::{INSIDE, NONE, Projected, Raster, weights};
-use super::shading_normals::{Normals, area, is_cut};
-use super::{Camera, Colours, Projection, Section, SectionColours, View};
+use super::shading_normals::{ShadingNormals, area, is_cut};
+use super::{Camera, Colours, Projection, SectionColours, SectionPlane, View};
 use crate::math::{Vec3, add, dot, scale, unit};
 use crate::surface_mesh::SurfaceMesh;
 
@@ -47,11 +47,11 @@ pub(super) struct Shader<'a> {
     surface: &'a SurfaceMesh,
     camera: &'a Camera,
     finish: Finish<'a>,
-    normals: Normals<'a>,
+    normals: ShadingNormals<'a>,
     /// The direction to the key light.
     key: Vec3,
     shade: Option<(Shadows, Occlusion)>,
-    section: Option<&'a Section>,
+    section: Option<&'a SectionPlane>,
     /// Whether the section is hatched.
     pub hatched: bool,
 }
@@ -63,10 +63,10 @@ impl<'a> Shader<'a> {
         camera: &'a Camera,
         size: [usize; 2],
         (finish, normals): (Finish<'a>, Option<&'a [[f32; 3]]>),
-        section: Option<&'a Section>,
+        section: Option<&'a SectionPlane>,
     ) -> Shader<'a> {
         let key = towards(camera, -0.55, 0.75, 0.60);
-        let normals = Normals::of(surface, normals);
+        let normals = ShadingNormals::of(surface, normals);
         let shade = match finish {
             Finish::Lines(_) => None,
             _ => Some((Shadows::cast(surface, key, section), Occlusion::of(surface, &normals, camera, size, section))),
@@ -119,7 +119,7 @@ impl<'a> Shader<'a> {
     }
 
     /// The light from the solid that a section cuts.
-    fn cut_through(&self, section: &Section, [x, y]: [usize; 2], near: f32, p: Vec3, eye: Vec3) -> [f32; 3] {
+    fn cut_through(&self, section: &SectionPlane, [x, y]: [usize; 2], near: f32, p: Vec3, eye: Vec3) -> [f32; 3] {
         let line = self.hatched && (x + y) % HATCH.0 < HATCH.1;
         let colour = match self.finish {
             Finish::Lines(_) => SECTION[1],
@@ -159,7 +159,7 @@ impl Shadows {
     const SIZE: usize = 2048;
 
     /// Draws the surface as seen along the light.
-    fn cast(surface: &SurfaceMesh, key: Vec3, section: Option<&Section>) -> Shadows {
+    fn cast(surface: &SurfaceMesh, key: Vec3, section: Option<&SectionPlane>) -> Shadows {
         let size = [Self::SIZE; 2];
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();

@@ -9,18 +9,18 @@ use crate::surface_mesh::SurfaceMesh;
 
 /// Normals at vertices, weighted by area: one for each vertex, but where faces meet in an edge or a cut ends, one for each side. And those
 /// that are given at corners, which come first.
-pub(super) struct Normals<'a> {
+pub(super) struct ShadingNormals<'a> {
     given: Option<&'a [[f32; 3]]>,
     smooth: Vec<[f32; 3]>,
     /// The triangles about a vertex on an edge.
     edges: HashMap<usize, Vec<u32>>,
 }
 
-impl<'a> Normals<'a> {
+impl<'a> ShadingNormals<'a> {
     /// Cosine of the angle from which on faces meet in an edge: 35°.
     pub(super) const EDGE: f64 = 0.82;
 
-    pub(super) fn of(surface: &SurfaceMesh, given: Option<&'a [[f32; 3]]>) -> Normals<'a> {
+    pub(super) fn of(surface: &SurfaceMesh, given: Option<&'a [[f32; 3]]>) -> ShadingNormals<'a> {
         let mesh = &surface.mesh;
         let given = given.filter(|n| n.len() == 3 * mesh.triangles.len());
         let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
@@ -50,7 +50,7 @@ impl<'a> Normals<'a> {
                 }
             }
         }
-        Normals { given, smooth: sums, edges }
+        ShadingNormals { given, smooth: sums, edges }
     }
 
     /// The unit normal at a point of a triangle, by the weights of its corners.

@@ -1,6 +1,6 @@
 //! Shares of named parts on a surface, as mixtures of their colours.
 
-use super::legend::{self, Row};
+use super::legend::{self, LegendRow};
 use super::palette::{self, AREAS};
 use super::paper::Paper;
 use super::section::PlaneGrid;
@@ -58,10 +58,10 @@ impl Colours {
     }
 
     /// Its rows in a legend.
-    pub(super) fn legend<'a>(&'a self, paper: &Paper, rows: &mut Vec<Row<'a>>) {
+    pub(super) fn legend<'a>(&'a self, paper: &Paper, rows: &mut Vec<LegendRow<'a>>) {
         match self {
             Colours::Scale(tint) => {
-                rows.push(Row::Scale(tint));
+                rows.push(LegendRow::Scale(tint));
                 rows.extend(legend::words(&tint.title));
             }
             Colours::Shares(shares) => {

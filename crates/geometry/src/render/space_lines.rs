@@ -7,8 +7,8 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::shading_normals::{Normals, area};
-use super::{Camera, Section};
+use super::shading_normals::{ShadingNormals, area};
+use super::{Camera, SectionPlane};
 use crate::math::{Vec3, add, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 use crate::union_find::{find, singles, unite};
@@ -53,10 +53,10 @@ pub(super) fn space_lines(
     surface: &SurfaceMesh,
     normals: Option<&[[f32; 3]]>,
     camera: &Camera,
-    section: Option<&Section>,
+    section: Option<&SectionPlane>,
     least: f64,
 ) -> Vec<SpaceLine> {
-    let normals = Normals::of(surface, normals);
+    let normals = ShadingNormals::of(surface, normals);
     let edges = without_crumbs(surface, sharp_edges(surface, &normals), least);
     let mut lines = contours(surface, &normals, camera, &edges.iter().copied().collect());
     lines.extend(edge_lines(surface, &edges));
@@ -71,7 +71,7 @@ pub(super) fn space_lines(
 /// say how faces meet: a beam of few facets has no edges along itself. The normal of a thin
 /// triangle says little: of edges that hang together, one has to lie between triangles that are not thin, and
 /// others are left out where they lead nowhere.
-fn sharp_edges(surface: &SurfaceMesh, normals: &Normals) -> Vec<EdgeKey> {
+fn sharp_edges(surface: &SurfaceMesh, normals: &ShadingNormals) -> Vec<EdgeKey> {
     let triangles = &surface.mesh.triangles;
     let mut all: Vec<(EdgeKey, u32)> = triangles
         .par_iter()
@@ -85,10 +85,10 @@ fn sharp_edges(surface: &SurfaceMesh, normals: &Normals) -> Vec<EdgeKey> {
     let sharp = |group: &[(EdgeKey, u32)]| match group {
         [(edge, s), (_, t)] if cut(*s) == cut(*t) => {
             if let (Some(m), Some(n)) = (along(surface, normals, *edge, *s), along(surface, normals, *edge, *t)) {
-                return (dot(m, n) < Normals::EDGE * norm(m) * norm(n)).then_some(true);
+                return (dot(m, n) < ShadingNormals::EDGE * norm(m) * norm(n)).then_some(true);
             }
             let (m, n) = (area(surface, *s as usize), area(surface, *t as usize));
-            let turned = dot(m, n) < Normals::EDGE * norm(m) * norm(n);
+            let turned = dot(m, n) < ShadingNormals::EDGE * norm(m) * norm(n);
             turned.then(|| !thin(*s) && !thin(*t))
         }
         _ => Some(true),
@@ -105,7 +105,7 @@ fn sharp_edges(surface: &SurfaceMesh, normals: &Normals) -> Vec<EdgeKey> {
 }
 
 /// The sum of the normals that are given for a triangle at the two ends of an edge; None without either.
-fn along(surface: &SurfaceMesh, normals: &Normals, (a, b): EdgeKey, i: u32) -> Option<Vec3> {
+fn along(surface: &SurfaceMesh, normals: &ShadingNormals, (a, b): EdgeKey, i: u32) -> Option<Vec3> {
     let t = surface.mesh.triangles[i as usize];
     let at = |v: u32| t.iter().position(|w| *w == v).and_then(|k| normals.given(i, k));
     Some(add(at(a)?, at(b)?))
@@ -201,7 +201,12 @@ impl Crossings {
     }
 }
 
-fn contours(surface: &SurfaceMesh, normals: &Normals, camera: &Camera, sharp: &HashSet<EdgeKey>) -> Vec<SpaceLine> {
+fn contours(
+    surface: &SurfaceMesh,
+    normals: &ShadingNormals,
+    camera: &Camera,
+    sharp: &HashSet<EdgeKey>,
+) -> Vec<SpaceLine> {
     let mesh = &surface.mesh;
     let on_edge: HashSet<u32> = sharp.iter().flat_map(|(a, b)| [*a, *b]).collect();
     let mut found = Crossings::default();
@@ -233,7 +238,7 @@ fn contours(surface: &SurfaceMesh, normals: &Normals, camera: &Camera, sharp: &H
     found.lines(LineKind::Contour).collect()
 }
 
-fn outlines(surface: &SurfaceMesh, section: &Section) -> Vec<SpaceLine> {
+fn outlines(surface: &SurfaceMesh, section: &SectionPlane) -> Vec<SpaceLine> {
     let mesh = &surface.mesh;
     let mut found = Crossings::default();
     for (i, t) in mesh.triangles.iter().enumerate() {
@@ -251,7 +256,7 @@ fn outlines(surface: &SurfaceMesh, section: &Section) -> Vec<SpaceLine> {
 }
 
 /// The parts of a line that a section keeps.
-fn kept(line: &SpaceLine, section: &Section) -> Vec<SpaceLine> {
+fn kept(line: &SpaceLine, section: &SectionPlane) -> Vec<SpaceLine> {
     let mut parts = vec![Vec::new()];
     for (i, q) in line.points.iter().enumerate() {
         let to = section.height(q.at);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::encode;
-use super::legend::{self, Row};
+use super::legend::{self, LegendRow};
 use super::marks::SeenMarks;
 use super::paper::{Colour, INK, Paper, short};
 use super::svg_path::path;
@@ -23,17 +23,17 @@ struct Place<'a> {
 }
 
 /// The elements of rows at the foot of a sheet of paper, `part` units of the drawing for each of its pixels; `per_mm` of these are a mm.
-pub(super) fn text(rows: &[Row], paper: &Paper, part: f64, per_mm: Option<f64>) -> String {
+pub(super) fn text(rows: &[LegendRow], paper: &Paper, part: f64, per_mm: Option<f64>) -> String {
     let letter = paper.letter();
     let digits = (2.0 - (letter as f64 * part).log10()).ceil().clamp(0.0, 9.0) as usize;
     let mut at = Place { paper, part, digits, out: String::new() };
     for (row, y) in legend::places(rows, paper) {
         let y = y as f64;
         match row {
-            Row::Words(words) => at.words(words, [paper.size[0] as f64 / 2.0, y], "middle", INK),
-            Row::Scale(tint) => at.scale(tint, y),
-            Row::Marks(marks) => at.marks(marks, y, per_mm),
-            Row::Names(entries) => {
+            LegendRow::Words(words) => at.words(words, [paper.size[0] as f64 / 2.0, y], "middle", INK),
+            LegendRow::Scale(tint) => at.scale(tint, y),
+            LegendRow::Marks(marks) => at.marks(marks, y, per_mm),
+            LegendRow::Names(entries) => {
                 for (name, colour, x) in legend::along(entries, paper) {
                     let (x, side) = (x as f64, letter as f64);
                     at.rectangle([x, y], [x + side, y + side], &hex(colour), "");

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use super::visible_parts::Point;
+use super::visible_parts::PicturePoint;
 
 /// Lines with this many digits behind the point; one that ends where it begins is closed.
-pub(super) fn path(lines: &[Vec<Point>], digits: usize) -> String {
+pub(super) fn path(lines: &[Vec<PicturePoint>], digits: usize) -> String {
     let mut out = String::new();
     for line in lines {
         let closed = line.len() > 2 && line.first() == line.last();

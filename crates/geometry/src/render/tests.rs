@@ -266,7 +266,7 @@ fn a_section_is_as_large_as_the_solid_there() {
     let ball = contour(24, |p| norm(sub(p, [0.5; 3])) - 0.4);
     let view = View { size: [200, 200], azimuth: 20.0, elevation: 90.0, projection: Projection::Perspective };
     let options = |offset: f64, side: f64| RenderOptions {
-        section: Some(Section { normal: [0.0, 0.0, side], offset: side * offset }),
+        section: Some(SectionPlane { normal: [0.0, 0.0, side], offset: side * offset }),
         ..RenderOptions::default()
     };
     let red = |rgb: &[u8]| rgb.chunks(3).filter(|c| i32::from(c[0]) > i32::from(c[1]) + 60).count() as f64;
@@ -292,8 +292,10 @@ fn a_section_is_as_large_as_the_solid_there() {
     // The same with any number of threads, and whatever is drawn at once.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("pool");
     let slanted = options(0.5, 1.0);
-    let slanted =
-        RenderOptions { section: slanted.section.map(|s| Section { normal: unit([1.0, 2.0, 2.0]), ..s }), ..slanted };
+    let slanted = RenderOptions {
+        section: slanted.section.map(|s| SectionPlane { normal: unit([1.0, 2.0, 2.0]), ..s }),
+        ..slanted
+    };
     let one = alone.install(|| render(&ball, &VIEW, &slanted));
     assert!(one == render(&ball, &VIEW, &slanted) && one == render_in_bands(&ball, &VIEW, &slanted, 1));
 }
@@ -433,7 +435,7 @@ fn a_face_in_the_plane_of_a_section_is_of_one_kind() {
         for (azimuth, elevation) in [(30.0, 25.0), (77.0, 60.0), (10.0, 90.0)] {
             let view = View { size: [400, 300], azimuth, elevation, projection };
             let cut = |offset| {
-                let section = Some(Section { normal: [0.0, 0.0, 1.0], offset });
+                let section = Some(SectionPlane { normal: [0.0, 0.0, 1.0], offset });
                 let rgb = render(&s, &view, &RenderOptions { section, ..RenderOptions::default() });
                 rgb.chunks(3).filter(|p| i32::from(p[0]) - i32::from(p[1]) > 60).count() as f64
             };
@@ -503,7 +505,7 @@ fn a_section_has_the_colours_of_what_is_inside() {
             grid: PlaneGrid { origin: [0.0, 0.0, 0.5], steps, counts: [3, 2] },
             values: (0..6).map(grid).collect(),
         };
-        let section = Some(Section { normal: [0.0, 0.0, 1.0], offset: 0.5 });
+        let section = Some(SectionPlane { normal: [0.0, 0.0, 1.0], offset: 0.5 });
         render(
             &ball,
             &view,
@@ -537,7 +539,7 @@ fn facets_of_a_ball_throw_no_shade() {
     let out = |v: &u32| unit(sub(ball.mesh.vertices[*v as usize], [0.5; 3])).map(|c| c as f32);
     let given: Vec<[f32; 3]> = ball.mesh.triangles.as_flattened().iter().map(out).collect();
     let camera = Camera::new(&ball.mesh.bounds(), &ball.mesh.vertices, &view, view.size.map(|n| n * OVER));
-    let normals = shading_normals::Normals::of(&ball, Some(&given));
+    let normals = shading_normals::ShadingNormals::of(&ball, Some(&given));
     let open = occlusion::Occlusion::of(&ball, &normals, &camera, view.size.map(|n| n * OVER), None);
     let raster = Projected::of(&ball, &camera, view.size.map(|n| n * OVER), None).draw(&ball, 0, 240 * OVER);
     let mut least = 1.0f32;

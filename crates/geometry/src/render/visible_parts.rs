@@ -5,7 +5,7 @@ use super::{Camera, raster::Raster};
 use crate::math::add;
 
 /// A point of the picture, in samples.
-pub(super) type Point = [f64; 2];
+pub(super) type PicturePoint = [f64; 2];
 
 /// Distance (samples) between the points of a line that are judged.
 const STEP: f64 = 1.0;
@@ -21,12 +21,12 @@ const SIMPLER: f64 = 0.4;
 const EASED: usize = 8;
 
 /// A picture's samples, to compare lines with.
-pub(super) struct Seen<'a> {
+pub(super) struct PictureSamples<'a> {
     pub camera: &'a Camera,
     pub raster: &'a Raster,
 }
 
-impl Seen<'_> {
+impl PictureSamples<'_> {
     /// The distance of what a sample sees; infinite where it sees nothing, or is not in the picture.
     fn far(&self, x: i64, y: i64) -> f64 {
         let (width, rows) = (self.raster.width as i64, (self.raster.near.len() / self.raster.width) as i64);
@@ -51,7 +51,7 @@ impl Seen<'_> {
     }
 
     /// The parts of a line that are seen, in the picture.
-    pub(super) fn parts(&self, line: &SpaceLine) -> Vec<Vec<Point>> {
+    pub(super) fn parts(&self, line: &SpaceLine) -> Vec<Vec<PicturePoint>> {
         let mut samples = self.samples(line);
         let closed = samples.len() > 2 && line.points.first().map(|p| p.at) == line.points.last().map(|p| p.at);
         // A closed line is cut where it is hidden, so that no part is cut where it is seen.
@@ -60,7 +60,7 @@ impl Seen<'_> {
             samples.rotate_left(at);
             samples.push(samples[0]);
         }
-        let mut runs: Vec<(bool, Vec<Point>)> = Vec::new();
+        let mut runs: Vec<(bool, Vec<PicturePoint>)> = Vec::new();
         for (p, seen) in samples {
             match runs.last_mut() {
                 Some((of, points)) if *of == seen => points.push(p),
@@ -68,7 +68,7 @@ impl Seen<'_> {
             }
         }
         let count = runs.len();
-        let mut parts: Vec<Vec<Point>> = Vec::new();
+        let mut parts: Vec<Vec<PicturePoint>> = Vec::new();
         let mut open = false;
         for (i, (seen, points)) in runs.into_iter().enumerate() {
             let gap = !seen && i > 0 && i + 1 < count && length(&points) < GAP;
@@ -86,12 +86,13 @@ impl Seen<'_> {
     }
 
     /// Points along a line, and whether they are seen.
-    fn samples(&self, line: &SpaceLine) -> Vec<(Point, bool)> {
+    fn samples(&self, line: &SpaceLine) -> Vec<(PicturePoint, bool)> {
         let place = |p: &LinePoint| {
             let [x, y, _] = self.camera.project(p.at);
             [x, y]
         };
-        let mut found: Vec<(Point, bool)> = line.points.first().map(|p| (place(p), self.sees(p))).into_iter().collect();
+        let mut found: Vec<(PicturePoint, bool)> =
+            line.points.first().map(|p| (place(p), self.sees(p))).into_iter().collect();
         for pair in line.points.windows(2) {
             let [p, q] = [&pair[0], &pair[1]];
             let long = length(&[place(p), place(q)]);
@@ -108,7 +109,7 @@ impl Seen<'_> {
 }
 
 /// A line of points that are a sample apart, averaged thrice over neighbours; ends stay, a closed line stays closed.
-fn eased(points: &[Point]) -> Vec<Point> {
+fn eased(points: &[PicturePoint]) -> Vec<PicturePoint> {
     let Some(last) = points.len().checked_sub(1) else {
         return Vec::new();
     };
@@ -126,12 +127,12 @@ fn eased(points: &[Point]) -> Vec<Point> {
     line
 }
 
-pub(super) fn length(points: &[Point]) -> f64 {
+pub(super) fn length(points: &[PicturePoint]) -> f64 {
     points.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1])).sum()
 }
 
 /// A polyline with fewer points, from which none of the given ones is farther than `SIMPLER` (Douglas and Peucker, 1973).
-pub(super) fn simpler(points: &[Point]) -> Vec<Point> {
+pub(super) fn simpler(points: &[PicturePoint]) -> Vec<PicturePoint> {
     let mut keep = vec![false; points.len()];
     let mut open = vec![(0, points.len().saturating_sub(1))];
     while let Some((a, b)) = open.pop() {
@@ -140,7 +141,7 @@ pub(super) fn simpler(points: &[Point]) -> Vec<Point> {
         let (p, q) = (points[a], points[b]);
         let along = [q[0] - p[0], q[1] - p[1]];
         let square = along[0] * along[0] + along[1] * along[1];
-        let off = |r: &Point| {
+        let off = |r: &PicturePoint| {
             let to = [r[0] - p[0], r[1] - p[1]];
             let s = if square > 0.0 { ((to[0] * along[0] + to[1] * along[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
             (to[0] - s * along[0]).hypot(to[1] - s * along[1])
@@ -166,12 +167,12 @@ mod tests {
                 (TAU * (i % 1200) as f64 / 1200.0, 200.0 + 2.0 * (TAU * (i % 1200) as f64 / 15.0).sin());
             [radius * angle.cos(), radius * angle.sin()]
         };
-        let closed: Vec<Point> = (0..=1200).map(wavering).collect();
+        let closed: Vec<PicturePoint> = (0..=1200).map(wavering).collect();
         let found = eased(&closed);
         assert_eq!(found.first(), found.last());
         // A circle of this radius shrinks by the variance of the averages over twice its radius: 3 × 24 / 400.
         assert!(found.iter().all(|p| (p[0].hypot(p[1]) - 200.0).abs() < 0.3));
-        let line: Vec<Point> = (0..50).map(|i| [f64::from(i), 0.5 * f64::from(i)]).collect();
+        let line: Vec<PicturePoint> = (0..50).map(|i| [f64::from(i), 0.5 * f64::from(i)]).collect();
         assert!(eased(&line).iter().zip(&line).all(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9));
         assert_eq!(eased(&line[..1]), line[..1]);
         assert!(eased(&[]).is_empty());

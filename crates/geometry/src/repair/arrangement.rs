@@ -244,14 +244,14 @@ impl Line {
 }
 
 /// A part of a triangle: a convex polygon, or two parts and the line between them.
-enum Node {
+enum BspNode {
     Leaf(Vec<Vec3>),
     Divided(Line, u32, u32),
 }
 
 /// A triangle divided by lines (a binary space partition).
 struct Partition {
-    nodes: Vec<Node>,
+    nodes: Vec<BspNode>,
     /// The triangle.
     outline: [[f64; 2]; 3],
     /// The coordinate left out.
@@ -277,7 +277,7 @@ impl Partition {
                 continue;
             }
             match &self.nodes[i as usize] {
-                Node::Divided(by, left, right) => {
+                BspNode::Divided(by, left, right) => {
                     let (left, right) = (*left, *right);
                     let (sa, sb) = (by.side(a), by.side(b));
                     if sa.abs() <= self.eta && sb.abs() <= self.eta {
@@ -295,11 +295,11 @@ impl Partition {
                         work.push((at_b, m, b));
                     }
                 }
-                Node::Leaf(polygon) => {
+                BspNode::Leaf(polygon) => {
                     if let Some((left, right)) = self.split(polygon, &line, segment) {
                         let first = self.nodes.len() as u32;
-                        self.nodes.extend([Node::Leaf(left), Node::Leaf(right)]);
-                        self.nodes[i as usize] = Node::Divided(line, first, first + 1);
+                        self.nodes.extend([BspNode::Leaf(left), BspNode::Leaf(right)]);
+                        self.nodes[i as usize] = BspNode::Divided(line, first, first + 1);
                     }
                 }
             }
@@ -460,7 +460,7 @@ impl Classifier<'_> {
         let face = &self.faces[i];
         let axis = steepest(face.normal);
         let mut partition = Partition {
-            nodes: vec![Node::Leaf(face.corners.to_vec())],
+            nodes: vec![BspNode::Leaf(face.corners.to_vec())],
             outline: face.corners.map(|p| drop_axis(p, axis)),
             axis,
             eta,
@@ -473,7 +473,7 @@ impl Classifier<'_> {
         }
         let mut out = Vec::new();
         for node in &partition.nodes {
-            let Node::Leaf(polygon) = node else { continue };
+            let BspNode::Leaf(polygon) = node else { continue };
             if !self.piece_bounds(i, polygon, covers) {
                 continue;
             }

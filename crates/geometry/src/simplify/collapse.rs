@@ -1,7 +1,7 @@
 //! The mesh while edges are taken from it: what a collapse would do, whether it may, and doing it.
 
 use super::bucket_queue::{Candidate, Queue};
-use super::deviation::{Displacements, Patch};
+use super::deviation::{CollapsePatch, Displacements};
 use super::error_quadric::Quadric;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::remesh::edited_mesh::{EdgeRing, EditedMesh, single};
@@ -43,7 +43,7 @@ pub struct Simplification {
     queue: Queue,
     // Scratch of one candidate, kept to save allocations.
     ring: EdgeRing,
-    patch: Patch,
+    patch: CollapsePatch,
     normals: Vec<Vec3>,
 }
 
@@ -66,7 +66,7 @@ impl Simplification {
             versions: vec![0; n],
             queue: Queue::new(),
             ring: EdgeRing::default(),
-            patch: Patch::default(),
+            patch: CollapsePatch::default(),
             normals: Vec::new(),
         };
         for h in 0..3 * work.mesh.count as u32 {

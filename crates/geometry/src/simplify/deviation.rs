@@ -78,7 +78,7 @@ impl Displacements {
 /// and on about v. Triangle i of the patch and of the fan stands on the loop's edge from i to i + 1; the patch has two more,
 /// u v x and v u y.
 #[derive(Default)]
-pub struct Patch {
+pub struct CollapsePatch {
     /// Ends of the edge, and what they become.
     pub u: Vec3,
     pub v: Vec3,
@@ -108,7 +108,7 @@ fn turn(a: Vec3, b: Vec3, c: Vec3) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-impl Patch {
+impl CollapsePatch {
     /// Finds the displacements of the fan. False if there is no direction that shows patch and fan as graphs, or one
     /// of the displacements would exceed `limit`.
     pub fn propagate(&mut self, limit: f64) -> bool {
@@ -358,21 +358,21 @@ mod tests {
     use super::*;
 
     /// A hexagon about u and v in the plane z = 0, u and v raised.
-    fn patch(u: f64, v: f64, w: Vec3) -> Patch {
+    fn patch(u: f64, v: f64, w: Vec3) -> CollapsePatch {
         let boundary =
             [[0.5, 1.0, 0.0], [-1.0, 0.6, 0.0], [-1.0, -0.6, 0.0], [0.5, -1.0, 0.0], [2.0, -0.6, 0.0], [2.0, 0.6, 0.0]];
-        Patch {
+        CollapsePatch {
             u: [0.0, 0.0, u],
             v: [1.0, 0.0, v],
             w,
             boundary: boundary.to_vec(),
             turn: 3,
             old: vec![Displacements::ZERO; 8],
-            ..Patch::default()
+            ..CollapsePatch::default()
         }
     }
 
-    fn longest(p: &Patch) -> f64 {
+    fn longest(p: &CollapsePatch) -> f64 {
         p.new.iter().map(Displacements::longest).fold(0.0, f64::max)
     }
 

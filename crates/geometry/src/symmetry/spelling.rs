@@ -1,14 +1,15 @@
 //! Spellings of Hermann–Mauguin symbols, and what else a symbol could be.
 
-use super::{Group, Row, rows};
+use super::{Group, SpaceGroupEntry, rows};
 use crate::fault::{Fault, nearest};
 
 /// The rows that a number or a Hermann–Mauguin symbol without spaces and underscores names: by the symbols of the tables or,
 /// if there are none, by its other usual spellings.
-pub(super) fn rows_of(bare: &str) -> Vec<Row> {
+pub(super) fn rows_of(bare: &str) -> Vec<SpaceGroupEntry> {
     let is = |symbol: &str| bare.eq_ignore_ascii_case(symbol);
     let number = bare.parse().ok();
-    let known: Vec<Row> = rows().filter(|r| number == Some(r.number) || is(r.short) || is(r.full)).collect();
+    let known: Vec<SpaceGroupEntry> =
+        rows().filter(|r| number == Some(r.number) || is(r.short) || is(r.full)).collect();
     if !known.is_empty() {
         return known;
     }
@@ -16,7 +17,7 @@ pub(super) fn rows_of(bare: &str) -> Vec<Row> {
 }
 
 /// Other usual spellings of a row's symbol; none is a symbol of the tables for another group.
-fn spellings(row: &Row) -> impl Iterator<Item = String> {
+fn spellings(row: &SpaceGroupEntry) -> impl Iterator<Item = String> {
     // Cubic symbols without the bar are those before 1935, and of most papers on minimal surfaces: Fd3m, I43d.
     let cubic = (row.number >= 195 && row.short.contains('-')).then(|| row.short.replace('-', ""));
     cubic.into_iter().chain(row.former.map(String::from)).chain(monoclinic(row))
@@ -24,7 +25,7 @@ fn spellings(row: &Row) -> impl Iterator<Item = String> {
 
 /// A full monoclinic symbol without the ones that tell the unique axis. Not of rotations alone: I 2 is also one of Hall's, about
 /// c.
-fn monoclinic(row: &Row) -> Option<String> {
+fn monoclinic(row: &SpaceGroupEntry) -> Option<String> {
     let (lattice, axes) = row.full.split_at_checked(1).filter(|_| (3..=15).contains(&row.number))?;
     let about = match row.setting.trim_start_matches('-').as_bytes().first()? {
         b'b' => axes.strip_prefix('1')?.strip_suffix('1')?,

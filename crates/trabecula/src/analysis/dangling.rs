@@ -128,14 +128,14 @@ impl BlockSearch<'_> {
         let depth = depths(&open, [side; 3], self.step);
         let mut owner = vec![0u32; open.len()];
         // The first stands for no body.
-        let mut bodies = vec![Body::at(0)];
+        let mut bodies = vec![BlockComponent::at(0)];
         let mut stack = Vec::new();
         for i in 0..open.len() {
             if owner[i] != 0 || open[i] || 2.0 * f64::from(depth[i]) < self.thin {
                 continue;
             }
             let name = bodies.len() as u32;
-            let mut body = Body::at(i);
+            let mut body = BlockComponent::at(i);
             let mut deepest = 0f32;
             owner[i] = name;
             stack.push(i);
@@ -203,7 +203,7 @@ impl BlockSearch<'_> {
     }
 
     /// Solid points that are in no body go to the nearest along the solid.
-    fn spread(&self, open: &[bool], owner: &mut [u32], bodies: &mut [Body], side: usize) {
+    fn spread(&self, open: &[bool], owner: &mut [u32], bodies: &mut [BlockComponent], side: usize) {
         let mut front: Vec<usize> = (0..open.len()).filter(|i| owner[*i] != 0).collect();
         while !front.is_empty() {
             let mut next = Vec::new();
@@ -223,7 +223,7 @@ impl BlockSearch<'_> {
 }
 
 /// A body of a block: its first point, its points, and how far it reaches.
-struct Body {
+struct BlockComponent {
     first: usize,
     size: u64,
     min: [usize; 3],
@@ -232,9 +232,9 @@ struct Body {
     bulges: bool,
 }
 
-impl Body {
-    fn at(first: usize) -> Body {
-        Body { first, size: 0, min: [usize::MAX; 3], max: [0; 3], bulges: false }
+impl BlockComponent {
+    fn at(first: usize) -> BlockComponent {
+        BlockComponent { first, size: 0, min: [usize::MAX; 3], max: [0; 3], bulges: false }
     }
 
     fn reach(&mut self, i: usize, side: usize) {

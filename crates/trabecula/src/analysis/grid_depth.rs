@@ -8,7 +8,7 @@ pub(super) fn depths(open: &[bool], shape: [usize; 3], step: f64) -> Vec<f32> {
     let far = 1e12f32;
     let mut d: Vec<f32> = open.iter().map(|o| if *o { 0.0 } else { far }).collect();
     let longest = nx.max(ny).max(nz);
-    let mut line = Line { f: vec![0.0; longest], v: vec![0; longest], z: vec![0.0; longest + 1] };
+    let mut line = ParabolaEnvelope { f: vec![0.0; longest], v: vec![0; longest], z: vec![0.0; longest + 1] };
     for l in 0..ny * nz {
         line.pass(&mut d[l * nx..(l + 1) * nx], nx, 1);
     }
@@ -22,16 +22,16 @@ pub(super) fn depths(open: &[bool], shape: [usize; 3], step: f64) -> Vec<f32> {
 }
 
 /// Room for one line of the grid: its values, the parabolas of the envelope, and where they take over.
-struct Line {
+struct ParabolaEnvelope {
     f: Vec<f32>,
     v: Vec<usize>,
     z: Vec<f32>,
 }
 
-impl Line {
+impl ParabolaEnvelope {
     /// Takes the values at a stride from the front of `d` to the least of their parabolas.
     fn pass(&mut self, d: &mut [f32], length: usize, stride: usize) {
-        let Line { f, v, z } = self;
+        let ParabolaEnvelope { f, v, z } = self;
         (0..length).for_each(|i| f[i] = d[i * stride]);
         let meet = |p: usize, q: usize, f: &[f32]| {
             let (a, b) = (p as f32, q as f32);

@@ -25,9 +25,9 @@ mod bits;
 mod lines;
 mod nearest_site;
 
-use balls::Space;
+use balls::BallSpace;
 use bits::Bits;
-use lines::{Lines, Shape};
+use lines::{LineCrossings, MeshInSteps};
 
 /// Bytes of memory that a voxel takes at most, sites of the surface included.
 pub const BYTES_PER_VOXEL: f64 = 16.0;
@@ -83,7 +83,7 @@ pub struct Thickness {
 }
 
 /// Voxels over a mesh.
-struct Grid {
+struct SolidVoxels {
     /// Centre of the first voxel, mm.
     first: Vec3,
     step: f64,
@@ -91,7 +91,7 @@ struct Grid {
     solid: Bits,
 }
 
-impl Grid {
+impl SolidVoxels {
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.shape[1] + y) * self.shape[0] + x
     }
@@ -193,7 +193,7 @@ pub fn thickness(
             let pores = pores(space.grid, region);
             let room = |v: [usize; 3]| -region.value(space.grid.place(v)) / step;
             if pores.count() > 0 {
-                pore = Some(spread(&Space { inside: &pores, side: 1.0, open: Some(&room), ..space }, watch)?);
+                pore = Some(spread(&BallSpace { inside: &pores, side: 1.0, open: Some(&room), ..space }, watch)?);
             }
         }
         Ok(Thickness { step, accuracy: ACCURACY * step, wall, pore })
@@ -215,7 +215,7 @@ pub fn thickness_at_vertices(surface: &SurfaceMesh, step: f64, progress: &dyn Pr
 }
 
 /// The local radius (steps) at a point of the surface.
-fn radius_at(grid: &Grid, radii: &[f32], p: Vec3) -> f64 {
+fn radius_at(grid: &SolidVoxels, radii: &[f32], p: Vec3) -> f64 {
     let at: Vec3 = core::array::from_fn(|a| (p[a] - grid.first[a]) / grid.step);
     let radius = |v: [i64; 3]| {
         let within = (0..3).all(|a| (0..grid.shape[a] as i64).contains(&v[a]));
@@ -242,7 +242,7 @@ fn in_solid<T>(
     region: Option<&Region>,
     step: f64,
     progress: &dyn Progress,
-    work: impl FnOnce(Space, &Watch) -> Result<T, Stopped>,
+    work: impl FnOnce(BallSpace, &Watch) -> Result<T, Stopped>,
 ) -> Result<T, Stopped> {
     let refuse = |message: String| Err(Stopped::Refused(Fault::new("", message)));
     let mesh = &surface.mesh;
@@ -267,10 +267,10 @@ fn in_solid<T>(
     let painted = nz * if region.is_some() { 4 } else { 2 };
     let watch = Watch::new(progress, (steps + painted) as u64);
 
-    let scaled = Shape::new(mesh, first, step);
+    let scaled = MeshInSteps::new(mesh, first, step);
     let (x, (y, z)) = rayon::join(
-        || Lines::new(&scaled, shape, 0),
-        || rayon::join(|| Lines::new(&scaled, shape, 1), || Lines::new(&scaled, shape, 2)),
+        || LineCrossings::new(&scaled, shape, 0),
+        || rayon::join(|| LineCrossings::new(&scaled, shape, 1), || LineCrossings::new(&scaled, shape, 2)),
     );
     let mut lines = [x, y, z];
     let mut sites = Vec::new();
@@ -278,7 +278,7 @@ fn in_solid<T>(
     if sites.len() >= lines::NONE as usize {
         return refuse("the surface is too large for this step; use a larger step".into());
     }
-    let mut grid = Grid { first, step, shape, solid: Bits::new(shape) };
+    let mut grid = SolidVoxels { first, step, shape, solid: Bits::new(shape) };
     fill(&mut grid, &lines[0], &sites);
     if grid.solid.count() == 0 {
         return refuse(format!(
@@ -289,7 +289,7 @@ fn in_solid<T>(
     drop(lines);
 
     let lattice = surface.cut.iter().any(|c| !*c);
-    let space = Space {
+    let space = BallSpace {
         grid: &grid,
         shape: &scaled,
         sites: &sites,
@@ -303,7 +303,7 @@ fn in_solid<T>(
 }
 
 /// The voxels whose centres are in the solid.
-fn fill(grid: &mut Grid, lines: &Lines, sites: &[lines::Site]) {
+fn fill(grid: &mut SolidVoxels, lines: &LineCrossings, sites: &[lines::Site]) {
     let nx = grid.shape[0];
     let stride = grid.solid.stride;
     grid.solid.words.par_chunks_mut(stride).enumerate().for_each(|(line, row)| {
@@ -320,7 +320,7 @@ fn fill(grid: &mut Grid, lines: &Lines, sites: &[lines::Site]) {
 }
 
 /// The voxels whose centres are in the region and not in the solid.
-fn pores(grid: &Grid, region: &Region) -> Bits {
+fn pores(grid: &SolidVoxels, region: &Region) -> Bits {
     let [nx, ny, _] = grid.shape;
     let axes =
         [0, 1, 2].map(|a| (0..grid.shape[a]).map(|i| grid.first[a] + i as f64 * grid.step).collect::<Vec<f64>>());
@@ -342,7 +342,7 @@ fn pores(grid: &Grid, region: &Region) -> Bits {
 }
 
 /// The distribution over a space.
-fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
+fn spread(space: &BallSpace, watch: &Watch) -> Result<Spread, Stopped> {
     let balls = space.balls(watch)?;
     let least = balls.iter().filter_map(|b| b.wall).reduce(f32::min).map(|d| d / 2.0);
     let balls = space.needed(&balls);

@@ -61,11 +61,11 @@ pub struct Transition {
 struct Points {
     shape: [usize; 3],
     /// `None` outside the region.
-    of: Vec<Option<Point>>,
+    of: Vec<Option<BlendSample>>,
 }
 
 #[derive(Clone, Copy)]
-struct Point {
+struct BlendSample {
     /// The lattices of greatest and second greatest weight.
     first: u8,
     second: u8,
@@ -89,7 +89,7 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     };
     let points = sample(solid, blend, shape, &at);
     // The region's surface is a cut and no surface of the lattice: points outside count as solid.
-    let open = |p: &Option<Point>| p.is_some_and(|p| !p.solid);
+    let open = |p: &Option<BlendSample>| p.is_some_and(|p| !p.solid);
     let open: Vec<bool> = points.of.iter().map(open).collect();
     let depth = depths(&open, shape, step);
     let mut pairs: Vec<[u8; 2]> = Vec::new();
@@ -102,8 +102,8 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     pairs.sort_unstable();
     let means = windows(&points, 2.0 * blend.longest() / step);
     let least = (WHOLE[1] * (solid.wavelength / step).powi(3)).ceil() as usize;
-    let grid = Grid { points: &points, depth: &depth, step, at: &at, least };
-    pairs.into_iter().map(|pair| grid.transition(&Pair::new(&points, pair), &means)).collect()
+    let grid = SampledPart { points: &points, depth: &depth, step, at: &at, least };
+    pairs.into_iter().map(|pair| grid.transition(&LatticePair::new(&points, pair), &means)).collect()
 }
 
 /// Samples the blend at the points of the grid, in parallel by rows along x.
@@ -120,7 +120,7 @@ fn sample(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -
         region
     });
     let region: Vec<f32> = layers.collect::<Vec<_>>().concat();
-    let rows: Vec<Vec<Option<Point>>> = (0..shape[1] * shape[2])
+    let rows: Vec<Vec<Option<BlendSample>>> = (0..shape[1] * shape[2])
         .into_par_iter()
         .map(|r| {
             let places: Vec<Vec3> = (r * row..(r + 1) * row).map(at).collect();
@@ -140,7 +140,7 @@ fn sample(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -
                 let Some(second) = rest.reduce(|m, k| if w[k] > w[m] { k } else { m }) else {
                     continue;
                 };
-                found[i] = Some(Point {
+                found[i] = Some(BlendSample {
                     first: first as u8,
                     second: second as u8,
                     share: (w[second] / (w[first] + w[second])) as f32,
@@ -161,7 +161,7 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
     let most = reach.floor() as usize;
     let share = |d: usize| (1.0 + (std::f64::consts::PI * d as f64 / reach).cos()) as f32;
     let window: Vec<f32> = (0..=most).map(share).collect();
-    let of = |p: &Option<Point>| p.map_or([0.0; 3], |p| [1.0, p.asked, f32::from(u8::from(p.solid))]);
+    let of = |p: &Option<BlendSample>| p.map_or([0.0; 3], |p| [1.0, p.asked, f32::from(u8::from(p.solid))]);
     let mut sums: Vec<[f32; 3]> = points.of.iter().map(of).collect();
     for (length, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
         let old = sums;
@@ -188,7 +188,7 @@ const SIDES: u8 = FIRST | SECOND;
 const WITHIN: u8 = 4;
 
 /// Two lattices, and where the sides of their transition are.
-struct Pair {
+struct LatticePair {
     of: [u8; 2],
     /// The least and greatest share of the second in the transition.
     range: [f32; 2],
@@ -197,9 +197,9 @@ struct Pair {
     ends: [f32; 2],
 }
 
-impl Pair {
-    fn new(points: &Points, of: [u8; 2]) -> Pair {
-        let mut pair = Pair { of, range: [1.0, 0.0], ends: [-1.0; 2] };
+impl LatticePair {
+    fn new(points: &Points, of: [u8; 2]) -> LatticePair {
+        let mut pair = LatticePair { of, range: [1.0, 0.0], ends: [-1.0; 2] };
         let all = || points.of.iter().flatten();
         let shares = all().filter(|p| pair.contains(p)).map(|p| pair.share_of_second(p));
         let (least, most) = shares.fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
@@ -211,17 +211,17 @@ impl Pair {
     }
 
     /// Whether a point lies in the transition.
-    fn contains(&self, p: &Point) -> bool {
+    fn contains(&self, p: &BlendSample) -> bool {
         p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == self.of
     }
 
     /// The share of the second of the pair at a point of the transition.
-    fn share_of_second(&self, p: &Point) -> f32 {
+    fn share_of_second(&self, p: &BlendSample) -> f32 {
         if p.first == self.of[0] { p.share } else { 1.0 - p.share }
     }
 
     /// The marks of a point; none where other lattices are.
-    fn marks(&self, p: &Point) -> u8 {
+    fn marks(&self, p: &BlendSample) -> u8 {
         match p.share {
             0.0 if p.first == self.of[0] => FIRST,
             0.0 if p.first == self.of[1] => SECOND,
@@ -255,7 +255,7 @@ impl Pair {
 }
 
 /// Connected components of the points added so far.
-struct Components {
+struct PointComponents {
     shape: [usize; 3],
     root: Vec<u32>,
     added: Vec<bool>,
@@ -264,10 +264,10 @@ struct Components {
     size: Vec<u32>,
 }
 
-impl Components {
-    fn new(points: &Points, pair: &Pair) -> Components {
+impl PointComponents {
+    fn new(points: &Points, pair: &LatticePair) -> PointComponents {
         let count = points.of.len();
-        Components {
+        PointComponents {
             shape: points.shape,
             root: singles(count),
             added: vec![false; count],
@@ -334,7 +334,7 @@ impl Components {
 }
 
 /// The sampled part.
-struct Grid<'a> {
+struct SampledPart<'a> {
     points: &'a Points,
     /// Depth of each point below the surface, mm.
     depth: &'a [f32],
@@ -346,10 +346,10 @@ struct Grid<'a> {
     least: usize,
 }
 
-impl Grid<'_> {
+impl SampledPart<'_> {
     /// The solid points of a transition and its sides, the deepest first.
-    fn deepest_first(&self, pair: &Pair) -> Vec<u32> {
-        let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && pair.marks(&p) > 0);
+    fn deepest_first(&self, pair: &LatticePair) -> Vec<u32> {
+        let wanted = |p: &Option<BlendSample>| p.is_some_and(|p| p.solid && pair.marks(&p) > 0);
         let mut order: Vec<u32> =
             (0..self.points.of.len() as u32).filter(|i| wanted(&self.points.of[*i as usize])).collect();
         order.sort_unstable_by(|a, b| self.depth[*b as usize].total_cmp(&self.depth[*a as usize]).then(a.cmp(b)));
@@ -362,9 +362,9 @@ impl Grid<'_> {
     }
 
     /// `Transition::gap` of a pair no component of which touches both sides.
-    fn gap(&self, pair: &Pair) -> Option<Vec3> {
+    fn gap(&self, pair: &LatticePair) -> Option<Vec3> {
         let all = || self.points.of.iter().enumerate().filter_map(|(i, p)| Some((i, p.as_ref().filter(|p| p.solid)?)));
-        let mut components = Components::new(self.points, pair);
+        let mut components = PointComponents::new(self.points, pair);
         all().for_each(|(i, _)| _ = components.add(i as u32));
         // Another lattice may lead across.
         if components.roots().any(|i| components.marks[i] & SIDES == SIDES) {
@@ -390,9 +390,9 @@ impl Grid<'_> {
         last.map(|(i, _)| (self.at)(i))
     }
 
-    fn transition(&self, pair: &Pair, means: &[[f32; 2]]) -> Transition {
+    fn transition(&self, pair: &LatticePair, means: &[[f32; 2]]) -> Transition {
         let order = self.deepest_first(pair);
-        let mut components = Components::new(self.points, pair);
+        let mut components = PointComponents::new(self.points, pair);
         let mut neck = None;
         for i in &order {
             if components.add(*i) & SIDES == SIDES && neck.is_none() {
@@ -402,7 +402,7 @@ impl Grid<'_> {
         let (loose, loose_points) = components.loose();
         let mut dangling = (0, 0);
         if let Some((wide, _)) = neck {
-            let mut thick = Components::new(self.points, pair);
+            let mut thick = PointComponents::new(self.points, pair);
             for i in order.iter().filter(|i| self.thickness(**i) >= THIN * wide) {
                 thick.add(*i);
             }

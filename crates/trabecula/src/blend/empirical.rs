@@ -79,7 +79,7 @@ pub(super) fn add_times(sum: &mut [f32], w: f32, values: &[f32]) {
 /// The segment of tabulated quantile functions in which a fraction lies, and the position in it. Below q = 0 a function continues
 /// with the mean slope of the whole table.
 #[derive(Clone, Copy)]
-pub(super) struct Segment {
+pub(super) struct QuantileSegment {
     /// Indices of its ends in a table.
     ends: [usize; 2],
     /// Position from the first end, in lengths of the segment.
@@ -88,17 +88,17 @@ pub(super) struct Segment {
     per: f64,
 }
 
-impl Segment {
+impl QuantileSegment {
     /// The segment of the fraction q.
     #[inline]
-    pub fn at(q: f64) -> Segment {
+    pub fn at(q: f64) -> QuantileSegment {
         if q < 0.0 {
-            return Segment { ends: [0, SEGMENTS], position: q, per: 1.0 };
+            return QuantileSegment { ends: [0, SEGMENTS], position: q, per: 1.0 };
         }
         let x = (q * SEGMENTS as f64).min(SEGMENTS as f64);
         // Conversion through i32 is the fastest.
         let k = (x as i32 as usize).min(SEGMENTS - 1);
-        Segment { ends: [k, k + 1], position: x - k as f64, per: SEGMENTS as f64 }
+        QuantileSegment { ends: [k, k + 1], position: x - k as f64, per: SEGMENTS as f64 }
     }
 
     /// T and dT/dq there, from the table of T.
@@ -112,7 +112,7 @@ impl Segment {
 /// T(q) from a table of T.
 #[inline]
 pub(super) fn quantile(table: &[f32], q: f64) -> f64 {
-    Segment::at(q).value_and_slope(table).0
+    QuantileSegment::at(q).value_and_slope(table).0
 }
 
 #[cfg(test)]
@@ -135,7 +135,7 @@ mod tests {
             assert!((quantile(&table, q) - want).abs() < 2.5e-3, "{q}: {}", quantile(&table, q));
         }
         assert!((distribution.quantile(0.0) + 0.25).abs() < 1e-6 && (distribution.quantile(1.0) - 0.75).abs() < 1e-6);
-        let (below, slope) = Segment::at(-0.1).value_and_slope(&table);
+        let (below, slope) = QuantileSegment::at(-0.1).value_and_slope(&table);
         assert!((below + 0.35).abs() < 1e-6 && (slope - 1.0).abs() < 1e-6);
         let same = Empirical::new(&[2.5; 7]);
         assert_eq!([0.0, 0.3, 1.0].map(|q| same.quantile(q)), [2.5; 3]);

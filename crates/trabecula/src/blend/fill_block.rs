@@ -14,13 +14,13 @@ use geometry::math::{Aabb, Interval, Vec3};
 const CUBE: usize = 8;
 
 /// For every cube of a block the summands that may have a weight in it, a bit for each.
-struct Cubes {
+struct CubeSummands {
     shape: [usize; 3],
     present: Vec<u64>,
 }
 
-impl Cubes {
-    fn new(blend: &Blend, block: &Block) -> Cubes {
+impl CubeSummands {
+    fn new(blend: &Blend, block: &Block) -> CubeSummands {
         let mut bound = vec![Interval::new(0.0, 0.0); blend.summands.len()];
         let mut present_in = |b: &Aabb| {
             blend.weights.bound(b, &mut bound);
@@ -29,7 +29,7 @@ impl Cubes {
         let shape = block.shape().map(|n| n.div_ceil(CUBE));
         let all = present_in(&block.bounds());
         if all.count_ones() == 1 {
-            return Cubes { shape, present: vec![all; shape.iter().product()] };
+            return CubeSummands { shape, present: vec![all; shape.iter().product()] };
         }
         let each = (0..shape.iter().product()).map(|n: usize| {
             let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
@@ -39,7 +39,7 @@ impl Cubes {
             });
             present_in(&Block { axes: nodes }.bounds())
         });
-        Cubes { present: each.collect(), shape }
+        CubeSummands { present: each.collect(), shape }
     }
 
     /// The cubes of a row of nodes.
@@ -58,7 +58,7 @@ impl Blend {
         wanted: Option<&[u64]>,
         mut out: [&mut [f32]; S],
     ) {
-        let cubes = Cubes::new(self, block);
+        let cubes = CubeSummands::new(self, block);
         let all = cubes.present.iter().fold(0, |m, c| m | c);
         let [xs, ys, zs] = block.axes;
         let mut rows: Vec<_> =

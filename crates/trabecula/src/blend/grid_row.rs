@@ -5,7 +5,7 @@ use geometry::math::Vec3;
 
 /// A row of nodes along x, and the cores of the summands there.
 pub(super) struct GridRow<'a> {
-    pub rows: &'a [Option<summand::Rows<'a>>],
+    pub rows: &'a [Option<summand::SummandRows<'a>>],
     pub cores: &'a [Vec<f32>],
     /// Its indices along y and z.
     pub index: [usize; 2],

@@ -5,10 +5,10 @@
 //! Σ λₗ Tₗ(Q) − Σ wᵢ Tᵢ(qᵢ), with λ the barycentric coordinates of the shares, Q the blended quantile (`ends::blended`), Tᵢ the function
 //! of the node where lattice i is alone and qᵢ its own quantile.
 
-use super::empirical::{Segment, quantile};
+use super::empirical::{QuantileSegment, quantile};
 use super::ends::{EndQuantiles, HIGH, blended, blended_gradient};
-use super::levels::Levels;
-use super::share_grid::Simplex;
+use super::levels::BlendLevels;
+use super::share_grid::ShareSimplex;
 use super::summand::Summand;
 use super::window_cache::WindowCache;
 use geometry::math::{Vec3, add, scale, sub};
@@ -17,22 +17,22 @@ use geometry::math::{Vec3, add, scale, sub};
 #[derive(Default)]
 pub(super) struct Position {
     /// The simplex of its shares.
-    pub simplex: Simplex,
+    pub simplex: ShareSimplex,
     /// The quantiles of the lattices, where levels vary.
     pub quantiles: Vec<[f64; 2]>,
-    terms: Vec<Term>,
+    terms: Vec<OffsetTerm>,
 }
 
 /// A node's term in an offset: the factor of its number and, of a quantile function, the fraction at which it is evaluated. (Not an
 /// enum: read before its tag, a small integer would be taken for a subnormal float, and those are slow.)
 #[derive(Clone, Copy)]
-struct Term {
+struct OffsetTerm {
     node: usize,
     factor: f64,
     q: f64,
 }
 
-impl Levels {
+impl BlendLevels {
     /// The offset of an end at a point (mm) with shares `w`, whose position in the tables is `at`.
     pub fn offset(&self, summands: &[Summand], p: Vec3, w: &[f64], at: &mut Position, end: usize) -> f64 {
         let mut sum = self.terms(summands, w, at, end);
@@ -63,12 +63,12 @@ impl Levels {
         };
         terms.clear();
         let nodes = simplex.nodes.iter().zip(&simplex.coordinates);
-        terms.extend(nodes.map(|(node, factor)| Term { node: *node, factor: *factor, q: own }));
+        terms.extend(nodes.map(|(node, factor)| OffsetTerm { node: *node, factor: *factor, q: own }));
         let mut constant = 0.0;
         if !self.is_uniform() {
             for (i, s) in summands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
                 if end == HIGH || s.is_sheet() {
-                    terms.push(Term { node: self.alone[i], factor: -w[i], q: quantiles[i][end] });
+                    terms.push(OffsetTerm { node: self.alone[i], factor: -w[i], q: quantiles[i][end] });
                 } else {
                     constant -= w[i] * s.lower_end(0.0);
                 }
@@ -84,16 +84,16 @@ impl Levels {
         &self,
         summands: &[Summand],
         windows: &mut WindowCache<C>,
-        (w, dw, simplex): (&[f64], &[Vec3], &Simplex),
+        (w, dw, simplex): (&[f64], &[Vec3], &ShareSimplex),
         ends: &[EndQuantiles],
         end: usize,
     ) -> (f64, Vec3) {
         let uniform = self.is_uniform();
         let (own, dq) = match uniform {
-            true => (Segment::at(0.0), [0.0; 3]),
+            true => (QuantileSegment::at(0.0), [0.0; 3]),
             false => {
                 let (q, dq) = blended_gradient(w, dw, ends, end);
-                (Segment::at(q), dq)
+                (QuantileSegment::at(q), dq)
             }
         };
         let (mut sum, mut steep) = ([0.0; C], [0.0; C]);
@@ -122,7 +122,7 @@ impl Levels {
             gradient = add(gradient, scale(dq, windows.interpolate(&steep)));
             for (i, s) in summands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
                 if end == HIGH || s.is_sheet() {
-                    let segment = Segment::at(ends[i].quantiles[end]);
+                    let segment = QuantileSegment::at(ends[i].quantiles[end]);
                     let (v, slope) = windows.quantiles(self.alone[i], segment);
                     add_to(&mut sum, -w[i], &v);
                     let own = scale(ends[i].slopes[end], w[i] * windows.interpolate(&slope));

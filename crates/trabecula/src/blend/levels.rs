@@ -40,7 +40,7 @@ pub(super) struct WindowTables {
 }
 
 /// The levels of a blend by fraction.
-pub(super) struct Levels {
+pub(super) struct BlendLevels {
     pub windows: Windows,
     weights: Weights,
     pub grid: ShareGrid,
@@ -56,8 +56,8 @@ pub(super) struct Levels {
     pub alone: Vec<usize>,
 }
 
-impl Levels {
-    pub fn new(summands: &[Summand], windows: Windows, weights: &Weights) -> Levels {
+impl BlendLevels {
+    pub fn new(summands: &[Summand], windows: Windows, weights: &Weights) -> BlendLevels {
         let n = summands.len();
         let grid = ShareGrid::new(n);
         let (mut alone, mut nodes) = (vec![0; n], vec![Vec::new(); grid.len()]);
@@ -68,7 +68,7 @@ impl Levels {
             }
         });
         let quantiles = |s: &Summand| Some(s.quantiles(s.uniform_upper_end()?));
-        Levels {
+        BlendLevels {
             two_sided: summands.iter().any(Summand::is_sheet),
             uniform: summands.iter().map(quantiles).collect(),
             tables: (0..windows.len()).map(|_| OnceLock::new()).collect(),

@@ -6,7 +6,7 @@
 use super::ends::HIGH;
 use super::grid_row::GridRow;
 use super::row_cache::RowCache;
-use super::share_grid::Simplex;
+use super::share_grid::ShareSimplex;
 use super::sum::{Blend, BlendBound};
 use super::summand::Summand;
 use geometry::math::Vec3;
@@ -122,7 +122,7 @@ impl Blend {
         let n = self.summands.len();
         let mut w = vec![0.0; n * points.len()];
         self.weights.values(points, &mut w);
-        let mut simplex = Simplex::default();
+        let mut simplex = ShareSimplex::default();
         for (out, w) in out.chunks_exact_mut(3 * n).zip(w.chunks_exact(n)) {
             out[..n].copy_from_slice(w);
             if let Some(levels) = &self.levels {

@@ -3,7 +3,7 @@
 use super::ends::{EndQuantiles, HIGH, LOW};
 use super::evaluated::{Evaluated, zeros};
 use super::level_offset::Position;
-use super::share_grid::Simplex;
+use super::share_grid::ShareSimplex;
 use super::sum::Blend;
 use super::window_cache::WindowCache;
 use geometry::math::{Vec3, add, scale, sub};
@@ -92,7 +92,7 @@ impl Blend {
         let evaluated: Vec<Evaluated> = (0..n).map(evaluate).collect();
         let varied = self.varied().is_some();
         let mut quantiles = vec![EndQuantiles::default(); if varied { n } else { 0 }];
-        let mut simplex = Simplex::default();
+        let mut simplex = ShareSimplex::default();
         let mut windows = self.levels.as_deref().map(|l| WindowCache::<C>::new(l, summands));
         for (k, p) in points.iter().enumerate() {
             let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);

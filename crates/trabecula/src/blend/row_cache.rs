@@ -1,9 +1,9 @@
 //! Offsets of a blend's ends at the nodes of a grid row along x. What is interpolated between windows along y and z is kept for the
 //! row, and that between windows along z for the rows of one layer.
 
-use super::empirical::{Segment, add_times};
+use super::empirical::{QuantileSegment, add_times};
 use super::ends::{HIGH, blended};
-use super::levels::Levels;
+use super::levels::BlendLevels;
 use super::node_table::NodeTable;
 use super::summand::Summand;
 
@@ -31,7 +31,7 @@ struct AdjacentWindows {
 
 impl RowCache {
     /// Rows with nodes at these x.
-    pub fn new(levels: &Levels, xs: &[f64]) -> RowCache {
+    pub fn new(levels: &BlendLevels, xs: &[f64]) -> RowCache {
         let last = levels.windows.shape[0] - 1;
         let along = |x: &f64| {
             let (n, weight, _) = levels.windows.interval(0, *x);
@@ -55,7 +55,7 @@ impl RowCache {
     }
 
     /// Moves to the row at this y and z (mm).
-    pub fn move_to(&mut self, levels: &Levels, at: [f64; 2]) {
+    pub fn move_to(&mut self, levels: &BlendLevels, at: [f64; 2]) {
         let across = [0, 1].map(|a| {
             let (n, weight, _) = levels.windows.interval(a + 1, at[a]);
             (n, weight)
@@ -76,7 +76,13 @@ impl RowCache {
 
 impl AdjacentWindows {
     /// Adds a node's numbers of a column, interpolated along y and z.
-    fn interpolate(&mut self, levels: &Levels, summands: &[Summand], (column, node): (usize, usize), out: &mut [f32]) {
+    fn interpolate(
+        &mut self,
+        levels: &BlendLevels,
+        summands: &[Summand],
+        (column, node): (usize, usize),
+        out: &mut [f32],
+    ) {
         let [nx, ny, _] = levels.windows.shape;
         let Some(across) = self.across else { return };
         let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
@@ -97,7 +103,7 @@ impl AdjacentWindows {
     }
 }
 
-impl Levels {
+impl BlendLevels {
     /// The offset of an end at the i-th node of the current row, where no level varies; the shares have barycentric coordinates at
     /// `nodes` of their grid (indices in the bits of floats).
     #[inline(always)]
@@ -166,7 +172,7 @@ impl Levels {
         let columns = || (columns.into_iter().zip([1.0 - weight, weight])).filter(|c| c.1 > 0.0);
         let RowCache { adjacent, quantiles, .. } = row;
         // A node's quantile function, interpolated between the columns.
-        let mut quantile = |node: usize, segment: Segment| -> f64 {
+        let mut quantile = |node: usize, segment: QuantileSegment| -> f64 {
             let each = columns().map(|(column, weight)| {
                 let table = quantiles[column].get_or_insert(node, |out| {
                     adjacent.interpolate(self, summands, (column, node), out);
@@ -176,13 +182,13 @@ impl Levels {
             each.sum()
         };
         let mut sum = 0.0;
-        let own = Segment::at(blended(w, (0..w.len()).map(&q))[end]);
+        let own = QuantileSegment::at(blended(w, (0..w.len()).map(&q))[end]);
         for (node, coordinate) in nodes.iter().zip(coordinates).filter(|n| *n.1 != 0.0) {
             sum += coordinate * quantile(node.to_bits() as usize, own);
         }
         for (s, summand) in summands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
             let base = match end == HIGH || summand.is_sheet() {
-                true => quantile(self.alone[s], Segment::at(q(s)[end])),
+                true => quantile(self.alone[s], QuantileSegment::at(q(s)[end])),
                 false => summand.lower_end(0.0),
             };
             sum -= w[s] * base;

@@ -28,7 +28,7 @@ pub(super) struct ShareGrid {
 
 /// The small simplex in which shares lie: its nodes, and the barycentric coordinates of the shares.
 #[derive(Default)]
-pub(super) struct Simplex {
+pub(super) struct ShareSimplex {
     pub nodes: Vec<usize>,
     pub coordinates: Vec<f64>,
     /// For each node but the first: index (from 0) of the y that rises by one from the node before it.
@@ -84,7 +84,7 @@ impl ShareGrid {
     }
 
     /// Finds the simplex in which shares `w` lie.
-    pub fn locate(&self, w: &[f64], at: &mut Simplex) {
+    pub fn locate(&self, w: &[f64], at: &mut ShareSimplex) {
         let (d, m) = (self.n - 1, self.steps as f64);
         if d == 1 {
             // For two lattices node k is y = k.
@@ -151,7 +151,7 @@ mod tests {
                 table[i] = f(w);
             });
             assert!(table.iter().all(|v| v.is_finite()));
-            let mut at = Simplex::default();
+            let mut at = ShareSimplex::default();
             for i in 0..2000 {
                 let mut w: Vec<f64> = (0..n)
                     .map(|k| ((i * (k + 3)) as f64 * 0.7548776662466927).fract())

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::constituent::Constituent;
 use super::ends::{HIGH, LOW};
-use super::levels::Levels;
+use super::levels::BlendLevels;
 use super::summand::Summand;
 use super::weights::Weights;
 use super::windows::{Phases, Windows};
+use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Vec3, apply, inverse, norm, sub};
 
@@ -17,12 +18,13 @@ const MOST: usize = 64;
 const SAMPLES: usize = 4096;
 
 /// What a blend keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum By {
-    /// The fractions asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(name = "By", noun = "word")]
+pub enum BlendRule {
+    /// The solid fractions: each lattice's own where it is alone, their weighted mean between.
     #[default]
     Fraction,
-    /// The weighted sum of the levels.
+    /// The weighted sum of the fields as it comes; material is lost half-way.
     Value,
 }
 
@@ -41,7 +43,7 @@ pub struct Blend {
     pub(super) summands: Arc<[Summand]>,
     pub(super) weights: Weights,
     /// Set where the fraction is kept.
-    pub(super) levels: Option<Arc<Levels>>,
+    pub(super) levels: Option<Arc<BlendLevels>>,
     /// Whether any summand is a sheet, so that there is a lower end.
     pub(super) two_sided: bool,
     /// Set for one side alone.
@@ -63,7 +65,7 @@ impl Blend {
     ///
     /// # Errors
     /// Fewer than two lattices, more than 64, or another number of them than of weights.
-    pub fn new(of: Vec<Constituent>, weights: Weights, by: By, bounds: &Aabb) -> Result<Blend, Fault> {
+    pub fn new(of: Vec<Constituent>, weights: Weights, by: BlendRule, bounds: &Aabb) -> Result<Blend, Fault> {
         if of.len() < 2 || of.len() != weights.len() || of.len() > MOST {
             let message = format!(
                 "{} lattices and {} weights; a blend is of 2 to {} lattices with a weight each",
@@ -74,10 +76,10 @@ impl Blend {
             return Err(Fault::new("", message));
         }
         let windows = Windows::new(&of, bounds);
-        let normalise = by == By::Fraction;
+        let normalise = by == BlendRule::Fraction;
         let (summands, covariance) = summands(of, normalise, &windows, bounds);
         let summands: Arc<[Summand]> = summands.into();
-        let levels = normalise.then(|| Arc::new(Levels::new(&summands, windows, &weights)));
+        let levels = normalise.then(|| Arc::new(BlendLevels::new(&summands, windows, &weights)));
         // Half as much again for the gradients of the shares: transitions are longer than cells.
         let lipschitz = summands.iter().map(Summand::lipschitz).fold(0.0, f64::max) * 1.5;
         Ok(Blend {
@@ -202,7 +204,7 @@ impl Blend {
     }
 
     /// The levels, where quantiles vary in space.
-    pub(super) fn varied(&self) -> Option<&Levels> {
+    pub(super) fn varied(&self) -> Option<&BlendLevels> {
         self.levels.as_deref().filter(|l| !l.is_uniform())
     }
 

@@ -357,7 +357,7 @@ impl Summand {
     }
 
     /// g on the rows of a block; `wanted` says where.
-    pub fn rows<'a>(&'a self, block: &Block<'a>, wanted: Option<&[u64]>) -> Rows<'a> {
+    pub fn rows<'a>(&'a self, block: &Block<'a>, wanted: Option<&[u64]>) -> SummandRows<'a> {
         let shape = [block.axes[0].len(), block.axes[1].len()];
         let filled = |field: &dyn Field| {
             let mut values = vec![0f32; block.len()];
@@ -368,33 +368,33 @@ impl Summand {
             values
         };
         let of = match &self.of {
-            Constituent::Lattice(l) => Kind::Lattice(Box::new(lattice::Rows::new(l, block))),
-            Constituent::Field { field, .. } => Kind::Filled(filled(&**field), shape),
+            Constituent::Lattice(l) => CoreRows::Lattice(Box::new(lattice::LatticeRows::new(l, block))),
+            Constituent::Field { field, .. } => CoreRows::Filled(filled(&**field), shape),
             Constituent::Wall { sides, .. } => {
                 let [mut a, b] = sides.each_ref().map(|side| filled(&**side));
                 (a.iter_mut().zip(b)).for_each(|(a, b)| *a = 0.5 * (*a - b));
-                Kind::Filled(a, shape)
+                CoreRows::Filled(a, shape)
             }
         };
-        Rows { of, factor: self.factor }
+        SummandRows { of, factor: self.factor }
     }
 }
 
 /// The core of a summand on the rows of a block.
-pub(super) struct Rows<'a> {
-    of: Kind<'a>,
+pub(super) struct SummandRows<'a> {
+    of: CoreRows<'a>,
     factor: f64,
 }
 
-enum Kind<'a> {
-    Lattice(Box<lattice::Rows<'a>>),
+enum CoreRows<'a> {
+    Lattice(Box<lattice::LatticeRows<'a>>),
     Filled(Vec<f32>, [usize; 2]),
 }
 
-impl Rows<'_> {
+impl SummandRows<'_> {
     /// Makes ready for the rows of layer k.
     pub fn enter_layer(&mut self, k: usize) {
-        if let Kind::Lattice(rows) = &mut self.of {
+        if let CoreRows::Lattice(rows) = &mut self.of {
             rows.enter_layer(k);
         }
     }
@@ -402,8 +402,8 @@ impl Rows<'_> {
     /// Fills the row (j, k) of the layer entered last with the core in single precision.
     pub fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
         match &mut self.of {
-            Kind::Lattice(rows) => rows.fill(j, k, wanted, row),
-            Kind::Filled(values, [nx, ny]) => {
+            CoreRows::Lattice(rows) => rows.fill(j, k, wanted, row),
+            CoreRows::Filled(values, [nx, ny]) => {
                 row.copy_from_slice(&values[(k * *ny + j) * *nx..][..*nx]);
             }
         }

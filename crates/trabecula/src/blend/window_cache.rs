@@ -1,7 +1,7 @@
 //! The windows about a point and what is tabulated at them, kept from point to point; trilinear interpolation between them.
 
-use super::empirical::Segment;
-use super::levels::Levels;
+use super::empirical::QuantileSegment;
+use super::levels::BlendLevels;
 use super::summand::Summand;
 use geometry::math::Vec3;
 
@@ -12,10 +12,10 @@ const EMPTY: usize = usize::MAX;
 
 /// The C windows about a point: eight, or one that serves everywhere.
 pub(super) struct WindowCache<'a, const C: usize> {
-    levels: &'a Levels,
+    levels: &'a BlendLevels,
     summands: &'a [Summand],
     /// Interpolation cells, each in the slot of its key modulo `SLOTS`; and the slot of the current point.
-    slots: Vec<Cell<'a, C>>,
+    slots: Vec<WindowCell<'a, C>>,
     current: usize,
     /// The cell's first window along each axis; NaN where the point lies beyond the outermost.
     first: Vec3,
@@ -25,7 +25,7 @@ pub(super) struct WindowCache<'a, const C: usize> {
 }
 
 /// An interpolation cell between windows.
-struct Cell<'a, const C: usize> {
+struct WindowCell<'a, const C: usize> {
     key: usize,
     windows: [usize; C],
     /// For each node of the shares' grid, once needed: the offsets of both ends, or where levels vary the quantile functions.
@@ -35,8 +35,8 @@ struct Cell<'a, const C: usize> {
 
 impl<'a, const C: usize> WindowCache<'a, C> {
     /// At no point yet.
-    pub fn new(levels: &'a Levels, summands: &'a [Summand]) -> WindowCache<'a, C> {
-        let empty = || Cell { key: EMPTY, windows: [0; C], offsets: Vec::new(), quantiles: Vec::new() };
+    pub fn new(levels: &'a BlendLevels, summands: &'a [Summand]) -> WindowCache<'a, C> {
+        let empty = || WindowCell { key: EMPTY, windows: [0; C], offsets: Vec::new(), quantiles: Vec::new() };
         WindowCache {
             levels,
             summands,
@@ -98,7 +98,7 @@ impl<'a, const C: usize> WindowCache<'a, C> {
     #[inline]
     pub fn offsets(&mut self, node: usize, end: usize) -> [f64; C] {
         let (levels, summands) = (self.levels, self.summands);
-        let Cell { windows, offsets, .. } = &mut self.slots[self.current];
+        let WindowCell { windows, offsets, .. } = &mut self.slots[self.current];
         let offsets = offsets[node].get_or_insert_with(|| {
             let of_windows = windows.map(|i| levels.node_values(i, summands, node));
             [0, 1].map(|e| of_windows.map(|of| of[e]))
@@ -108,9 +108,9 @@ impl<'a, const C: usize> WindowCache<'a, C> {
 
     /// The quantile functions of a node at a fraction, and their slopes, where levels vary.
     #[inline]
-    pub fn quantiles(&mut self, node: usize, segment: Segment) -> ([f64; C], [f64; C]) {
+    pub fn quantiles(&mut self, node: usize, segment: QuantileSegment) -> ([f64; C], [f64; C]) {
         let (levels, summands) = (self.levels, self.summands);
-        let Cell { windows, quantiles, .. } = &mut self.slots[self.current];
+        let WindowCell { windows, quantiles, .. } = &mut self.slots[self.current];
         let of = quantiles[node]
             .get_or_insert_with(|| windows.map(|i| levels.node_values(i, summands, node)))
             .map(|table| segment.value_and_slope(table));

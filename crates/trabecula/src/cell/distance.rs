@@ -9,9 +9,9 @@ use std::sync::OnceLock;
 
 use super::Part;
 use super::curvature;
-use super::nearest::Search;
+use super::nearest::NearestSearch;
 use super::periodic_components::connected;
-use super::periodic_spline::Spline;
+use super::periodic_spline::PeriodicSpline;
 use super::quantile::Quantile;
 use super::series::Series;
 use super::thickness::least;
@@ -33,7 +33,7 @@ const NODES: [f64; 3] = [36.0, 72.0, 96.0];
 
 /// The signed distance to f = 0 in mm, by phase: positive where f is.
 pub struct Distance {
-    spline: Spline,
+    spline: PeriodicSpline,
     /// The metric it was measured in: phases are M x.
     to_phase: Mat3,
     /// A bound of |∂d/∂x|.
@@ -64,8 +64,8 @@ impl Distance {
             let most = (0.5 * waves).clamp(NODES[1], NODES[2]);
             bends.max(waves).clamp(NODES[0], most).ceil() as usize
         });
-        let values = Search::new(series, to_phase, shape).distances();
-        let spline = Spline::through(values, shape);
+        let values = NearestSearch::new(series, to_phase, shape).distances();
+        let spline = PeriodicSpline::through(values, shape);
         let error = |u: Vec3| {
             let mut d = [0.0];
             spline.values(&[u], &mut d);

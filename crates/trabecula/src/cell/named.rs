@@ -8,7 +8,7 @@ use geometry::fault::Fault;
 
 /// A named surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Named {
+pub struct NamedCell {
     /// Name in designs.
     pub name: &'static str,
     /// The usual long name.
@@ -67,8 +67,8 @@ const SCHOEN: &str =
     "Schoen, NASA TN D-5541 (1970); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407";
 const SCHWARZ: &str = "Schwarz, Gesammelte Mathematische Abhandlungen (1890); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407";
 
-static CATALOGUE: [Named; 10] = [
-    Named {
+static CATALOGUE: [NamedCell; 10] = [
+    NamedCell {
         name: "gyroid",
         title: "Schoen gyroid",
         formula: "sx cy + sy cz + sz cx",
@@ -76,7 +76,7 @@ static CATALOGUE: [Named; 10] = [
         source: SCHOEN,
         products: products!(3; cyclic(1.0, [S(1), C(1), One])),
     },
-    Named {
+    NamedCell {
         name: "gyroid_mirrored",
         title: "Schoen gyroid, the other hand",
         formula: "cx sy + cy sz + cz sx",
@@ -84,7 +84,7 @@ static CATALOGUE: [Named; 10] = [
         source: "SPARTAN equations, section 3; the mirror image of the usual form",
         products: products!(3; cyclic(1.0, [C(1), S(1), One])),
     },
-    Named {
+    NamedCell {
         name: "diamond",
         title: "Schwarz diamond, four-term form",
         formula: "sx sy sz + sx cy cz + cx sy cz + cx cy sz",
@@ -92,7 +92,7 @@ static CATALOGUE: [Named; 10] = [
         source: SCHWARZ,
         products: products!(4; cyclic(1.0, [S(1), C(1), C(1)]); (1.0, [S(1), S(1), S(1)])),
     },
-    Named {
+    NamedCell {
         name: "primitive",
         title: "Schwarz primitive",
         formula: "cx + cy + cz",
@@ -100,7 +100,7 @@ static CATALOGUE: [Named; 10] = [
         source: SCHWARZ,
         products: products!(3; cyclic(1.0, [C(1), One, One])),
     },
-    Named {
+    NamedCell {
         name: "iwp",
         title: "Schoen I-WP, two-shell form",
         formula: "2(cx cy + cy cz + cz cx) - (c2x + c2y + c2z)",
@@ -108,7 +108,7 @@ static CATALOGUE: [Named; 10] = [
         source: SCHOEN,
         products: products!(6; cyclic(2.0, [C(1), C(1), One]), cyclic(-1.0, [C(2), One, One])),
     },
-    Named {
+    NamedCell {
         name: "neovius",
         title: "Neovius, C(P)",
         formula: "3(cx + cy + cz) + 4 cx cy cz",
@@ -116,7 +116,7 @@ static CATALOGUE: [Named; 10] = [
         source: "Neovius, dissertation, Helsinki (1883); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407",
         products: products!(4; cyclic(3.0, [C(1), One, One]); (4.0, [C(1), C(1), C(1)])),
     },
-    Named {
+    NamedCell {
         name: "frd",
         title: "Schoen F-RD",
         formula: "4 cx cy cz - (c2x c2y + c2y c2z + c2z c2x)",
@@ -124,7 +124,7 @@ static CATALOGUE: [Named; 10] = [
         source: SCHOEN,
         products: products!(4; cyclic(-1.0, [C(2), C(2), One]); (4.0, [C(1), C(1), C(1)])),
     },
-    Named {
+    NamedCell {
         name: "fischer_koch_s",
         title: "Fischer-Koch S",
         formula: "c2x sy cz + cx c2y sz + sx cy c2z",
@@ -132,7 +132,7 @@ static CATALOGUE: [Named; 10] = [
         source: "Fischer and Koch, Z. Kristallogr. 179 (1987) 31; nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407",
         products: products!(3; cyclic(1.0, [C(2), S(1), C(1)])),
     },
-    Named {
+    NamedCell {
         name: "lidinoid",
         title: "Lidinoid",
         formula: "0.5(s2x cy sz + s2y cz sx + s2z cx sy) - 0.5(c2x c2y + c2y c2z + c2z c2x) + 0.15",
@@ -140,7 +140,7 @@ static CATALOGUE: [Named; 10] = [
         source: "Lidin and Larsson, J. Chem. Soc. Faraday Trans. 86 (1990) 769; the usual level-set form",
         products: products!(7; cyclic(0.5, [S(2), C(1), S(1)]), cyclic(-0.5, [C(2), C(2), One]); (0.15, [One, One, One])),
     },
-    Named {
+    NamedCell {
         name: "split_p",
         title: "Split P",
         formula: "1.1(s2x sz cy + s2y sx cz + s2z sy cx) - 0.2(c2x c2y + c2y c2z + c2z c2x) - 0.4(c2x + c2y + c2z)",
@@ -150,7 +150,7 @@ static CATALOGUE: [Named; 10] = [
     },
 ];
 
-impl Named {
+impl NamedCell {
     /// The number of its space group.
     pub fn number(&self) -> &'static str {
         let (_, number) = self.group.rsplit_once('(').unwrap_or(("", self.group));
@@ -198,12 +198,12 @@ impl Named {
 }
 
 /// All named surfaces.
-pub fn catalogue() -> &'static [Named] {
+pub fn catalogue() -> &'static [NamedCell] {
     &CATALOGUE
 }
 
 /// The named surface of this name.
-pub fn named(name: &str) -> Option<&'static Named> {
+pub fn named(name: &str) -> Option<&'static NamedCell> {
     CATALOGUE.iter().find(|n| n.name == name)
 }
 

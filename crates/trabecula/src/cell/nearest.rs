@@ -12,7 +12,7 @@ use super::series::Series;
 use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, scale, transpose};
 
 /// The nearest points of the surface to the nodes of a grid.
-pub(super) struct Search<'a> {
+pub(super) struct NearestSearch<'a> {
     series: &'a Series,
     surface: LevelSurface<'a>,
     shape: [usize; 3],
@@ -27,8 +27,8 @@ pub(super) struct Search<'a> {
 /// Nothing found yet.
 const NONE: Vec3 = [f64::INFINITY; 3];
 
-impl<'a> Search<'a> {
-    pub(super) fn new(series: &'a Series, to_phase: &Mat3, shape: [usize; 3]) -> Search<'a> {
+impl<'a> NearestSearch<'a> {
+    pub(super) fn new(series: &'a Series, to_phase: &Mat3, shape: [usize; 3]) -> NearestSearch<'a> {
         let to_space = inverse(to_phase);
         let around: Vec<([i32; 3], Vec3)> = (0..27)
             .map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1])
@@ -42,7 +42,7 @@ impl<'a> Search<'a> {
         let columns = transpose(&to_space);
         let spacing = core::array::from_fn(|a| scale(columns[a], 1.0 / shape[a] as f64));
         let surface = LevelSurface::new(series, 0.0, to_phase, 3.0 * diagonal);
-        Search { series, surface, shape, around, spacing, diagonal }
+        NearestSearch { series, surface, shape, around, spacing, diagonal }
     }
 
     /// One step along each axis of the grid, mm.
@@ -233,7 +233,7 @@ mod tests {
     fn feet_are_the_nearest_points_of_the_surface() {
         for name in ["iwp", "lidinoid", "frd"] {
             let (s, m) = (series(name), stretched([1.0, 1.5, 2.5], [0.0; 3]));
-            let search = Search::new(&s, &m, [24; 3]);
+            let search = NearestSearch::new(&s, &m, [24; 3]);
             let (_, feet) = search.feet();
             let points = surface(&s, &m, 3000);
             let to_space = inverse(&m);

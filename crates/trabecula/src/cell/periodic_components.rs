@@ -27,7 +27,7 @@ pub(super) use offset_forest::{Forest, UnionOutcome};
 pub(super) use sublattice::Int3;
 use sublattice::Sublattice;
 pub(super) use torus_grid::AROUND;
-use torus_grid::{DIRECTIONS, Grid, groups};
+use torus_grid::{DIRECTIONS, TorusGrid, groups};
 
 /// The steps along the axes.
 const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -57,7 +57,7 @@ struct Event {
 ///
 /// Levels are exact (to about 1e-9) where the critical points are found by Newton's method, else good to the sampling.
 pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
-    let found = Sweep::prepared(f, part, |sweep| {
+    let found = NodeFiltration::prepared(f, part, |sweep| {
         let (births, events) = sweep.events();
         let last = sweep.order.last().map_or(0, |i| *i);
         let full = sweep.refine(last, &[], 3).map_or(sweep.amounts[last as usize], |c| c.0);
@@ -77,7 +77,7 @@ pub(super) type Openings = [Option<(f64, Vec3)>; 3];
 /// connected with its translates in that number, as amounts of solid grow, and the phase of the saddle that does it. Levels are
 /// those of f; as exact as those of [`connected`].
 pub(super) fn openings(f: Function, part: Part) -> Openings {
-    let found = Sweep::prepared(f, part, |sweep| {
+    let found = NodeFiltration::prepared(f, part, |sweep| {
         let (births, mut events) = sweep.events();
         events.sort_by(|a, b| a.level.total_cmp(&b.level));
         let mut forest = Forest::new(sweep.amounts.len());
@@ -101,7 +101,7 @@ pub fn necks(f: Function, part: Part) -> Vec<(Vec3, f64)> {
     if part == Part::Sheet {
         return Vec::new();
     }
-    Sweep::prepared(f, part, |sweep| sweep.necks()).unwrap_or_default()
+    NodeFiltration::prepared(f, part, |sweep| sweep.necks()).unwrap_or_default()
 }
 
 /// How late a value becomes solid: the level at which it does (negated for the upper part).
@@ -114,18 +114,18 @@ fn amount(part: Part, v: f64) -> f64 {
 }
 
 /// The nodes in the order in which they become solid.
-struct Sweep<'a> {
+struct NodeFiltration<'a> {
     f: Function<'a>,
     part: Part,
-    grid: &'a Grid,
+    grid: &'a TorusGrid,
     amounts: &'a [f64],
     order: &'a [u32],
 }
 
-impl Sweep<'_> {
+impl NodeFiltration<'_> {
     /// What `make` finds of a function's samples; `None` where one of them is no number.
-    fn prepared<T>(f: Function, part: Part, make: impl Fn(&Sweep) -> T) -> Option<T> {
-        let grid = Grid::sample(f);
+    fn prepared<T>(f: Function, part: Part, make: impl Fn(&NodeFiltration) -> T) -> Option<T> {
+        let grid = TorusGrid::sample(f);
         let mut amounts: Vec<f64> = grid.values.iter().map(|v| amount(part, *v)).collect();
         if amounts.iter().any(|v| !v.is_finite()) {
             return None;
@@ -133,7 +133,7 @@ impl Sweep<'_> {
         amounts.iter_mut().for_each(|v| *v += 0.0); // −0.0 and 0.0 are one level
         let mut order: Vec<u32> = (0..amounts.len() as u32).collect();
         order.sort_unstable_by(|a, b| amounts[*a as usize].total_cmp(&amounts[*b as usize]).then(a.cmp(b)));
-        Some(make(&Sweep { f, part, grid: &grid, amounts: &amounts, order: &order }))
+        Some(make(&NodeFiltration { f, part, grid: &grid, amounts: &amounts, order: &order }))
     }
 
     /// The amount at, and the phase of, the critical point near a node from which at most `falling` directions lead to more solid;

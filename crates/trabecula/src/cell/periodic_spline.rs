@@ -6,7 +6,7 @@
 
 use multiversion::multiversion;
 
-use geometry::cubic_spline::{Boundary, bends, coefficients, slopes, weights};
+use geometry::cubic_spline::{EndCondition, bends, coefficients, slopes, weights};
 use geometry::math::{Interval, Mat3, Vec3, apply, norm, transpose};
 
 /// Coefficients per axis, besides that of its own node, on which the spline in a knot interval depends.
@@ -15,7 +15,7 @@ const PAD: usize = 3;
 const LANES: usize = 8;
 
 /// A tricubic B-spline of period one along each axis.
-pub(super) struct Spline {
+pub(super) struct PeriodicSpline {
     /// Knots along each axis.
     shape: [usize; 3],
     /// Coefficients, x fastest, those at the ends repeated so that four in a row never wrap.
@@ -24,22 +24,22 @@ pub(super) struct Spline {
     stride: [usize; 2],
 }
 
-impl Spline {
+impl PeriodicSpline {
     /// The spline that has `values` (x fastest) at the nodes k / shape.
-    pub(super) fn through(values: Vec<f64>, shape: [usize; 3]) -> Spline {
+    pub(super) fn through(values: Vec<f64>, shape: [usize; 3]) -> PeriodicSpline {
         let [nx, ny, _] = shape;
-        let values = coefficients(values, shape, Boundary::Periodic);
-        Spline::from_coefficients(|[i, j, k]| values[(k * ny + j) * nx + i], shape)
+        let values = coefficients(values, shape, EndCondition::Periodic);
+        PeriodicSpline::from_coefficients(|[i, j, k]| values[(k * ny + j) * nx + i], shape)
     }
 
-    fn from_coefficients(c: impl Fn([usize; 3]) -> f64, shape: [usize; 3]) -> Spline {
+    fn from_coefficients(c: impl Fn([usize; 3]) -> f64, shape: [usize; 3]) -> PeriodicSpline {
         let [sx, sy, sz] = shape.map(|n| n + PAD);
         // Entry m holds coefficient m − 1: interval i needs i − 1 to i + 2.
         let wrap = |m: usize, a: usize| (m + shape[a] - 1) % shape[a];
         let padded = (0..sx * sy * sz)
             .map(|i| c([wrap(i % sx, 0), wrap(i / sx % sy, 1), wrap(i / sx / sy, 2)]) as f32)
             .collect();
-        Spline { shape, padded, stride: [sx, sx * sy] }
+        PeriodicSpline { shape, padded, stride: [sx, sx * sy] }
     }
 
     /// The entry of `padded` for coefficient (i, j, k) − 1.
@@ -95,7 +95,7 @@ impl Spline {
 
     /// The spline whose value at a point is, to fourth order in `h`, the mean of this one over the cube of edge `h`
     /// (turns) about the point.
-    pub(super) fn averaged(&self, h: f64) -> Spline {
+    pub(super) fn averaged(&self, h: f64) -> PeriodicSpline {
         // The mean is S + h²/24 ΔS, and a second difference of coefficients is a second derivative.
         let weight = self.shape.map(|n| (h * n as f64).powi(2) / 24.0);
         let steps = [1, self.stride[0], self.stride[1]];
@@ -108,7 +108,7 @@ impl Spline {
                 sum + weight[a] * bend
             })
         };
-        Spline::from_coefficients(mean, self.shape)
+        PeriodicSpline::from_coefficients(mean, self.shape)
     }
 
     /// Values at phases `u` (turns).
@@ -236,7 +236,7 @@ struct SplineStencils<const D: usize> {
 
 impl<const D: usize> SplineStencils<D> {
     #[inline(always)]
-    fn new(spline: &Spline, u: &[Vec3]) -> Self {
+    fn new(spline: &PeriodicSpline, u: &[Vec3]) -> Self {
         let steps = [1, spline.stride[0] as i32, spline.stride[1] as i32];
         let mut stencils = SplineStencils { first: [0; LANES], weights: [[[[0.0; LANES]; 4]; D]; 3] };
         for a in 0..3 {
@@ -277,7 +277,7 @@ impl<const D: usize> SplineStencils<D> {
     #[inline(always)]
     fn sums<const N: usize>(
         &self,
-        spline: &Spline,
+        spline: &PeriodicSpline,
         count: usize,
         pairs: [(usize, usize); N],
     ) -> [[[f64; 4]; N]; LANES] {
@@ -290,7 +290,7 @@ impl<const D: usize> SplineStencils<D> {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn values(spline: &Spline, u: &[Vec3], out: &mut [f64]) {
+fn values(spline: &PeriodicSpline, u: &[Vec3], out: &mut [f64]) {
     for (u, out) in u.chunks(LANES).zip(out.chunks_mut(LANES)) {
         let stencils = SplineStencils::<1>::new(spline, u);
         let sums = stencils.sums(spline, u.len(), [(0, 0)]);
@@ -301,7 +301,7 @@ fn values(spline: &Spline, u: &[Vec3], out: &mut [f64]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn fill_gradients(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+fn fill_gradients(spline: &PeriodicSpline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
     let n = spline.shape.map(|n| n as f64);
     let batches = u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES));
     for ((u, values), gradients) in batches {
@@ -316,7 +316,7 @@ fn fill_gradients(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &m
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn fill_second(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
+fn fill_second(spline: &PeriodicSpline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
     let [nx, ny, nz] = spline.shape.map(|n| n as f64);
     let batches =
         u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES).zip(second.chunks_mut(LANES)));
@@ -336,7 +336,7 @@ fn fill_second(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut 
 
 /// On a row along x, y and z are constant: the spline becomes one of x alone.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn fill_straight(spline: &Spline, base: Vec3, along: f64, xs: &[f64], out: &mut [f32]) {
+fn fill_straight(spline: &PeriodicSpline, base: Vec3, along: f64, xs: &[f64], out: &mut [f32]) {
     let [line, plane] = spline.stride;
     let (first, t) = spline.interval([0.0, base[1], base[2]]);
     let (y, z) = (weights(t[1]), weights(t[2]));
@@ -367,7 +367,7 @@ fn fill_straight(spline: &Spline, base: Vec3, along: f64, xs: &[f64], out: &mut 
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn fill_row(spline: &Spline, [base, along]: [Vec3; 2], xs: &[f64], out: &mut [f32]) {
+fn fill_row(spline: &PeriodicSpline, [base, along]: [Vec3; 2], xs: &[f64], out: &mut [f32]) {
     let [line, plane] = spline.stride;
     let steps = [1, line as i32, plane as i32];
     for (xs, out) in xs.chunks(LANES).zip(out.chunks_mut(LANES)) {
@@ -419,7 +419,7 @@ mod tests {
         (TAU * u[0]).sin() * (TAU * u[1]).cos() + (TAU * (u[1] + 2.0 * u[2])).cos()
     }
 
-    fn spline(n: [usize; 3]) -> Spline {
+    fn spline(n: [usize; 3]) -> PeriodicSpline {
         let at = |i: usize| [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
         let values = (0..n[0] * n[1] * n[2])
             .map(|i| {
@@ -427,7 +427,7 @@ mod tests {
                 wave(core::array::from_fn(|a| k[a] as f64 / n[a] as f64))
             })
             .collect();
-        Spline::through(values, n)
+        PeriodicSpline::through(values, n)
     }
 
     fn positions(n: usize) -> Vec<Vec3> {

@@ -14,7 +14,7 @@ use rustc_hash::FxHashSet;
 
 use super::Part;
 use super::foot_point::LevelSurface;
-use super::nearest::Search;
+use super::nearest::NearestSearch;
 use super::periodic_components::{AROUND, Forest, Int3, critical, present};
 use super::series::Series;
 use super::thickness::distance;
@@ -71,11 +71,11 @@ struct Pass {
 }
 
 /// The nodes of a grid on the torus, and what of the void each stands for.
-struct Nodes<'a> {
+struct VoidNodes<'a> {
     void: &'a Void<'a>,
     /// f less the void's level.
     series: &'a Series,
-    search: &'a Search<'a>,
+    search: &'a NearestSearch<'a>,
     surface: LevelSurface<'a>,
     feet: Vec<Vec3>,
     /// Radius (mm) of the largest ball near a node; zero in the solid.
@@ -103,7 +103,7 @@ impl Void<'_> {
 
     /// The same on a grid with `finer` times the nodes along each axis, and whether the saddle was found.
     fn measured(&self, series: &Series, finer: f64) -> (f64, bool) {
-        let search = Search::new(series, self.to_phase, self.shape(finer));
+        let search = NearestSearch::new(series, self.to_phase, self.shape(finer));
         let (f, feet) = search.feet();
         if !feet.iter().any(|p| p[0].is_finite()) {
             return (f64::INFINITY, true);
@@ -115,7 +115,7 @@ impl Void<'_> {
             radii.map(|i| if open(f[i]) { largest_near(&search, &feet, i, 0.5 * step).1 } else { 0.0 }).collect();
         let surface = LevelSurface::new(series, 0.0, self.to_phase, 3.0 * step);
         let necks = self.necks.iter().map(|u| search.nearest_node(*u)).collect();
-        let nodes = Nodes { void: self, series, search: &search, surface, feet, radii, step, necks };
+        let nodes = VoidNodes { void: self, series, search: &search, surface, feet, radii, step, necks };
         let (radius, sure) = nodes.bottleneck(self.rank).unwrap_or_else(|| (nodes.at(self.saddle), true));
         (2.0 * radius, sure)
     }
@@ -135,7 +135,7 @@ impl Void<'_> {
 
 /// The centre (mm from a node) and radius of the largest empty ball about a point at most `reach` from the node, among the feet
 /// of the node and its neighbours: away from the nearest foot, then from the nearest two, then from the nearest three.
-fn largest_near(search: &Search, feet: &[Vec3], node: usize, reach: f64) -> (Vec3, f64) {
+fn largest_near(search: &NearestSearch, feet: &[Vec3], node: usize, reach: f64) -> (Vec3, f64) {
     let mut near = [feet[node]; 27];
     let at = search.index(node);
     for (k, (d, step)) in search.around().iter().enumerate() {
@@ -183,7 +183,7 @@ fn ordered(a: u32, b: u32, shift: Int3) -> (u32, u32, Int3) {
     if (a, shift) <= (b, back) { (a, b, shift) } else { (b, a, back) }
 }
 
-impl Nodes<'_> {
+impl VoidNodes<'_> {
     /// The passes between chambers, as the ball shrinks, down to a little below the radius at which a component has the rank;
     /// `None` if none has it. A chamber hardly wider than its widest pass is one with what is beyond it.
     fn passes(&self, rank: usize) -> Option<Vec<Pass>> {

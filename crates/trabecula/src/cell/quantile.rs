@@ -38,7 +38,7 @@ struct Ascending {
 }
 
 /// A function on rows: phases along x, phases along y and z, values, gradients.
-pub(super) type Rows<'a> = &'a (dyn Fn(&[f64], [f64; 2], &mut [f64], &mut [Vec3]) + Sync);
+pub(super) type RowFunction<'a> = &'a (dyn Fn(&[f64], [f64; 2], &mut [f64], &mut [Vec3]) + Sync);
 
 impl Quantile {
     pub(super) fn new(series: &Series) -> Quantile {
@@ -49,7 +49,7 @@ impl Quantile {
 
     /// The distribution of a function on the torus with values in [−most, most]. `mean` gives, for rows along x at
     /// some y and z, its means over cubes of edge 1/n about phases, and their gradients.
-    pub(super) fn of(mean: Rows, n: usize, most: f64) -> Quantile {
+    pub(super) fn of(mean: RowFunction, n: usize, most: f64) -> Quantile {
         let h = 1.0 / n as f64;
         let most = most * (1.0 + 1e-9);
         let (start, step) = (-most, 2.0 * most / (LEVELS - 1) as f64);

@@ -10,8 +10,8 @@ mod fraction;
 mod subdivision;
 mod tet_catalogue;
 
-pub(crate) use fraction::{Table as FractionTable, share_below};
-pub use subdivision::{Nodes, Subdivision};
+pub(crate) use fraction::{FractionTable, share_below};
+pub use subdivision::{Subdivision, SubdivisionNodes};
 pub use tet_catalogue::{NamedTetCell, named_tet_cell, tet_catalogue};
 
 use std::sync::OnceLock;
@@ -32,7 +32,7 @@ pub struct TetCell {
     series: Series,
     /// Phases p_1 … p_4 of the vertices, turns.
     corners: [Vec3; 4],
-    volume: OnceLock<fraction::Table>,
+    volume: OnceLock<fraction::FractionTable>,
     connect: [OnceLock<component_counts::ComponentCounts>; 3],
 }
 
@@ -149,8 +149,8 @@ impl TetCell {
         v
     }
 
-    fn table(&self) -> &fraction::Table {
-        computed(&self.volume, || fraction::Table::new(self))
+    fn table(&self) -> &fraction::FractionTable {
+        computed(&self.volume, || fraction::FractionTable::new(self))
     }
 
     /// Range of f in the tetrahedron, to fourth order in 1/96 of its edge.

@@ -10,7 +10,7 @@ use geometry::math::{Mat3, Vec3, add, cross, dot, eigen, norm, scale, sub, unit}
 
 /// The surface about a foot point, to second order: distances to it are exact for planes, spheres, cylinders, and for any
 /// surface to the third order in the distance along it.
-struct Patch {
+struct OsculatingSurface {
     foot: Vec3,
     /// Unit normal, towards the passage.
     normal: Vec3,
@@ -19,9 +19,9 @@ struct Patch {
     curvatures: [f64; 2],
 }
 
-impl Patch {
+impl OsculatingSurface {
     /// The patch at the foot of x; `None` where x is beyond the centre of a curvature, so that this is no nearest point.
-    fn new(surface: &LevelSurface, u: Vec3, x: Vec3, foot: Vec3) -> Option<Patch> {
+    fn new(surface: &LevelSurface, u: Vec3, x: Vec3, foot: Vec3) -> Option<OsculatingSurface> {
         let (_, g, h) = surface.second(u, foot);
         let (to, steep) = (sub(x, foot), norm(g));
         let sign = dot(to, g).signum() / steep;
@@ -39,7 +39,7 @@ impl Patch {
         let curvatures = axes.map(|v| bend(v, v));
         let away = dot(to, normal);
         let nearest = curvatures.iter().all(|k| 1.0 + k * away > -1e-4);
-        (nearest && normal[0].is_finite()).then_some(Patch { foot, normal, axes, curvatures })
+        (nearest && normal[0].is_finite()).then_some(OsculatingSurface { foot, normal, axes, curvatures })
     }
 
     /// Distance, its gradient and second derivatives at x. Centres of curvature are rounded off within about `soft` mm.
@@ -69,7 +69,7 @@ impl Patch {
 }
 
 /// Gradient and second derivatives of the soft minimum of the distances to patches.
-fn soft_minimum(patches: &[Patch], x: Vec3, soft: f64) -> (Vec3, Mat3) {
+fn soft_minimum(patches: &[OsculatingSurface], x: Vec3, soft: f64) -> (Vec3, Mat3) {
     let each: Vec<_> = patches.iter().map(|p| p.distance(x, soft)).collect();
     let least = each.iter().fold(f64::INFINITY, |m, e| m.min(e.0));
     let weights: Vec<f64> = each.iter().map(|e| ((least - e.0) / soft).exp()).collect();
@@ -90,7 +90,7 @@ fn soft_minimum(patches: &[Patch], x: Vec3, soft: f64) -> (Vec3, Mat3) {
 }
 
 /// The saddle of the least of the distances to patches, within `reach` of `start`.
-fn saddle(patches: &[Patch], start: Vec3, reach: f64, radius: f64) -> Option<Vec3> {
+fn saddle(patches: &[OsculatingSurface], start: Vec3, reach: f64, radius: f64) -> Option<Vec3> {
     if patches.is_empty() {
         return None;
     }
@@ -134,7 +134,8 @@ pub(super) fn throat(surface: &LevelSurface, u: Vec3, start: Vec3, cloud: &[Vec3
         if last.is_some_and(|last| norm(last) < 1e-5 * radius) {
             return Some(radius);
         }
-        let patches: Vec<Patch> = feet.iter().filter_map(|p| Patch::new(surface, u, x, *p)).collect();
+        let patches: Vec<OsculatingSurface> =
+            feet.iter().filter_map(|p| OsculatingSurface::new(surface, u, x, *p)).collect();
         let mut to = sub(saddle(&patches, x, reach, radius)?, x);
         if last.is_some_and(|last| dot(to, last) < -0.25 * dot(last, last)) {
             to = scale(to, 0.5);

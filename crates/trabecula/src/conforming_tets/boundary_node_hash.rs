@@ -12,13 +12,13 @@ use rayon::prelude::*;
 const COUNTED: usize = 1000;
 
 /// A cell of `BoundaryNodeHash`.
-type Cell = [i64; 3];
+type HashCell = [i64; 3];
 
 /// The nodes of the boundary by the cell of a grid that they are in.
 pub(super) struct BoundaryNodeHash {
     /// Edge of the cells (mm): that of the longest edge of the boundary.
     pub edge: f64,
-    nodes: FxHashMap<Cell, Vec<u32>>,
+    nodes: FxHashMap<HashCell, Vec<u32>>,
 }
 
 impl BoundaryNodeHash {
@@ -39,7 +39,7 @@ impl BoundaryNodeHash {
     }
 
     /// The cell of a position.
-    fn cell(&self, p: Vec3) -> Cell {
+    fn cell(&self, p: Vec3) -> HashCell {
         p.map(|x| (x / self.edge).floor() as i64)
     }
 
@@ -59,10 +59,10 @@ impl BoundaryNodeHash {
 
     /// The nodes of all triangles that may meet one at these nodes.
     pub fn near_to(&self, nodes: &[u32], shaping: &Shaping) -> Vec<u32> {
-        let mut at: Vec<Cell> = nodes.iter().map(|n| self.cell(shaping.nodes[*n as usize])).collect();
+        let mut at: Vec<HashCell> = nodes.iter().map(|n| self.cell(shaping.nodes[*n as usize])).collect();
         at.sort_unstable();
         at.dedup();
-        let middle = |c: Cell| c.map(|i| (i as f64 + 0.5) * self.edge);
+        let middle = |c: HashCell| c.map(|i| (i as f64 + 0.5) * self.edge);
         let mut near: Vec<u32> = at.into_iter().flat_map(|c| self.near(&Aabb::EMPTY.with(middle(c)))).collect();
         near.extend(nodes);
         near.sort_unstable();

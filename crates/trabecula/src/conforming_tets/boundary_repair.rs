@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::node_tets::NodeTets;
 use geometry::progress::checkpoint;
 use geometry::tetmesh::{FACES, TetMesh, volume};
 
@@ -51,7 +52,7 @@ fn fragments(mesh: &TetMesh) -> HashSet<u32> {
 
 /// The tetrahedra to be removed at nodes with more than one boundary sheet.
 fn non_manifold(mesh: &TetMesh) -> HashSet<u32> {
-    let node_tets = NodeTets::new(mesh);
+    let node_tets = NodeTets::new(mesh.tets.iter().copied(), &vec![true; mesh.nodes.len()]);
     let mut sheets: Vec<Vec<[u32; 2]>> = vec![Vec::new(); mesh.nodes.len()];
     for [a, b, c] in mesh.boundary_faces() {
         for (n, edge) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
@@ -63,7 +64,7 @@ fn non_manifold(mesh: &TetMesh) -> HashSet<u32> {
         if link.is_empty() || cycles(link) == 1 {
             continue;
         }
-        let groups = groups(mesh, n as u32, node_tets.of(n));
+        let groups = groups(mesh, n as u32, node_tets.of(n as u32));
         let size = |of: &Vec<u32>| of.iter().map(|i| volume(mesh.corners(*i as usize))).sum::<f64>();
         if let [_] = groups.as_slice() {
             // The tetrahedra at the node enclose a hole: only removing all of them is certain to repair it.
@@ -125,24 +126,4 @@ fn groups(mesh: &TetMesh, n: u32, tets: &[u32]) -> Vec<Vec<u32>> {
         groups.push(group.into_iter().map(|i| tets[i]).collect());
     }
     groups
-}
-
-/// The tetrahedra at each node.
-struct NodeTets(Vec<Vec<u32>>);
-
-impl NodeTets {
-    fn new(mesh: &TetMesh) -> NodeTets {
-        let mut count = vec![0; mesh.nodes.len()];
-        mesh.tets.iter().flatten().for_each(|n| count[*n as usize] += 1);
-        let mut at: Vec<Vec<u32>> = count.into_iter().map(Vec::with_capacity).collect();
-        for (i, t) in (0..).zip(&mesh.tets) {
-            t.iter().for_each(|n| at[*n as usize].push(i));
-        }
-        NodeTets(at)
-    }
-
-    /// The tetrahedra at node `n`.
-    fn of(&self, n: usize) -> &[u32] {
-        &self.0[n]
-    }
 }

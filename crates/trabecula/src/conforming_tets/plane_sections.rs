@@ -6,7 +6,7 @@
 
 use super::node_surfaces::{SurfaceSet, members};
 use super::partition::Partition;
-use crate::implicit::Plane;
+use crate::implicit::AxisPlane;
 use geometry::math::Vec3;
 use geometry::tetmesh::FACES;
 use rustc_hash::FxHashMap;
@@ -72,7 +72,7 @@ impl PlaneSections {
 
 impl Partition<'_> {
     /// The faces of tetrahedra in bounding planes, each with its plane, by their nodes, of all images the first, ascending.
-    fn faces_in_planes(&self) -> impl Iterator<Item = (Plane, [u32; 3])> {
+    fn faces_in_planes(&self) -> impl Iterator<Item = (AxisPlane, [u32; 3])> {
         let tied = |n: &u32| self.next[*n as usize] != *n;
         let faces = self.tets.iter().flat_map(|t| FACES.map(|f| f.map(|c| t.nodes[c])));
         faces.filter(move |f| f.iter().all(tied)).filter_map(|f| {

@@ -5,6 +5,7 @@
 //! whole mesh, the longest first, so that both sides of a face are divided alike.
 
 use super::node_surfaces::{SurfaceSet, only, onto};
+use super::node_tets::NodeTets;
 use super::partition::{Partition, Tet, images};
 use super::plane_sections::PlaneSections;
 use super::tet_shape::shape;
@@ -30,7 +31,7 @@ const ROUNDING: f64 = 1e-7;
 const REACH: f64 = 0.5;
 
 /// An edge that crosses the surface.
-struct Crossing {
+struct CutEdge {
     /// Its nodes, the one of negative value first.
     ends: [u32; 2],
     /// Where it crosses, as a fraction from the first.
@@ -110,7 +111,7 @@ impl Partition<'_> {
     }
 
     /// The edges of some tetrahedra that cross the surface, ascending, and where.
-    fn crossings(&self, surface: usize, of: &[bool], values: &[f64]) -> Vec<Crossing> {
+    fn crossings(&self, surface: usize, of: &[bool], values: &[f64]) -> Vec<CutEdge> {
         let each = self.tets.par_iter().zip(of).filter(|(_, of)| **of);
         let mut ends: Vec<[u32; 2]> = each
             .flat_map_iter(|(t, _)| {
@@ -133,17 +134,17 @@ impl Partition<'_> {
         let first = |e: &[u32; 2]| self.edge_images(*e).into_iter().fold(*e, |m, o| m.min(o));
         let asked: Vec<[u32; 2]> = ends.par_iter().map(first).collect();
         let at = roots(&*self.surfaces[surface].field, &self.nodes, values, &asked);
-        ends.into_iter().zip(at).map(|(ends, at)| Crossing { ends, at }).collect()
+        ends.into_iter().zip(at).map(|(ends, at)| CutEdge { ends, at }).collect()
     }
 
     /// Where an edge crosses.
-    fn place(&self, c: &Crossing) -> Vec3 {
+    fn place(&self, c: &CutEdge) -> Vec3 {
         let [p, q] = c.ends.map(|n| self.nodes[n as usize]);
         core::array::from_fn(|k| p[k] + c.at * (q[k] - p[k]))
     }
 
     /// Moves nodes that are close to crossings of their edges onto the surface.
-    fn snap(&mut self, surface: usize, crossings: &[Crossing], values: &mut [f64], step: f64) {
+    fn snap(&mut self, surface: usize, crossings: &[CutEdge], values: &mut [f64], step: f64) {
         let this = &*self;
         // (first image, distance, crossing, its end)
         let mut near: Vec<(u32, f64, u32, u8)> = crossings
@@ -218,28 +219,14 @@ impl Partition<'_> {
 
     /// The tetrahedra at some nodes.
     fn node_tets(&self, nodes: impl Iterator<Item = u32>) -> NodeTets {
-        let mut start = vec![0u32; self.nodes.len() + 1];
         let mut wanted = vec![false; self.nodes.len()];
         nodes.for_each(|n| wanted[n as usize] = true);
-        let each = || self.tets.iter().flat_map(|t| t.nodes).filter(|n| wanted[*n as usize]);
-        each().for_each(|n| start[n as usize + 1] += 1);
-        for i in 1..start.len() {
-            start[i] += start[i - 1];
-        }
-        let mut fill = start.clone();
-        let mut of = vec![0u32; start[start.len() - 1] as usize];
-        for (i, t) in (0..).zip(&self.tets) {
-            for n in t.nodes.into_iter().filter(|n| wanted[*n as usize]) {
-                of[fill[n as usize] as usize] = i;
-                fill[n as usize] += 1;
-            }
-        }
-        NodeTets { start, of }
+        NodeTets::new(self.tets.iter().map(|t| t.nodes), &wanted)
     }
 
     /// Makes the nodes in which edges that still cross are bisected; in the order of their ends.
-    fn mark(&mut self, surface: usize, crossings: &[Crossing], values: &mut Vec<f64>) -> Vec<Mark> {
-        let open = |c: &&Crossing| c.ends.iter().all(|n| values[*n as usize] != 0.0);
+    fn mark(&mut self, surface: usize, crossings: &[CutEdge], values: &mut Vec<f64>) -> Vec<Mark> {
+        let open = |c: &&CutEdge| c.ends.iter().all(|n| values[*n as usize] != 0.0);
         let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
         // (length², first image, ends, where)
         let mut edges: Vec<(f64, [u32; 2], [u32; 2], Vec3)> = crossings
@@ -369,18 +356,6 @@ impl Partition<'_> {
             bad = bad.into_iter().flat_map(|n| images(&self.next, n).collect::<Vec<_>>()).collect();
             bad.into_iter().for_each(|n| self.nodes[n as usize] = back[&n]);
         }
-    }
-}
-
-/// The tetrahedra at nodes.
-struct NodeTets {
-    start: Vec<u32>,
-    of: Vec<u32>,
-}
-
-impl NodeTets {
-    fn of(&self, n: u32) -> &[u32] {
-        &self.of[self.start[n as usize] as usize..self.start[n as usize + 1] as usize]
     }
 }
 

@@ -13,7 +13,7 @@ use crate::truss::{Beams, beams_in};
 use beams::{Fillet, Frusta, Graph, Profile, Quadors};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{
-    BeamGraph, ByteSpool, CompanionMeshes, GraphFormat, Lost, Metadata, write_beam_lattice, write_graph,
+    BeamGraph, ByteSpool, CompanionMeshes, GraphFormat, GraphLoss, Metadata, write_beam_lattice, write_graph,
 };
 use geometry::progress::{Stopped, checkpoint};
 
@@ -111,14 +111,14 @@ fn lost_radii(graph: &BeamGraph, format: &GraphFormat) -> Option<String> {
     let node = |n: u32| graph.radii[n as usize];
     let suffix = format.suffix;
     match format.lost {
-        Lost::Radii => Some(format!("a .{suffix} has no radii: they are left out")),
-        Lost::Beams => {
+        GraphLoss::Radii => Some(format!("a .{suffix} has no radii: they are left out")),
+        GraphLoss::Beams => {
             let odd = pairs().filter(|(e, r)| !(same(r[0], node(e[0])) && same(r[1], node(e[1])))).count();
             let beams = counted(odd, "beam");
             (odd > 0)
                 .then(|| format!("{beams} unlike the hubs: a .{suffix} has the radii of hubs alone, json has both"))
         }
-        Lost::Balls => {
+        GraphLoss::Balls => {
             let mut most = vec![0.0_f64; graph.nodes.len()];
             for (n, r) in pairs().flat_map(|(e, r)| e.iter().zip(r)) {
                 most[*n as usize] = most[*n as usize].max(*r);
@@ -130,7 +130,7 @@ fn lost_radii(graph: &BeamGraph, format: &GraphFormat) -> Option<String> {
             let all: Vec<String> = hubs.into_iter().chain(taper).collect();
             (!all.is_empty()).then(|| format!("a .{suffix} cannot hold {}; 3mf, json and vtu do", all.join(" and ")))
         }
-        Lost::Nothing => None,
+        GraphLoss::Nothing => None,
     }
 }
 

@@ -48,7 +48,7 @@ fn given(
     d: &Design,
     loader: &dyn Loader,
     notes: &RefCell<Notes>,
-) -> Result<(Region, Option<build_tets::Tets>), DesignError> {
+) -> Result<(Region, Option<build_tets::BuiltTets>), DesignError> {
     match environment::region(&d.region, "region", loader, None, notes) {
         Ok(region) => Ok((region, None)),
         Err(why) => {
@@ -184,7 +184,7 @@ fn sampled(region: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, De
 
 /// The lattice over a tetrahedral mesh, and the net that ties its ports.
 fn tiled(
-    domain: build_tiling::Domain,
+    domain: build_tiling::TilingDomain,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Tiled, Option<CsgSolid>), DesignError> {
@@ -227,7 +227,7 @@ fn checked_lattice(
     warnings: &mut Vec<Warning>,
 ) -> Result<(Lattice, Option<PropertyReport>), DesignError> {
     let path = &environment.path;
-    if spec.level.of == Of::Part && d.blend.is_some() {
+    if spec.level.of == FractionOf::Part && d.blend.is_some() {
         let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
         return Err(DesignError::new(format!("{path}.level.of"), message));
     }

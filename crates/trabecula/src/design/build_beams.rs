@@ -21,7 +21,7 @@ use crate::grade::Grade;
 use crate::kind::DesignError;
 use crate::region::HalfSpace;
 use crate::truss::{self, Beams, Truss, fill};
-use ::beams::Plane;
+use ::beams::SlicePlane;
 use ::beams::graph::{self, GivenRadii, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::Quadors;
 use geometry::fault::{Fault, number};
@@ -139,7 +139,7 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
 }
 
 /// The beams that a design is made of, if of nothing else, for a STEP file; and the planes behind which they are kept.
-pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> {
+pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<SlicePlane>), Fault> {
     let fault = |why: &str| {
         let message =
             format!("write a mesh (3mf, stl) instead: a STEP file has the exact surface of beams alone, and {why}");
@@ -156,8 +156,8 @@ pub(super) fn exact(built: &Built) -> Result<(Arc<Quadors>, Vec<Plane>), Fault> 
         ));
     };
     let crossed = |side: &HalfSpace| (0..quadors.len()).any(|hub| side.bound(&quadors.hub_bounds(hub)).hi > 0.0);
-    let planes = sides.iter().filter(|s| crossed(s)).map(|s| Plane::new(s.point(), s.normal()));
-    let planes = planes.collect::<Result<Vec<Plane>, Fault>>()?;
+    let planes = sides.iter().filter(|s| crossed(s)).map(|s| SlicePlane::new(s.point(), s.normal()));
+    let planes = planes.collect::<Result<Vec<SlicePlane>, Fault>>()?;
     Ok((quadors, planes))
 }
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::Warning;
-use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
+use super::data::{BlendKind, BlendSpec, GradeKind, GradeSpec};
 use super::sample;
-use crate::blend::{Blend, By, Constituent, Weights};
+use crate::blend::{Blend, BlendRule, Constituent, Weights};
 use crate::environment::Environment;
 use crate::grade::Quantity;
 use crate::kind::{DesignError, Key};
@@ -139,20 +139,16 @@ pub(super) fn blend(
         (_, last) => Weights::shares(grades.into_iter().chain(last).collect()),
     };
     check_weights(&weights, spec, environment, warnings)?;
-    let by = match spec.by {
-        BySpec::Fraction => By::Fraction,
-        BySpec::Value => By::Value,
-    };
     let bounds = environment.region.bounds();
     let equal = equal(&weights, environment.points);
     let cells: Vec<f64> = of.iter().map(|m| m.longest()).collect();
     let narrow = narrow(&weights, &equal, &cells);
-    let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
+    let blend = Blend::new(of, weights, spec.by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
     unused(&blend, &names, members, environment, warnings);
     cancelling(&blend, &names, &equal, environment, warnings);
     // The width is that at samples: exactly two cells are wide enough.
-    let steep = narrow.filter(|t| by == By::Fraction && t.cells() < 2.0 * (1.0 - WIDTH_ERROR));
-    if let Some(Transition { width, between: [a, b], cell }) = steep {
+    let steep = narrow.filter(|t| spec.by == BlendRule::Fraction && t.cells() < 2.0 * (1.0 - WIDTH_ERROR));
+    if let Some(TransitionSample { width, between: [a, b], cell }) = steep {
         let message = format!(
             "the transition between \"{}\" and \"{}\" is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet \
              there without growing into each other, and the fraction is not held",
@@ -303,7 +299,7 @@ fn equal(weights: &Weights, points: &[Vec3]) -> Vec<[Vec3; 2]> {
 
 /// A place of a transition.
 #[derive(Clone, Copy)]
-struct Transition {
+struct TransitionSample {
     /// Its width, mm.
     width: f64,
     /// The lattices that have the greatest weights there.
@@ -312,7 +308,7 @@ struct Transition {
     cell: f64,
 }
 
-impl Transition {
+impl TransitionSample {
     fn cells(&self) -> f64 {
         self.width / self.cell
     }
@@ -320,7 +316,7 @@ impl Transition {
 
 /// Where a transition is narrowest for the cells that meet in it, `cells` long (mm): its width is 1/|∇w| where two lattices have the same
 /// weight, to either side of it.
-fn narrow(weights: &Weights, equal: &[[Vec3; 2]], cells: &[f64]) -> Option<Transition> {
+fn narrow(weights: &Weights, equal: &[[Vec3; 2]], cells: &[f64]) -> Option<TransitionSample> {
     let n = weights.len();
     let each = equal.iter().map(|[a, b]| {
         let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
@@ -334,7 +330,7 @@ fn narrow(weights: &Weights, equal: &[[Vec3; 2]], cells: &[f64]) -> Option<Trans
         // A jump has no slope on either side of it.
         let jump = v.iter().zip(&u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) > 0.1;
         let width = if jump { 0.0 } else { 1.0 / steep };
-        Transition { width, between, cell: between.iter().map(|i| cells[*i]).fold(0.0, f64::max) }
+        TransitionSample { width, between, cell: between.iter().map(|i| cells[*i]).fold(0.0, f64::max) }
     });
     each.min_by(|a, b| a.cells().total_cmp(&b.cells()))
 }

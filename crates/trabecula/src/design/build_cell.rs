@@ -57,8 +57,8 @@ pub(super) fn cell<'a>(
 fn plain_term(t: &TermSpec) -> Term {
     // sin a = cos(a − a quarter turn).
     let behind = match t.component {
-        Component::Re => 0.0,
-        Component::Im => 0.25,
+        WaveComponent::Re => 0.0,
+        WaveComponent::Im => 0.25,
     };
     Term { hkl: t.hkl, amplitude: t.amplitude, phase: t.phase - behind }
 }
@@ -67,8 +67,8 @@ fn plain_term(t: &TermSpec) -> Term {
 pub(super) fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
     let (s, c) = sin_cos_turns(t.phase);
     let (parts, word, other) = match t.component {
-        Component::Re => ([(ComplexPart::Re, c), (ComplexPart::Im, -s)], "real", "im"),
-        Component::Im => ([(ComplexPart::Re, s), (ComplexPart::Im, c)], "imaginary", "re"),
+        WaveComponent::Re => ([(ComplexPart::Re, c), (ComplexPart::Im, -s)], "real", "im"),
+        WaveComponent::Im => ([(ComplexPart::Re, s), (ComplexPart::Im, c)], "imaginary", "re"),
     };
     let mut terms = Vec::new();
     for (side, factor) in parts.into_iter().filter(|p| p.1 != 0.0) {

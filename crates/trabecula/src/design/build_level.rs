@@ -1,7 +1,7 @@
 //! Levels, which set how much is solid: data to [`Level`].
 
 use super::build_property;
-use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
+use super::data::{AmountSpec, FractionOf, GradeSpec, LatticeSpec, LevelFit, LevelSpec, PartSpec};
 use super::sample;
 use super::varied::Varied;
 use crate::cell::{Cell, Distance, NoPore, Part};
@@ -74,7 +74,7 @@ pub(super) fn level(
     let length = spec.amount.length();
     if !matches!(spec.amount, AmountSpec::Fraction(_) | AmountSpec::Porosity(_)) || length.is_some() {
         let found = length.map_or(key.to_string(), |(length, _)| format!("a {length}, too"));
-        for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
+        for (option, set) in [("of", spec.of != FractionOf::Cell), ("fit", spec.fit != LevelFit::Table)] {
             if set {
                 let message = format!("\"{option}\" goes with fraction or porosity, found {found}; leave it out");
                 return Err(DesignError::new(path(option), message));
@@ -115,8 +115,8 @@ fn of_fraction(
     let path = |key: &str| format!("{}.{key}", environment.path);
     let key = spec.amount.key();
     match (spec.of, spec.fit) {
-        (Of::Cell, Fit::Table) => Ok(Level::Fraction(amount)),
-        (Of::Part, Fit::Table) => {
+        (FractionOf::Cell, LevelFit::Table) => Ok(Level::Fraction(amount)),
+        (FractionOf::Part, LevelFit::Table) => {
             let Some(target) = amount.constant() else {
                 let message =
                     format!("of = \"part\" solves for one level and takes a constant {key}; found one that varies");
@@ -126,7 +126,7 @@ fn of_fraction(
             let iso = solved.map_err(|m| DesignError::new(path(key), m))?;
             Ok(Level::Iso(Grade::Constant(iso)))
         }
-        (Of::Cell, Fit::Spartan) => {
+        (FractionOf::Cell, LevelFit::Spartan) => {
             let fits = "diamond, gyroid, gyroid_mirrored";
             if part != PartSpec::Lower {
                 let message = "fit = \"spartan\" is for part lower (f ≤ t); use fit = \"table\" for sheet and upper";
@@ -146,7 +146,7 @@ fn of_fraction(
                 }
             }
         }
-        (Of::Part, Fit::Spartan) => {
+        (FractionOf::Part, LevelFit::Spartan) => {
             let message = "fit = \"spartan\" speaks of the cell, of = \"part\" of the part; give one of the two";
             Err(DesignError::new(path("fit"), message))
         }

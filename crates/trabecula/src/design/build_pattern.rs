@@ -10,7 +10,7 @@ use crate::environment::Environment;
 use crate::kind::DesignError;
 use crate::report::{BeamsReport, PatternReport};
 use crate::truss::Beams;
-use ::beams::graph::{Hub, Profile};
+use ::beams::graph::{HubBall, Profile};
 use ::beams::pattern::{Pattern, PatternField, Strut};
 use geometry::fault::{counted, number};
 use geometry::math::rotation;
@@ -38,7 +38,7 @@ pub(super) fn laid(
             let message = "it has no radius of its own, and no radius of beams is given; give one";
             return Err(DesignError::new(format!("{at}.nodes[{i}]"), message));
         };
-        hubs.push(Hub { center: *center, radius });
+        hubs.push(HubBall { center: *center, radius });
     }
     let profile = match (spec.profile, radius) {
         (Some(ProfileSpec::Cylinder), _) => Profile::Cylinder,

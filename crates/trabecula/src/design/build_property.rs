@@ -45,7 +45,7 @@ const BEYOND: f64 = 0.01;
 
 /// A property at a fraction, and the estimated relative error of it.
 #[derive(Clone, Copy)]
-struct Found {
+struct PropertyEstimate {
     value: f64,
     error: f64,
 }
@@ -85,7 +85,7 @@ pub(super) fn level(
     let property = Property { cell, part, map: *affine, amount: spec, along, path };
     let n = property.fine();
     if let Some(value) = amount.constant() {
-        let (fraction, Found { value, error }) = property.fraction(value)?;
+        let (fraction, PropertyEstimate { value, error }) = property.fraction(value)?;
         let report = PropertyReport { name: key, value: Varying::Number(value), error, n };
         return Ok((Level::Fraction(Grade::Constant(fraction)), report));
     }
@@ -105,14 +105,16 @@ impl Property<'_> {
     }
 
     /// The property at a fraction: 0 where a cell falls apart or lets nothing through.
-    fn found(&self, fraction: f64, n: usize) -> Result<Found, DesignError> {
+    fn found(&self, fraction: f64, n: usize) -> Result<PropertyEstimate, DesignError> {
         let cell = self.at(fraction)?;
         let (axes, _) = upper_edges(&transpose(&cell.edges));
         let (value, error) = match self.amount {
             AmountSpec::Stiffness(of) => {
                 let material = Material::isotropic(1.0, of.nu).map_err(|f| DesignError::fault(&self.path, f))?;
                 let made = cell.stiffness(&material, Resolution { n, plain: false }, &Silent);
-                let Some(made) = self.unless_degenerate(made)? else { return Ok(Found { value: 0.0, error: 0.0 }) };
+                let Some(made) = self.unless_degenerate(made)? else {
+                    return Ok(PropertyEstimate { value: 0.0, error: 0.0 });
+                };
                 // An axis of the frame along the direction.
                 let other = if self.along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
                 let third = geometry::math::cross(self.along, other);
@@ -127,12 +129,12 @@ impl Property<'_> {
                 let along = apply(&axes, self.along);
                 // On voxels that no wall is seen by, nothing holds the flow.
                 let Some(made) = self.unless_degenerate(made)? else {
-                    return Ok(Found { value: f64::INFINITY, error: 0.0 });
+                    return Ok(PropertyEstimate { value: f64::INFINITY, error: 0.0 });
                 };
                 (dot(along, apply(&made.k, along)), made.error)
             }
         };
-        Ok(Found { value: value.max(0.0), error })
+        Ok(PropertyEstimate { value: value.max(0.0), error })
     }
 
     /// The property at a fraction.
@@ -182,12 +184,12 @@ impl Property<'_> {
     }
 
     /// The fraction at which the property has this value, and the property there on fine voxels.
-    fn fraction(&self, asked: f64) -> Result<(f64, Found), DesignError> {
+    fn fraction(&self, asked: f64) -> Result<(f64, PropertyEstimate), DesignError> {
         let (mut at, mut slope) = self.coarse_root(asked)?;
         let [low, high] = self.range()?;
         let mut last: Option<[f64; 2]> = None;
         // Values on few voxels are noisy, and steps may not come nearer: the nearest counts.
-        let mut nearest = (f64::INFINITY, at, Found { value: f64::NAN, error: f64::NAN });
+        let mut nearest = (f64::INFINITY, at, PropertyEstimate { value: f64::NAN, error: f64::NAN });
         for _ in 0..STEPS[1] {
             let found = self.found(at, self.fine())?;
             let off = (found.value / asked).ln();

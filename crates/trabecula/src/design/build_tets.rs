@@ -17,7 +17,7 @@ use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::surface_fit::{LostFeature, LostKind};
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
 use geometry::transform::Transform;
-use source::{from_file, surface, triangles, wild};
+use source::{from_file, ftetwild, surface, triangles};
 
 /// Depth above which a loss is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
 const DEEP: f64 = 0.17;
@@ -37,7 +37,7 @@ const NAMED: usize = 3;
 
 /// A tetrahedral mesh of a region, and its report.
 #[derive(Clone, Debug)]
-pub struct Tets {
+pub struct BuiltTets {
     /// The mesh, checked.
     pub mesh: TetMesh,
     /// Its nodes with those of the boundary on the region's surface, where it was made for one: between them, its flat faces balance about that.
@@ -67,7 +67,7 @@ pub struct TetReport {
 
 impl TetReport {
     /// Features of the region that the mesh does not keep, but for those that are small against its tetrahedra.
-    pub(super) fn lost(&self) -> Vec<&LostFeature> {
+    pub(super) fn lost_features(&self) -> Vec<&LostFeature> {
         let matters = |f: &&LostFeature| {
             let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
             f.depth > if one_way { FAR } else { DEEP } * self.quality.size.mean
@@ -89,9 +89,9 @@ impl From<&TetReport> for TetMeshReport {
     }
 }
 
-impl Tets {
+impl BuiltTets {
     /// The tetrahedral mesh of a lattice (by name, or the first that has one) in a design; its other keys are left alone.
-    pub fn in_design(node: &Node, lattice: Option<&str>, loader: &dyn Loader) -> Result<Tets, DesignError> {
+    pub fn in_design(node: &Node, lattice: Option<&str>, loader: &dyn Loader) -> Result<BuiltTets, DesignError> {
         let lines = node.lines();
         let make = || {
             let (path, spec) = declared(node, lattice)?;
@@ -125,16 +125,16 @@ impl Tets {
     }
 
     /// The tetrahedral mesh in a file, of no region.
-    pub fn in_file(file: &TetFileKind, loader: &dyn Loader) -> Result<Tets, DesignError> {
+    pub fn in_file(file: &TetFileKind, loader: &dyn Loader) -> Result<BuiltTets, DesignError> {
         let (mesh, checked, names) = from_file(file, "", loader)?;
-        Ok(Tets { names, ..checked_mesh(mesh, &checked, file.path.clone(), None, "", false)? })
+        Ok(BuiltTets { names, ..checked_mesh(mesh, &checked, file.path.clone(), None, "", false)? })
     }
 
     /// The image of the mesh, of no region.
-    pub fn transformed(&self, by: &Transform) -> Result<Tets, DesignError> {
+    pub fn transformed(&self, by: &Transform) -> Result<BuiltTets, DesignError> {
         let mesh = self.mesh.transformed(by).map_err(|f| DesignError::fault("", f))?;
         let made = checked_mesh(mesh, &Checked::default(), self.report.mesher.clone(), None, "", false)?;
-        Ok(Tets { names: self.names.clone(), ..made })
+        Ok(BuiltTets { names: self.names.clone(), ..made })
     }
 
     /// The figures and the warnings.
@@ -179,7 +179,7 @@ fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsKind), De
 }
 
 /// The tetrahedral mesh of `spec`; `environment.path` is that of its table.
-pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
+pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environment) -> Result<BuiltTets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&environment.path, f);
     // Points on the surface are no evidence of lost volume.
     let inside: Vec<Vec3> = {
@@ -213,7 +213,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
                     return Err(DesignError::new(below("size"), message));
                 };
                 let surface = surface(region, environment, size)?;
-                let (mesh, checked) = wild(made, &surface, size, &environment.path, environment.loader)?;
+                let (mesh, checked) = ftetwild(made, &surface, size, &environment.path, environment.loader)?;
                 (mesh, 0.0, checked, "ftetwild".to_string())
             }
         }
@@ -361,13 +361,13 @@ fn checked_mesh(
     fit: Option<Fit>,
     path: &str,
     is_made: bool,
-) -> Result<Tets, DesignError> {
+) -> Result<BuiltTets, DesignError> {
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
     let report = TetReport { mesher, quality, fit, region_volume: None, layers: None };
     let warnings = warnings(&report, checked, path, is_made);
-    Ok(Tets { mesh, on_surface: None, names: Vec::new(), report, warnings })
+    Ok(BuiltTets { mesh, on_surface: None, names: Vec::new(), report, warnings })
 }
 
 /// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the
@@ -378,7 +378,7 @@ pub(super) fn of_soup(
     path: &str,
     loader: &dyn Loader,
     why: DesignError,
-) -> Result<Tets, DesignError> {
+) -> Result<BuiltTets, DesignError> {
     let (TetsKind::Made(made), RegionKind::Mesh(file)) = (spec, region) else {
         return Err(why);
     };
@@ -395,7 +395,7 @@ pub(super) fn of_soup(
     let GradeSpec::Constant(size) = made.size else {
         return Err(why);
     };
-    let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
+    let (mut mesh, checked) = ftetwild(made, &surface, size, path, loader)?;
     let notes = RefCell::default();
     mesh.zones = zones(&mesh, made, path, loader, None, &notes)?;
     let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, true)?;
@@ -442,7 +442,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
         if is_made { "take a smaller size" } else { "is it a mesh of this region, in the right place and unit?" };
     // A mesh of something else has no features of the region to keep.
     let strange = !is_made && fit.to_part.max > FAR * q.size.mean;
-    let lost = report.lost();
+    let lost = report.lost_features();
     if !lost.is_empty() && !strange {
         let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), position(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
@@ -501,12 +501,12 @@ mod tests {
         }
     }
 
-    fn made(table: &str) -> Result<Tets, DesignError> {
+    fn made(table: &str) -> Result<BuiltTets, DesignError> {
         let text = format!(
             "[region.box]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n[lattice.core]\ncell.tet.name = \"any\"\n\
              [lattice.core.map.tets]\n{table}\n"
         );
-        Tets::in_design(&Node::from_toml(&text).unwrap(), None, &Files)
+        BuiltTets::in_design(&Node::from_toml(&text).unwrap(), None, &Files)
     }
 
     #[test]
@@ -554,8 +554,8 @@ mod tests {
         assert!(!report.region.volume_exact && (report.region.described_volume.unwrap() / own - 1.0).abs() < 1e-12);
         let of_box = made("size = 0.3").unwrap();
         assert!((of_box.report.region_volume.unwrap() - of_box.mesh.volume()).abs() < 1e-9);
-        let file = TetFileKind { path: "hex.vtk".into(), unit: None, split: false, joined: Joined::default() };
-        let wrong = Tets::in_file(&file, &Files).unwrap_err();
+        let file = TetFileKind { path: "hex.vtk".into(), unit: None, split: false, joined: CellJoin::default() };
+        let wrong = BuiltTets::in_file(&file, &Files).unwrap_err();
         assert!(wrong.to_string().starts_with("hex.vtk: the mesh has 1 hexahedron"), "{wrong}");
     }
 
@@ -580,7 +580,7 @@ mod tests {
         wrong("path = \"hex.vtk\"", ".split", Some(6), "1 hexahedron and 0 tetrahedra; give split = true");
         wrong("path = \"turned.vtk\"", ".path", Some(7), "1 of 6 tetrahedra are inverted");
         let none = "[region.sphere]\nradius = 1\n[lattice.core.map.affine]\nwavelength = 1";
-        let e = Tets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();
+        let e = BuiltTets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();
         assert!(e.message.contains("no lattice of the design has a tetrahedral mesh"), "{e}");
     }
 }

@@ -19,9 +19,9 @@ use crate::environment::Environment;
 use crate::grade::Grade;
 use crate::grade::Quantity;
 use crate::kind::DesignError;
-use crate::map::{Ends, Tets};
+use crate::map::{CarrierMesh, SurfaceEnds};
 use crate::region::{Intersection, MeshRegion, Notes, Region};
-use crate::tiling::{Amount, Level, Share, Tiling};
+use crate::tiling::{Amount, NodalLevel, Share, Tiling};
 use geometry::fault::{Fault, position};
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
@@ -33,12 +33,12 @@ const SAMPLED: f64 = 1e-3;
 const THICKER: f64 = 1.1;
 
 /// A tetrahedral mesh that the part is made of, and the lattice in it.
-pub(super) struct Domain<'a> {
+pub(super) struct TilingDomain<'a> {
     pub name: &'a str,
     pub spec: &'a LatticeSpec,
     cell: &'a TetCellSpec,
-    joined: Joined,
-    map: Arc<Tets>,
+    joined: CellJoin,
+    map: Arc<CarrierMesh>,
     /// Numbers of zones with names.
     names: ZoneNames,
     /// The report on the mesh.
@@ -49,9 +49,9 @@ pub(super) struct Domain<'a> {
     fit: MeshFit,
 }
 
-impl Domain<'_> {
+impl TilingDomain<'_> {
     /// How the lattice ends at the part's surface.
-    pub fn ends(&self) -> Ends {
+    pub fn ends(&self) -> SurfaceEnds {
         self.joined.surface
     }
 
@@ -86,7 +86,7 @@ pub(super) fn of_soup(
     d: &Design,
     loader: &dyn Loader,
     why: DesignError,
-) -> Result<(build_tets::Tets, Region), DesignError> {
+) -> Result<(build_tets::BuiltTets, Region), DesignError> {
     let Some((name, _, spec)) = over_tets(d) else {
         return Err(why);
     };
@@ -107,10 +107,10 @@ fn enclosed(boundary: Mesh, path: &str) -> Result<Region, DesignError> {
 pub(super) fn domain<'a>(
     d: &'a Design,
     region: &Region,
-    soup: Option<build_tets::Tets>,
+    soup: Option<build_tets::BuiltTets>,
     loader: &dyn Loader,
     notes: &RefCell<Notes>,
-) -> Result<Option<Domain<'a>>, DesignError> {
+) -> Result<Option<TilingDomain<'a>>, DesignError> {
     let Some((name, spec, spec_of_mesh)) = over_tets(d) else {
         return Ok(None);
     };
@@ -159,14 +159,14 @@ pub(super) fn domain<'a>(
     }
     let wrong = |f| DesignError::fault(&path, f);
     let (map, region, fit) = match filled {
-        Some(region) => (Tets::new(&made.mesh, joined.overlap).map_err(wrong)?, region, MeshFit::Whole),
+        Some(region) => (CarrierMesh::new(&made.mesh, joined.overlap).map_err(wrong)?, region, MeshFit::Whole),
         None => {
-            let bent = Tets::of_region(&made.mesh, joined.overlap, region).map_err(wrong)?;
+            let bent = CarrierMesh::of_region(&made.mesh, joined.overlap, region).map_err(wrong)?;
             match spec_of_mesh {
-                _ if bent.fits() && made.report.lost().is_empty() => (bent, region.clone(), MeshFit::Whole),
+                _ if bent.fits() && made.report.lost_features().is_empty() => (bent, region.clone(), MeshFit::Whole),
                 TetsKind::Made(_) => (bent, region.clone(), MeshFit::Nearly),
                 TetsKind::File(file) => {
-                    let flat = Tets::new(&made.mesh, joined.overlap).map_err(wrong)?;
+                    let flat = CarrierMesh::new(&made.mesh, joined.overlap).map_err(wrong)?;
                     let message = cut(&made.report, &file.path);
                     notes.borrow_mut().warnings.push(Warning { path: path.clone(), message });
                     let common = common(region, &flat, &made.report, &path)?;
@@ -176,11 +176,11 @@ pub(super) fn domain<'a>(
         }
     };
     let (names, report) = (made.names, made.report);
-    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), names, report, region, fit }))
+    Ok(Some(TilingDomain { name, spec, cell, joined, map: Arc::new(map), names, report, region, fit }))
 }
 
 /// What a region and a mesh of something else have in common: the region, if the mesh holds it.
-fn common(region: &Region, mesh: &Tets, report: &TetReport, path: &str) -> Result<Region, DesignError> {
+fn common(region: &Region, mesh: &CarrierMesh, report: &TetReport, path: &str) -> Result<Region, DesignError> {
     if report.fit.as_ref().is_some_and(|f| f.uncovered.share == 0.0) {
         return Ok(region.clone());
     }
@@ -266,7 +266,7 @@ pub(super) struct BuiltTiling {
 
 /// The lattice.
 pub(super) fn lattice(
-    domain: &Domain,
+    domain: &TilingDomain,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<BuiltTiling, DesignError> {
@@ -280,7 +280,7 @@ pub(super) fn lattice(
     let part: Part = domain.spec.part.into();
     let spec = &domain.spec.level;
     let path = below("level");
-    if spec.fit != Fit::Table {
+    if spec.fit != LevelFit::Table {
         let message = "the fraction of a tetrahedral cell is exact; leave this out";
         return Err(DesignError::new(format!("{path}.fit"), message));
     }
@@ -322,12 +322,12 @@ pub(super) fn lattice(
     if amount == Amount::Thickness && cell.iso(Part::Sheet, 0.5) <= 0.0 {
         return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
     }
-    let level = Level::of(&domain.map, &cell, part, amount, values.clone());
+    let level = NodalLevel::of(&domain.map, &cell, part, amount, values.clone());
     let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level);
     let tiling = match amount {
-        Amount::Iso => tiling.meeting(None),
-        Amount::Fraction => tiling.meeting(Some(&values)),
-        Amount::Thickness => tiling.walled(&values).meeting(None),
+        Amount::Iso => tiling.with_fraction(None),
+        Amount::Fraction => tiling.with_fraction(Some(&values)),
+        Amount::Thickness => tiling.with_mean_thickness(&values).with_fraction(None),
     };
     check(&tiling, &path)?;
     let made = made(tiling, &values, domain, environment, &path)?;
@@ -341,13 +341,13 @@ pub(super) fn lattice(
 fn made(
     tiling: Tiling,
     values: &[f64],
-    domain: &Domain,
+    domain: &TilingDomain,
     environment: &Environment,
     path: &str,
 ) -> Result<BuiltTiling, DesignError> {
     let spec = &domain.spec.level;
     let fraction = matches!(spec.amount, AmountSpec::Fraction(_) | AmountSpec::Porosity(_));
-    let whole = spec.of == Of::Part;
+    let whole = spec.of == FractionOf::Part;
     if whole && !fraction {
         let message = "of = \"part\" goes with a fraction or a porosity";
         return Err(DesignError::new(format!("{}.level.of", environment.path), message));
@@ -379,7 +379,7 @@ fn made(
 }
 
 /// Why the surface of a lattice is made on a grid, with the place if there is one; `None` where each tetrahedron has its own.
-fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<String> {
+fn on_grid(domain: &TilingDomain, environment: &Environment, ends: bool) -> Option<String> {
     if domain.joined.method == Method::Implicit {
         return Some("method = \"implicit\"".into());
     }
@@ -392,7 +392,7 @@ fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<Str
     match domain.fit {
         MeshFit::Whole => None,
         MeshFit::Cut => Some("the region cuts the tetrahedra of the file".into()),
-        MeshFit::Nearly => Some(match (domain.report.lost().first(), domain.map.farthest_off()) {
+        MeshFit::Nearly => Some(match (domain.report.lost_features().first(), domain.map.farthest_off()) {
             (Some(lost), _) => {
                 let size = rounded(lost.size, 3);
                 format!("the tetrahedra do not follow a {} of {size} mm at {}", lost.kind.word(), position(lost.at))
@@ -412,7 +412,7 @@ fn on_grid(domain: &Domain, environment: &Environment, ends: bool) -> Option<Str
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
 /// zone, so that one passes into the other in the tetrahedra between.
 fn zoned(
-    domain: &Domain,
+    domain: &TilingDomain,
     names_of_cells: &BTreeMap<String, TetCellName>,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
@@ -446,8 +446,8 @@ fn zoned(
         let weights = map.shares(|zone| cell_of(zone) == Some(&name.0));
         cells.push(Share { cell, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
     }
-    let level = Level::mixed(map, &cells, part, &values);
-    let tiling = Tiling::of(map.clone(), cells, part, level).meeting(Some(&values));
+    let level = NodalLevel::mixed(map, &cells, part, &values);
+    let tiling = Tiling::of(map.clone(), cells, part, level).with_fraction(Some(&values));
     let made = made(tiling, &values, domain, environment, &path)?;
     let joins = made.alone.then(|| joins(&made.done.tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
@@ -458,7 +458,7 @@ fn zoned(
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.
-fn at_nodes(grade: &Grade, quantity: &Quantity, map: &Tets) -> Result<Vec<f64>, DesignError> {
+fn at_nodes(grade: &Grade, quantity: &Quantity, map: &CarrierMesh) -> Result<Vec<f64>, DesignError> {
     if let Some(v) = grade.constant() {
         return Ok(vec![v]);
     }

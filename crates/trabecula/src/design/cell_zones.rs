@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::data::TetCellName;
 use crate::kind::DesignError;
-use crate::map::Tets;
+use crate::map::CarrierMesh;
 
 /// Zones that are listed in an error, at most.
 const LISTED: usize = 12;
@@ -23,7 +23,7 @@ pub struct CellZone {
 /// The zones of a mesh that the keys of a design mean: a name of `names`, or else a number; every zone of the mesh has one.
 pub(super) fn resolved(
     cells: &BTreeMap<String, TetCellName>,
-    map: &Tets,
+    map: &CarrierMesh,
     names: &[(i64, String)],
     path: &str,
 ) -> Result<Vec<CellZone>, DesignError> {
@@ -83,10 +83,10 @@ mod tests {
     use geometry::tetmesh::{CUBE, TetMesh};
 
     /// A cube whose six tetrahedra are of these zones.
-    fn cube(zones: [i64; 6]) -> Tets {
+    fn cube(zones: [i64; 6]) -> CarrierMesh {
         let nodes = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(|v| v as f64)).collect();
         let tets = CUBE.map(|t| t.map(|v| v as u32)).to_vec();
-        Tets::new(&TetMesh { nodes, tets, zones: zones.to_vec() }, 0.0).unwrap()
+        CarrierMesh::new(&TetMesh { nodes, tets, zones: zones.to_vec() }, 0.0).unwrap()
     }
 
     #[test]

@@ -10,9 +10,11 @@ use std::sync::{Arc, Mutex};
 
 use super::{Built, Tiled};
 use crate::extract::{GridSurface, region_volume};
-use crate::map::Ends;
+use crate::map::SurfaceEnds;
 use crate::solid::Solid;
-use crate::surface_maker::{Estimate, Islands, Measured, Options, Pieces, Resolved, Store, Summary, SurfaceMaker};
+use crate::surface_maker::{
+    Estimate, Islands, Measured, Resolved, Store, Summary, SurfaceMaker, SurfaceOptions, SurfaceSink,
+};
 use crate::tiling::Rounded;
 use geometry::fault::Fault;
 use geometry::progress::{Progress, Stage, Stopped};
@@ -39,13 +41,13 @@ const MEASURED: f64 = 0.5;
 
 /// A move of the level, and the share of the solid's volume that it makes up for.
 #[derive(Clone, Copy)]
-pub(super) struct Move {
+pub(super) struct LevelShift {
     by: f64,
     share: f64,
 }
 
 /// Moves of the level that were found, by the bits of the step.
-pub(super) type Moves = Mutex<HashMap<u64, Move>>;
+pub(super) type Moves = Mutex<HashMap<u64, LevelShift>>;
 
 /// The surface of a lattice over tetrahedra on a grid.
 pub(super) struct CompensatedGrid<'a>(pub &'a Built);
@@ -97,10 +99,10 @@ pub(super) fn moved(built: &Built, by: f64) -> Cow<'_, Solid> {
 
 /// The design's solid with the level of its lattice moved.
 fn at(built: &Built, tiled: &Tiled, by: f64) -> Solid {
-    let moved = tiled.placed.as_ref().clone().moved(by);
+    let moved = tiled.placed.as_ref().clone().with_level_shift(by);
     let field: Arc<dyn crate::implicit::Implicit> = match tiled.ends {
-        Ends::Rounded => Arc::new(Rounded::new(&Arc::new(moved), &built.solid.region)),
-        _ => Arc::new(moved.eased()),
+        SurfaceEnds::Rounded => Arc::new(Rounded::new(&Arc::new(moved), &built.solid.region)),
+        _ => Arc::new(moved.with_limited_gradient()),
     };
     Solid { field: Some(field), ..built.solid.clone() }
 }
@@ -111,34 +113,34 @@ fn found(
     (tiled, [aim, off]): (&Tiled, [f64; 2]),
     (step, guess): (f64, f64),
     progress: &dyn Progress,
-) -> Result<Move, Stopped> {
+) -> Result<LevelShift, Stopped> {
     let share = |k: usize| k as f64 / (ROUNDS + 1) as f64;
     let stage = |k: usize| Stage { whole: progress, from: share(k), to: share(k + 1) };
     let all = region_volume(&built.solid.region, 0.0, &stage(0))?;
     let range = tiled.tiling.cells[0].cell.range();
     let width = (range.hi - range.lo) / tiled.tiling.cells[0].scale;
     let share_at = |by: f64| {
-        let (flat, solid) = tiled.placed.as_ref().clone().moved(by).volumes();
+        let (flat, solid) = tiled.placed.as_ref().clone().with_level_shift(by).volumes();
         solid / flat
     };
     let nudge = NUDGE * width;
     let rate = all * (share_at(nudge) - share_at(-nudge)) / (2.0 * nudge);
-    let search = Search { aim: aim * all, near: (NEAR * aim).max(off) * all, rate, farthest: FARTHEST * width };
+    let search = LevelSearch { aim: aim * all, near: (NEAR * aim).max(off) * all, rate, farthest: FARTHEST * width };
     let mut rounds = 1..;
     let (by, rate) = search.solve(guess, |by| {
         let solid = at(built, tiled, by);
-        let options = Options { resolution: step, islands: Islands::Keep };
+        let options = SurfaceOptions { resolution: step, islands: Islands::Keep };
         match GridSurface(&solid).measure(&options, &stage(rounds.next().unwrap_or(ROUNDS))) {
             Ok(made) => Ok(Some(made.figures.size.volume)),
             Err(Stopped::Refused(_)) => Ok(None),
             Err(stopped) => Err(stopped),
         }
     })?;
-    Ok(Move { by, share: (by * rate / (aim * all)).abs() })
+    Ok(LevelShift { by, share: (by * rate / (aim * all)).abs() })
 }
 
 /// What a move of the level is sought for.
-struct Search {
+struct LevelSearch {
     /// The volume to be enclosed, and how far from it is near enough, mm³.
     aim: f64,
     near: f64,
@@ -148,7 +150,7 @@ struct Search {
     farthest: f64,
 }
 
-impl Search {
+impl LevelSearch {
     /// The move, from a guess on, and the rate of the volume there; `measure` has the volume at a move, if a surface can be made there.
     fn solve(
         &self,
@@ -194,17 +196,27 @@ impl CompensatedGrid<'_> {
 }
 
 impl SurfaceMaker for CompensatedGrid<'_> {
-    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
+    fn make(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn SurfaceSink,
+        progress: &dyn Progress,
+    ) -> Result<Resolved, Stopped> {
         let (solid, rest) = self.solid(options.resolution, progress)?;
         GridSurface(&solid).make(options, out, &rest)
     }
 
-    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
+    fn stream_stl(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn Store,
+        progress: &dyn Progress,
+    ) -> Result<Summary, Stopped> {
         let (solid, rest) = self.solid(options.resolution, progress)?;
         GridSurface(&solid).stream_stl(options, out, &rest)
     }
 
-    fn measure(&self, options: &Options, progress: &dyn Progress) -> Result<Measured, Stopped> {
+    fn measure(&self, options: &SurfaceOptions, progress: &dyn Progress) -> Result<Measured, Stopped> {
         let (solid, rest) = self.solid(options.resolution, progress)?;
         GridSurface(&solid).measure(options, &rest)
     }
@@ -229,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_level_at_which_there_is_no_surface_is_stepped_back_from() {
-        let search = Search { aim: 20.2, near: 0.004, rate: 20.0, farthest: 0.8 };
+        let search = LevelSearch { aim: 20.2, near: 0.004, rate: 20.0, farthest: 0.8 };
         for refused in [-1.0, -0.35] {
             let (by, rate) = search.solve(0.0, |by| Ok((by > refused).then(|| volume(by)))).expect("not stopped");
             assert!((volume(by) - search.aim).abs() < SURE * search.aim, "{by}");

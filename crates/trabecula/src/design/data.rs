@@ -8,7 +8,8 @@ pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
 use crate::kind::{Defs, DesignError, Fault, Key, Kind, Node, NodeCursor, OneOrThree, Table};
 pub use crate::map::{
-    AffineKind, Ends, Joined, LayersSpec, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, TetFileKind, TetsKind,
+    AffineKind, CellJoin, LayersSpec, MadeTetsKind, MapKind, MesherKind, Method, NetSpec, SurfaceEnds, TetFileKind,
+    TetsKind,
 };
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::math::Vec3;
@@ -190,13 +191,13 @@ pub struct TermSpec {
     pub phase: f64,
     /// The real part of e^{2πi(h·u + phase)} (a cosine) or its imaginary part (a sine).
     #[kind(default)]
-    pub component: Component,
+    pub component: WaveComponent,
 }
 
 /// Which part of e^{2πi(h·u + phase)} a term is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "component")]
-pub enum Component {
+#[kind(name = "Component", noun = "component")]
+pub enum WaveComponent {
     /// The real part: a cosine.
     #[default]
     Re,
@@ -347,10 +348,10 @@ pub struct LevelSpec {
     pub amount: AmountSpec,
     /// What a fraction or porosity is of.
     #[kind(default)]
-    pub of: Of,
+    pub of: FractionOf,
     /// How a fraction or porosity becomes a level.
     #[kind(default)]
-    pub fit: Fit,
+    pub fit: LevelFit,
     /// The sheet's mid-surface is f = mid: an off-centre sheet, |f − mid| ≤ t or the wall about it.
     #[kind(default = 0.0)]
     pub mid: f64,
@@ -466,8 +467,8 @@ pub struct PermeabilitySpec {
 
 /// What a fraction is of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "word")]
-pub enum Of {
+#[kind(name = "Of", noun = "word")]
+pub enum FractionOf {
     /// Of the periodic cell.
     #[default]
     Cell,
@@ -477,8 +478,8 @@ pub enum Of {
 
 /// How a fraction becomes a level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "fit")]
-pub enum Fit {
+#[kind(name = "Fit", noun = "fit")]
+pub enum LevelFit {
     /// By the cell's own exact distribution.
     #[default]
     Table,
@@ -488,8 +489,8 @@ pub enum Fit {
 
 /// Regions that are kept fully solid, by name.
 #[derive(Clone, Debug, Default, PartialEq, Kind)]
-#[kind(before = named_first)]
-pub struct Keeps(pub BTreeMap<String, RegionKind>);
+#[kind(name = "Keeps", before = named_first)]
+pub struct KeepZones(pub BTreeMap<String, RegionKind>);
 
 /// Explains that a name comes before the kind of a region.
 fn named_first(at: &NodeCursor) -> Result<(), DesignError> {

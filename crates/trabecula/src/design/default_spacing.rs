@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::Built;
 use super::coarse_steps::LEAST;
-use crate::map::Ends;
+use crate::map::SurfaceEnds;
 use crate::report::{BeamsReport, LatticeReport};
 use crate::tiling::steps_enough;
 use crate::truss::Beams;
@@ -116,7 +116,7 @@ pub(super) fn spacing(
     let walls = gridded(built, lattices).filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
     let beams = beams.values().map(|b| b.thickness / PER_BEAM);
     let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
-    let rods = built.tilings.iter().filter(|t| t.ends == Ends::Net).filter_map(|t| t.radii);
+    let rods = built.tilings.iter().filter(|t| t.ends == SurfaceEnds::Net).filter_map(|t| t.radii);
     let beams = beams.chain(rods.flat_map(|[least, most]| [2.0 * least / PER_WALL, 2.0 * most / PER_BEAM]));
     let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
     (smallest_repeat(built) / PER_CELL).min(waves).min(walls).min(wavelength / FEWEST)

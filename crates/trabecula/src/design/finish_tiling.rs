@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::sample;
-use super::surface_net::{Net, Rods};
+use super::surface_net::{RodNet, Rods};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::implicit::Implicit;
 use crate::kind::DesignError;
-use crate::map::{Ends, Joined};
+use crate::map::{CellJoin, SurfaceEnds};
 use crate::region::Region;
 use crate::tiling::{Rounded, Tiling};
 use geometry::fault::number;
@@ -44,7 +44,7 @@ pub(super) struct Finished {
 
 /// What gives a lattice its ends.
 pub(super) struct Finish<'a> {
-    ends: Ends,
+    ends: SurfaceEnds,
     region: Region,
     /// The radius of the net's rods as given.
     radius: Option<f64>,
@@ -57,10 +57,10 @@ pub(super) struct Finish<'a> {
 
 impl<'a> Finish<'a> {
     /// Reads how a lattice is to end; `environment` is that of the lattice, `path` that of the amount.
-    pub fn new(joined: &Joined, environment: &'a Environment<'a>, path: &str) -> Result<Finish<'a>, DesignError> {
+    pub fn new(joined: &CellJoin, environment: &'a Environment<'a>, path: &str) -> Result<Finish<'a>, DesignError> {
         let map = format!("{}.map.tets", environment.path);
         let net = match (&joined.net, joined.surface) {
-            (Some(_), ends) if ends != Ends::Net => {
+            (Some(_), ends) if ends != SurfaceEnds::Net => {
                 let message = format!("there is a net with surface = \"net\" alone, found \"{}\"", ends.word());
                 return Err(DesignError::new(format!("{map}.net"), message));
             }
@@ -80,14 +80,14 @@ impl<'a> Finish<'a> {
 
     /// Whether the finished part has another fraction than the cells.
     pub fn changes(&self) -> bool {
-        matches!(self.ends, Ends::Net | Ends::Rounded)
+        matches!(self.ends, SurfaceEnds::Net | SurfaceEnds::Rounded)
     }
 
     /// The lattice with its ends; with `asked`, at the level at which the finished part has that fraction: with skin and what is
     /// kept solid if `whole`.
     pub fn made(&self, tiling: Tiling, asked: Option<f64>, whole: bool) -> Result<Finished, DesignError> {
         let net = match self.ends {
-            Ends::Net => Some(Arc::new(self.net(&tiling)?)),
+            SurfaceEnds::Net => Some(Arc::new(self.net(&tiling)?)),
             _ => None,
         };
         let Some(asked) = asked else {
@@ -117,7 +117,7 @@ impl<'a> Finish<'a> {
         for _ in 0..ROUNDS {
             checkpoint();
             let by = sorted[((share * count) as usize).min(points.len() - 1)];
-            let made = self.finished(Arc::new(tiling.clone().moved(by)), net.as_ref())?;
+            let made = self.finished(Arc::new(tiling.clone().with_level_shift(by)), net.as_ref())?;
             let mut solid = kept.clone();
             fill(&mut solid, &points, |p, out| made.field.values(p, out));
             if let (Some(rods), None) = (&made.net, fixed) {
@@ -168,7 +168,7 @@ impl<'a> Finish<'a> {
         let mut best: Option<(f64, Tiling)> = None;
         for _ in 0..ROUNDS {
             checkpoint();
-            let moved = tiling.clone().moved(by);
+            let moved = tiling.clone().with_level_shift(by);
             let Some(found) = fraction(&moved) else { break };
             if best.as_ref().is_none_or(|b| (found - asked).abs() < (b.0 - asked).abs()) {
                 best = Some((found, moved));
@@ -204,7 +204,7 @@ impl<'a> Finish<'a> {
     }
 
     /// The middle lines of the net: on the faces of the boundary that are chosen, where no skin or keep zone ties the ports anyway.
-    fn net(&self, tiling: &Tiling) -> Result<Net, DesignError> {
+    fn net(&self, tiling: &Tiling) -> Result<RodNet, DesignError> {
         let map = &tiling.map;
         let all = map.boundary_faces();
         let third = |(t, f): &(usize, [usize; 3])| {
@@ -234,10 +234,10 @@ impl<'a> Finish<'a> {
                            (surface = \"capped\"), or leave the skin open where it is wanted";
             return Err(DesignError::new(format!("{}.surface", self.map), message));
         }
-        Ok(Net::new(map, &self.region, &tiling.ports(), open))
+        Ok(RodNet::new(map, &self.region, &tiling.ports(), open))
     }
 
-    fn rods(&self, net: &Arc<Net>, of: &[f64]) -> Result<Rods, DesignError> {
+    fn rods(&self, net: &Arc<RodNet>, of: &[f64]) -> Result<Rods, DesignError> {
         if of.iter().all(|r| r.is_nan() || *r <= 0.0) {
             let message = "the cell has no ports on the surface at this level, so there is nothing for the net to tie; ask for a higher \
                            fraction, take another cell, or give net.radius";
@@ -247,16 +247,16 @@ impl<'a> Finish<'a> {
     }
 
     /// The lattice with its ends at its own level.
-    fn finished(&self, tiling: Arc<Tiling>, net: Option<&Arc<Net>>) -> Result<Finished, DesignError> {
+    fn finished(&self, tiling: Arc<Tiling>, net: Option<&Arc<RodNet>>) -> Result<Finished, DesignError> {
         let (field, placed) = (tiling.clone(), tiling.clone());
         let plain = Finished { tiling: tiling.clone(), placed, field, net: None, radii: None, fraction: None };
         match (self.ends, net) {
-            (Ends::Net, Some(net)) => {
+            (SurfaceEnds::Net, Some(net)) => {
                 let of = self.radius.map_or_else(|| tiling.rod_radii(), |radius| tiling.given_radii(radius));
                 let rods = self.rods(net, &of)?;
                 Ok(Finished { radii: Some(rods.range()), net: Some(rods), ..plain })
             }
-            (Ends::Rounded, _) => {
+            (SurfaceEnds::Rounded, _) => {
                 let rounded = Rounded::new(&tiling, &self.region);
                 Ok(Finished { radii: Some(rounded.end_radii()), field: Arc::new(rounded), ..plain })
             }

@@ -8,7 +8,7 @@ use geometry::fault::nearest;
 
 /// What varies: keys of the design by their paths, such as "lattice.core.level.fraction" = [0.2, 0.3, 0.4].
 #[derive(Clone, Debug, PartialEq)]
-pub struct SweepKind {
+pub struct StudySweep {
     /// How values are chosen.
     pub settings: SweepSettings,
     /// The values of each path.
@@ -116,7 +116,7 @@ impl Kind for AnyValue {
     }
 }
 
-impl Kind for SweepKind {
+impl Kind for StudySweep {
     const DOC: &'static str = "What varies in a sweep: keys of the design by their paths, each with its values.";
 
     fn expected() -> String {
@@ -143,7 +143,7 @@ impl Kind for SweepKind {
             let message = "nothing varies; give a key of the design by its path, such as \"lattice.core.level.fraction\" = [0.2, 0.3]";
             return Err(at.error(message));
         }
-        Ok(SweepKind { settings, parameters })
+        Ok(StudySweep { settings, parameters })
     }
 
     fn write(&self) -> Node {
@@ -175,7 +175,7 @@ impl Kind for SweepKind {
         let nested =
             defs.named("StudyTable", |_| Node::table([("type", "object".into()), ("description", words.into())]));
         defs.named("Study", |defs| {
-            let settings = crate::kind::Open::of::<SweepSettings>(defs).closed();
+            let settings = crate::kind::OpenTable::of::<SweepSettings>(defs).closed();
             settings
                 .with("description", Self::DOC.into())
                 .with("additionalProperties", crate::kind::any_schema("", vec![values, nested]))
@@ -183,7 +183,7 @@ impl Kind for SweepKind {
     }
 }
 
-impl SweepKind {
+impl StudySweep {
     /// Refuses values that the sampling cannot take.
     fn possible(&self, of: &ParameterKind) -> Result<(), Fault> {
         match of {

@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::implicit::Surface;
-use crate::map::Tets;
+use crate::map::CarrierMesh;
 use crate::map::curved_tets::boundary_edges;
 use crate::map::surface_feet::{EdgeFaces, edge_feet, feet, sharp_feet};
 use crate::region::Region;
 use crate::tiling::Ports;
-use ::beams::graph::{Beam, Graph, Hub, Profile};
+use ::beams::graph::{Beam, Graph, HubBall, Profile};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::Fault;
 use geometry::math::{Vec3, add, norm, scale, sub};
@@ -28,7 +28,7 @@ const SHORTEST: f64 = 1e-6;
 const TAPER: f64 = 0.25;
 
 /// The middle lines of a net.
-pub(super) struct Net {
+pub(super) struct RodNet {
     pub nodes: Vec<Vec3>,
     /// Where each node is on the mesh.
     places: Vec<NodePosition>,
@@ -45,7 +45,7 @@ pub(super) struct Net {
 
 /// The rods of a net.
 pub(super) struct Rods {
-    pub net: Arc<Net>,
+    pub net: Arc<RodNet>,
     /// The radii of its nodes, mm.
     pub radii: Vec<f64>,
     pub solid: CsgSolid,
@@ -69,9 +69,9 @@ enum NodePosition {
 /// The middles of the two faces of each edge of the boundary, by its nodes.
 type Edges = HashMap<[u32; 2], EdgeFaces>;
 
-impl Net {
+impl RodNet {
     /// The net on these faces of a mesh's boundary, and along the sharp edges of the region there.
-    pub fn new(map: &Tets, region: &Region, ports: &Ports, on: Vec<usize>) -> Net {
+    pub fn new(map: &CarrierMesh, region: &Region, ports: &Ports, on: Vec<usize>) -> RodNet {
         let at = |n: u32| map.nodes()[n as usize];
         let edges: Edges = boundary_edges(map).into_iter().map(|e| (e.nodes, e.faces)).collect();
         let all = map.boundary_nodes();
@@ -87,10 +87,10 @@ impl Net {
             drawn = sharp(map, region, &edges, drawn);
         }
         let (nodes, places, rods, owners) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut out = Net { nodes, places, rods, owners, faces: on, lines: lines.clone(), drawn: drawn.clone() };
+        let mut out = RodNet { nodes, places, rods, owners, faces: on, lines: lines.clone(), drawn: drawn.clone() };
         // Ends by the nodes they are between, with a share to a millionth.
         let mut known: BTreeMap<(Vec<(u32, i64)>, bool), u32> = BTreeMap::new();
-        let mut end = |out: &mut Net, f: &[u32; 3], l: &[f64; 3]| {
+        let mut end = |out: &mut RodNet, f: &[u32; 3], l: &[f64; 3]| {
             let mut key: Vec<(u32, i64)> = f.iter().zip(l).map(|(n, v)| (*n, (v * 1e6).round() as i64)).collect();
             key.retain(|k| k.1 != 0);
             key.sort_unstable();
@@ -183,14 +183,14 @@ impl Net {
     }
 
     /// Its rods, of the radii (mm) that the nodes of the mesh have.
-    pub fn rods(self: &Arc<Net>, of: &[f64]) -> Result<Rods, Fault> {
+    pub fn rods(self: &Arc<RodNet>, of: &[f64]) -> Result<Rods, Fault> {
         let radii = self.radii(of);
         Ok(Rods { solid: self.solid(&radii)?, net: self.clone(), radii })
     }
 
     /// The rods between nodes of these radii (mm), as a solid.
     fn solid(&self, radii: &[f64]) -> Result<CsgSolid, Fault> {
-        let hubs = self.nodes.iter().zip(radii).map(|(center, radius)| Hub { center: *center, radius: *radius });
+        let hubs = self.nodes.iter().zip(radii).map(|(center, radius)| HubBall { center: *center, radius: *radius });
         // Nodes may coincide, where the mesh is finer than what it follows.
         let long = |ends: &&[u32; 2]| self.length(**ends) > SHORTEST * radii[ends[0] as usize];
         let rods = self.rods.iter().filter(long);
@@ -206,7 +206,7 @@ impl Net {
 }
 
 /// Those of some edges that lie on sharp edges of the region.
-fn sharp(map: &Tets, region: &Region, edges: &Edges, of: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
+fn sharp(map: &CarrierMesh, region: &Region, edges: &Edges, of: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
     let (mut some, mut middles, mut sides) = (Vec::new(), Vec::new(), Vec::new());
     for e in of {
         if let Some(of) = edges.get(&e) {
@@ -235,14 +235,14 @@ mod tests {
     use crate::grade::{Grade, Linear};
     use crate::mesher::background;
     use crate::region::{Cuboid, Sphere};
-    use crate::tiling::{Level, Tiling};
+    use crate::tiling::{NodalLevel, Tiling};
 
     /// A tapered rod is a frustum of the common tangent cone between two balls: its volume by sums over a grid of a fortieth of its
     /// radius, on the surface of which a share of 1e-3 of the volume is in doubt.
     #[test]
     fn a_rod_has_the_volume_of_its_cone_and_balls() {
         let (length, radii) = (3.0, [0.5, 0.3]);
-        let net = Net {
+        let net = RodNet {
             nodes: vec![[0.0; 3], [length, 0.0, 0.0]],
             places: vec![NodePosition::On([0; 3], [1.0, 0.0, 0.0]), NodePosition::On([1; 3], [1.0, 0.0, 0.0])],
             rods: vec![[0, 1]],
@@ -292,13 +292,13 @@ mod tests {
                 Grade::from(Linear::new([1.0, 0.0, 0.0], vec![[-reach, fine], [reach, 3.0 * fine]]).expect("size"));
             let (inside, _) = crate::design::sample::inside(&region, 4000);
             let mesh = background(&region, &region.bounds(), &size, &inside, None).expect("mesh").mesh;
-            let map = Arc::new(Tets::of_region(&mesh, 0.0, &region).expect("map"));
+            let map = Arc::new(CarrierMesh::of_region(&mesh, 0.0, &region).expect("map"));
             let named = named_tet_cell(["diamond", "pn3m"][i / 2]).expect("cell");
             let cell = named.cell().expect("cell");
             let iso = cell.iso(named.part, 0.3);
-            let tiling = Tiling::new(map.clone(), Arc::new(cell), named.part, Level::Same(iso));
+            let tiling = Tiling::new(map.clone(), Arc::new(cell), named.part, NodalLevel::Same(iso));
             let all = map.boundary_nodes();
-            let net = Net::new(&map, &region, &tiling.ports(), (0..all.len()).collect());
+            let net = RodNet::new(&map, &region, &tiling.ports(), (0..all.len()).collect());
             let radii = net.radii(&tiling.rod_radii());
             let mut edges: HashMap<u32, Vec<f64>> = HashMap::new();
             for f in &all {

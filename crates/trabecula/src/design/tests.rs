@@ -34,7 +34,7 @@ fn with(line: &str, instead: &str) -> DesignError {
 fn a_design_survives_toml_and_json() {
     let d = Design::from_toml(GOOD).expect("good");
     let strip = |mut d: Design| {
-        d.lines = Lines::default();
+        d.lines = LineNumbers::default();
         d
     };
     let toml = Design::from_toml(&d.to_toml().expect("writable")).expect("own TOML is readable");

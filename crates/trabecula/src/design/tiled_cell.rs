@@ -9,8 +9,8 @@ use crate::cell::Part;
 use crate::cell::tet::TetCell;
 use crate::implicit::Implicit;
 use crate::kind::DesignError;
-use crate::map::Tets;
-use crate::tiling::{Level, SpaceFilling, Tiling};
+use crate::map::CarrierMesh;
+use crate::tiling::{NodalLevel, SpaceFilling, Tiling};
 use geometry::fault::Fault;
 use geometry::math::Mat3;
 use geometry::tetmesh::TetMesh;
@@ -32,9 +32,9 @@ impl TiledCell {
     /// A part of a cell at a solid fraction, in tetrahedra of this volume (mm³) that overlap.
     pub fn new(cell: &Arc<TetCell>, part: Part, fraction: f64, volume: f64, overlap: f64) -> Result<TiledCell, Fault> {
         let edge = (IN_CUBE * volume).cbrt();
-        let map = Arc::new(Tets::new(&body_centred(edge), overlap)?);
-        let level = Level::Same(cell.iso(part, fraction));
-        let made = Tiling::new(map, cell.clone(), part, level).meeting(Some(&[fraction]));
+        let map = Arc::new(CarrierMesh::new(&body_centred(edge), overlap)?);
+        let level = NodalLevel::Same(cell.iso(part, fraction));
+        let made = Tiling::new(map, cell.clone(), part, level).with_fraction(Some(&[fraction]));
         let wall = match part {
             Part::Sheet => made.thickness().map(|w| w.min),
             // Without ports there is no neck.
@@ -108,10 +108,10 @@ mod tests {
     fn folded_tetrahedra_are_those_of_the_mesh() {
         let cell = Arc::new(named_tet_cell("diamond").and_then(|c| c.cell().ok()).expect("a cell"));
         let edge = 3.0;
-        let map = Arc::new(Tets::new(&body_centred(edge), 0.0).expect("a mesh"));
+        let map = Arc::new(CarrierMesh::new(&body_centred(edge), 0.0).expect("a mesh"));
         let mut seed = 7;
         for part in [Part::Lower, Part::Sheet, Part::Upper] {
-            let tiling = Tiling::new(map.clone(), cell.clone(), part, Level::Same(0.4));
+            let tiling = Tiling::new(map.clone(), cell.clone(), part, NodalLevel::Same(0.4));
             let folded = SpaceFilling::of(&tiling, edge).expect("equal tetrahedra");
             let points: Vec<Vec3> = (0..2000).map(|_| [0; 3].map(|_| edge * (0.5 + 0.7 * random(&mut seed)))).collect();
             let both = [&tiling as &dyn Field, &folded].map(|field| {

@@ -277,8 +277,8 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
     let mut say = |message: String| {
         warnings.push(Warning { path: format!("{lattice}.map.{}", spec.key()), message });
     };
-    if let Some(hasty) = phase.hasty() {
-        say(hasty.to_string());
+    if let Some(undersampled) = phase.undersampled() {
+        say(undersampled.to_string());
     }
     if d.turn > TURN {
         let remedy = if phase.cores().is_some() { "give a larger core_radius there" } else { phase.smoother() };

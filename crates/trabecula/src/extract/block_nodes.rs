@@ -4,7 +4,7 @@ use crate::field::Block;
 use geometry::math::Vec3;
 
 /// The nodes of a block, indexed.
-pub(super) struct Nodes<'a> {
+pub(super) struct BlockNodes<'a> {
     pub axes: [&'a [f64]; 3],
     pub shape: [usize; 3],
     pub stride: [usize; 3],
@@ -13,8 +13,8 @@ pub(super) struct Nodes<'a> {
     pub steps: [[f64; 64]; 3],
 }
 
-impl<'a> Nodes<'a> {
-    pub fn new(block: &Block<'a>) -> Nodes<'a> {
+impl<'a> BlockNodes<'a> {
+    pub fn new(block: &Block<'a>) -> BlockNodes<'a> {
         let shape = block.shape();
         let (mut positions, mut steps) = ([[0.0; 64]; 3], [[0.0; 64]; 3]);
         for (a, axis) in block.axes.iter().enumerate() {
@@ -23,7 +23,7 @@ impl<'a> Nodes<'a> {
                 *step = ends[1] - ends[0];
             }
         }
-        Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], positions, steps }
+        BlockNodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], positions, steps }
     }
 
     pub fn count(&self) -> usize {

@@ -24,13 +24,13 @@ use geometry::math::{Vec3, add, scale};
 use geometry::mesh::{Mesh, is_embedded};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::block_nodes::Nodes;
+use super::block_nodes::BlockNodes;
 use super::cube_table::{CASES, EDGES};
 use super::feature_edges::{DividedFaces, EdgeStore};
-use super::sampling_grid::{Grid, LocalSolid, Sides};
+use super::sampling_grid::{LocalSolid, SamplingGrid, Sides};
 use super::sign_words::Signs;
 use super::vertex_id::VertexId;
-use super::vertex_numbers::{Numbers, numbered};
+use super::vertex_numbers::{VertexNumbers, numbered};
 pub(super) use fragments::{CutVertex, Fragments};
 pub(super) use simplex_cut::{Simplex, section};
 
@@ -57,12 +57,12 @@ impl FeatureMesh {
 
 /// A block while the vertices and triangles of feature cells, fitted cells and caps are added to it.
 pub(super) struct FeatureCells<'a> {
-    pub nodes: &'a Nodes<'a>,
-    pub grid: &'a Grid,
+    pub nodes: &'a BlockNodes<'a>,
+    pub grid: &'a SamplingGrid,
     pub local: &'a LocalSolid,
     pub samples: &'a [Vec<f32>],
     pub signs: &'a Signs,
-    pub numbers: &'a [Numbers],
+    pub numbers: &'a [VertexNumbers],
     pub positions: &'a mut Vec<Vec3>,
     pub extra: &'a mut FeatureMesh,
     pub edges: &'a EdgeStore,

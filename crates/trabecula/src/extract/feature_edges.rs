@@ -41,8 +41,8 @@ use rustc_hash::FxHashMap;
 use crate::field::Field;
 use geometry::math::{Vec3, add, dot, scale, sub};
 
-use super::block_nodes::Nodes;
-use super::sampling_grid::{Grid, LocalSolid};
+use super::block_nodes::BlockNodes;
+use super::sampling_grid::{LocalSolid, SamplingGrid};
 use super::sign_words::Signs;
 use super::vertex_id::VertexId;
 use cell_claims::{CellClaims, OtherSurfaces, decides};
@@ -79,9 +79,9 @@ pub(super) struct EdgeStore {
 
 /// One surface in a block, with all that its contours depend on.
 pub(super) struct SurfaceContext<'a, P: Fn(usize, usize) -> Option<Vec3>> {
-    pub grid: &'a Grid,
+    pub grid: &'a SamplingGrid,
     pub local: &'a LocalSolid,
-    pub nodes: &'a Nodes<'a>,
+    pub nodes: &'a BlockNodes<'a>,
     pub signs: &'a Signs,
     /// Index of the surface among the live ones, its samples and its function.
     pub surface: usize,
@@ -314,21 +314,21 @@ fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
 }
 
 /// The grid edges of a face, each by its lower node and its axis.
-fn lines_of(nodes: &Nodes, (low, axis): (usize, usize)) -> [(usize, usize); 4] {
+fn lines_of(nodes: &BlockNodes, (low, axis): (usize, usize)) -> [(usize, usize); 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let (du, dv) = (nodes.stride[u], nodes.stride[v]);
     [(low, u), (low + du, v), (low + dv, u), (low, v)]
 }
 
 /// The faces around a grid edge that is not on the border of the block.
-fn faces_around(nodes: &Nodes, (node, along): (usize, usize)) -> [(usize, usize); 4] {
+fn faces_around(nodes: &BlockNodes, (node, along): (usize, usize)) -> [(usize, usize); 4] {
     let (u, v) = ((along + 1) % 3, (along + 2) % 3);
     let (du, dv) = (nodes.stride[u], nodes.stride[v]);
     [(node, u), (node - dv, u), (node, v), (node - du, v)]
 }
 
 /// A coordinate clamped to a grid step, without its ends.
-fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
+fn within(grid: &SamplingGrid, axis: &[f64], at: usize, x: f64) -> f64 {
     let (low, high) = (axis[at], axis[at + 1]);
     let margin = grid.margin * (high - low);
     x.clamp(low + margin, high - margin)

@@ -11,7 +11,7 @@ use super::packed::damaged;
 use super::range_partial::{Partial, RowLines};
 use super::tile_components::LINES;
 use super::tile_figures::FigureSums;
-use crate::surface_maker::{ComponentGraph, Measured, NONE, Options, Summary, not_empty};
+use crate::surface_maker::{ComponentGraph, Measured, NONE, Summary, SurfaceOptions, not_empty};
 
 /// Joins ranges of tiles as they come, in order. It holds the border vertices of two layers of tiles and a few numbers for each
 /// component of each tile.
@@ -110,7 +110,7 @@ impl JoinedRanges {
     ///
     /// # Errors
     /// No surface at all; several connected components, if the options refuse them.
-    pub fn finish(self, options: &Options) -> Result<WholeSurface, Stopped> {
+    pub fn finish(self, options: &SurfaceOptions) -> Result<WholeSurface, Stopped> {
         not_empty(self.triangles, options.resolution)?;
         let triangles = self.triangles;
         let found = self.graph.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
@@ -121,7 +121,7 @@ impl JoinedRanges {
     ///
     /// # Errors
     /// As `finish`; ranges whose figures were not taken.
-    pub fn measured(self, options: &Options) -> Result<Measured, Stopped> {
+    pub fn measured(self, options: &SurfaceOptions) -> Result<Measured, Stopped> {
         not_empty(self.triangles, options.resolution)?;
         let found = self.graph.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         let sums = self.sums.ok_or_else(|| Stopped::Refused(damaged()))?;

@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 use std::ops::Range;
 
 use super::packed::{Packer, Unpacker, damaged};
-use super::sampling_grid::{Grid, TILE};
+use super::sampling_grid::{SamplingGrid, TILE};
 use super::tile_components::{LINES, TileComponents};
 use super::tile_figures::FigureSums;
 use crate::surface_maker::{ComponentGraph, NONE, Totals};
@@ -79,7 +79,7 @@ impl RangeSweep {
     }
 
     /// Adds the components of the next tile.
-    pub fn add(&mut self, grid: &Grid, tile: TileComponents) -> Result<(), Fault> {
+    pub fn add(&mut self, grid: &SamplingGrid, tile: TileComponents) -> Result<(), Fault> {
         let base = self.graph.add(&tile.totals, 0)?;
         let layer = tile.tile[2];
         if layer != self.at[0] {
@@ -118,7 +118,7 @@ impl RangeSweep {
     }
 
     /// Puts the vertices of the layer below aside, those that tiles outside the range may use.
-    fn put_below(&mut self, grid: &Grid) {
+    fn put_below(&mut self, grid: &SamplingGrid) {
         let inside = |name: u128| {
             let [first, last] = users(grid, name);
             self.range.contains(&first) && self.range.contains(&last)
@@ -131,7 +131,7 @@ impl RangeSweep {
     }
 
     /// What is known of the range.
-    pub fn finish(mut self, grid: &Grid, figures: Option<FigureSums>) -> Partial {
+    pub fn finish(mut self, grid: &SamplingGrid, figures: Option<FigureSums>) -> Partial {
         self.put_below(grid);
         (self.below, self.at[1]) = (std::mem::take(&mut self.here), self.at[0]);
         self.put_below(grid);
@@ -157,7 +157,7 @@ fn joined(root: &mut [u32]) -> Vec<(u32, u32)> {
 }
 
 /// The first and the last of the tiles that may use a border vertex, by its name (`VertexId::global`).
-fn users(grid: &Grid, name: u128) -> [usize; 2] {
+fn users(grid: &SamplingGrid, name: u128) -> [usize; 2] {
     let steps = (name >> 48 & 0o777) as u64;
     let spans = (steps | steps >> 3 | steps >> 6) & 7;
     let mut node = (name >> 57) as usize;

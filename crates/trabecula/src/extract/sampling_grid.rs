@@ -30,7 +30,7 @@ const LONG: f64 = 3.0;
 const SHARP: f64 = 0.436;
 
 /// The solid on its grid.
-pub(super) struct Grid {
+pub(super) struct SamplingGrid {
     /// Node planes along the three axes (mm, ascending). The outermost ones lie outside the region.
     pub axes: [Vec<f64>; 3],
     /// Least distance of points from the ends of their grid edges, as a share of the edge.
@@ -70,19 +70,19 @@ pub(super) struct GridPlane {
     pub below: bool,
 }
 
-impl Grid {
+impl SamplingGrid {
     /// A grid for a solid.
-    pub(super) fn new(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
+    pub(super) fn new(solid: &Solid, edge: f64) -> Result<SamplingGrid, Fault> {
         check(solid, edge)?;
         let (surfaces, tree) = solid.surfaces();
-        Grid::of(solid, edge, surfaces, vec![tree], None)
+        SamplingGrid::of(solid, edge, surfaces, vec![tree], None)
     }
 
     /// A grid for the wall of a solid and the spaces adjacent to it.
-    pub(super) fn of_spaces(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
+    pub(super) fn of_spaces(solid: &Solid, edge: f64) -> Result<SamplingGrid, Fault> {
         check(solid, edge)?;
         let Spaces { surfaces, trees, faces } = solid.spaces()?;
-        Grid::of(solid, edge, surfaces, trees.into(), Some(faces))
+        SamplingGrid::of(solid, edge, surfaces, trees.into(), Some(faces))
     }
 
     fn of(
@@ -91,7 +91,7 @@ impl Grid {
         surfaces: Vec<Surface>,
         trees: Vec<CsgTree>,
         faces: Option<[usize; 2]>,
-    ) -> Result<Grid, Fault> {
+    ) -> Result<SamplingGrid, Fault> {
         // Planes that bound the whole solid become node planes and so are exact. (Others may meet each other in ways that a
         // node plane cannot represent, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
@@ -114,8 +114,17 @@ impl Grid {
         for (f, p) in planes {
             grid_plane[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
-        let mut grid =
-            Grid { axes, margin, step: edge, surfaces, trees, faces, grid_plane, creases: Vec::new(), fitted: None };
+        let mut grid = SamplingGrid {
+            axes,
+            margin,
+            step: edge,
+            surfaces,
+            trees,
+            faces,
+            grid_plane,
+            creases: Vec::new(),
+            fitted: None,
+        };
         grid.creases = (grid.surfaces.iter()).map(|f| by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
@@ -375,7 +384,7 @@ fn count(axes: &[Vec<f64>; 3], edge: f64) -> Result<(), Fault> {
 }
 
 /// The segments of a surface's feature edges that are kept, by the tiles near which they pass.
-fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
+fn by_tile(grid: &SamplingGrid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
     let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
     let tiles = grid.tiles();
     for (i, s) in (0..).zip(&creases.segments) {

@@ -10,12 +10,12 @@ use geometry::fault::{Fault, number};
 use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 
-use super::sampling_grid::Grid;
+use super::sampling_grid::SamplingGrid;
 use super::stitched::Stitched;
 use super::tile::View;
 use super::tile_queue::each_tile;
 use crate::solid::{Solid, Space};
-use crate::surface_maker::{Islands, MeshedSurface, Options, Resolved, kept};
+use crate::surface_maker::{Islands, MeshedSurface, Resolved, SurfaceOptions, kept};
 
 /// One of the solids that a sheet makes of its region.
 pub struct SpaceMade {
@@ -40,7 +40,7 @@ pub fn spaces(
     in_one_piece: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<SpaceMade>, Stopped> {
-    let grid = Grid::of_spaces(solid, edge).map_err(Stopped::Refused)?;
+    let grid = SamplingGrid::of_spaces(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
     let mut surfaces = vec![SurfaceMesh::default(); wanted.len()];
     let mut all: Vec<Stitched> = surfaces.iter_mut().map(|s| Stitched::new(s)).collect();
@@ -54,7 +54,7 @@ pub fn spaces(
     })?;
     let islands = if in_one_piece { Islands::Error } else { Islands::Keep };
     let finished = wanted.iter().zip(all).map(|(space, out)| {
-        out.finish(&Options { resolution: edge, islands }).map_err(|stopped| match stopped {
+        out.finish(&SurfaceOptions { resolution: edge, islands }).map_err(|stopped| match stopped {
             Stopped::Refused(fault) => Stopped::Refused(of_space(*space, fault)),
             other => other,
         })

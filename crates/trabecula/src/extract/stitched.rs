@@ -4,13 +4,13 @@ use geometry::math::Vec3;
 use geometry::progress::Stopped;
 use rustc_hash::FxHashMap;
 
-use super::tile::Patch;
+use super::tile::TileSurface;
 use super::tile_components::{TileComponents, TileSweep};
-use crate::surface_maker::{Options, Pieces, Resolved, next_vertex, not_empty};
+use crate::surface_maker::{Resolved, SurfaceOptions, SurfaceSink, next_vertex, not_empty};
 
 /// A mesh that grows by one tile after the other, in order. It holds the names of the border vertices of two layers of tiles.
 pub(super) struct Stitched<'a> {
-    out: &'a mut dyn Pieces,
+    out: &'a mut dyn SurfaceSink,
     sweep: TileSweep,
     vertices: usize,
     triangles: u64,
@@ -24,7 +24,7 @@ pub(super) struct Stitched<'a> {
 
 impl<'a> Stitched<'a> {
     /// An empty mesh, which goes to `out`.
-    pub fn new(out: &'a mut dyn Pieces) -> Stitched<'a> {
+    pub fn new(out: &'a mut dyn SurfaceSink) -> Stitched<'a> {
         Stitched {
             out,
             sweep: TileSweep::default(),
@@ -38,7 +38,7 @@ impl<'a> Stitched<'a> {
     }
 
     /// Adds the patch of the next tile.
-    pub fn add(&mut self, (mut patch, components): (Patch, TileComponents)) -> Result<(), Stopped> {
+    pub fn add(&mut self, (mut patch, components): (TileSurface, TileComponents)) -> Result<(), Stopped> {
         let layer = components.tile[2];
         if layer != self.layer {
             // A vertex is shared within a layer of tiles or with the layer below.
@@ -70,7 +70,7 @@ impl<'a> Stitched<'a> {
     }
 
     /// The components of the whole mesh, once all tiles are added.
-    pub fn finish(self, options: &Options) -> Result<Resolved, Stopped> {
+    pub fn finish(self, options: &SurfaceOptions) -> Result<Resolved, Stopped> {
         not_empty(self.triangles, options.resolution)?;
         self.sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)
     }

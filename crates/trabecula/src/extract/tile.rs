@@ -30,18 +30,18 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::field::Block;
-use crate::implicit::{Pair, Surface};
+use crate::implicit::{Surface, SurfacePair};
 use geometry::fault::Fault;
 use geometry::math::Vec3;
 
-use super::block_nodes::Nodes;
+use super::block_nodes::BlockNodes;
 use super::feature_cells::{FeatureCells, FeatureMesh};
 use super::feature_edges::{DividedFaces, EdgeStore, SurfaceContext};
 use super::planar_caps;
-use super::sampling_grid::{Grid, GridPlane, LocalSolid, Sides, TILE};
+use super::sampling_grid::{GridPlane, LocalSolid, SamplingGrid, Sides, TILE};
 use super::sign_words::{Signs, below, bits, negative};
 use super::vertex_id::VertexId;
-use super::vertex_numbers::Numbers;
+use super::vertex_numbers::VertexNumbers;
 pub(super) use count::count;
 use edge_vertices::{list_vertices, solve};
 use holes::hole;
@@ -50,7 +50,7 @@ use volume_balance::balance;
 
 /// The surface of one tile.
 #[derive(Default)]
-pub(super) struct Patch {
+pub(super) struct TileSurface {
     /// Vertex positions.
     pub vertices: Vec<Vec3>,
     /// For each vertex, its id among all tiles if an adjacent one may use it too.
@@ -63,15 +63,15 @@ pub(super) struct Patch {
 
 /// Buffers that one thread uses again and again.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(super) struct TileBuffers {
     /// Values of the live surfaces at the nodes.
     samples: Vec<Vec<f32>>,
     signs: Signs,
-    numbers: Vec<Numbers>,
+    numbers: Vec<VertexNumbers>,
     points: Vec<Vec3>,
     values: Vec<f64>,
     gradients: Vec<Vec3>,
-    vertices: Vec<Vertex>,
+    vertices: Vec<EdgeVertex>,
     plain: Plain,
     /// Positions of all vertices: those on grid edges, then the extra ones.
     positions: Vec<Vec3>,
@@ -91,7 +91,7 @@ struct Plain {
     triangles: Vec<[u32; 3]>,
     /// Number of triangles of each surface.
     counts: Vec<usize>,
-    kinds: Vec<Kind>,
+    kinds: Vec<TriangleRole>,
     /// What lies on the sides of each triangle, if the solid has several parts.
     sides: Vec<Sides>,
     seams: Vec<Seam>,
@@ -102,7 +102,7 @@ type Seam = ([usize; 3], usize);
 
 /// What a triangle of a plain cell is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum TriangleRole {
     /// Only to balance its neighbours: it belongs to another tile, or something finer takes its position.
     Neighbour,
     /// The lattice's surface.
@@ -113,7 +113,7 @@ enum Kind {
 
 /// A vertex on a grid edge. Compact, as a tile has ten thousand of them: what follows from the block is not stored.
 #[derive(Clone, Copy)]
-struct Vertex {
+struct EdgeVertex {
     /// The lower node of the edge.
     node: [u8; 3],
     axis: u8,
@@ -126,23 +126,23 @@ struct Vertex {
     t: f32,
 }
 
-impl Vertex {
+impl EdgeVertex {
     /// The lower node, as an index in the block.
     #[inline]
-    fn low(&self, nodes: &Nodes) -> usize {
+    fn low(&self, nodes: &BlockNodes) -> usize {
         nodes.index(self.node.map(usize::from))
     }
 
     /// Signed length of the edge from its solid to its void end.
     #[inline]
-    fn reach(&self, nodes: &Nodes) -> f64 {
+    fn reach(&self, nodes: &BlockNodes) -> f64 {
         let axis = usize::from(self.axis) % 3;
         let length = nodes.steps[axis][usize::from(self.node[axis]) % 64];
         if self.up { length } else { -length }
     }
 
     #[inline]
-    fn at(&self, nodes: &Nodes, t: f64) -> Vec3 {
+    fn at(&self, nodes: &BlockNodes, t: f64) -> Vec3 {
         let s = if self.up { t } else { 1.0 - t };
         core::array::from_fn(|a| {
             let n = usize::from(self.node[a]) % 64;
@@ -157,9 +157,9 @@ const BATCH: usize = 512;
 
 /// The surface found in a tile, in the buffers of its thread.
 pub(super) struct View<'a> {
-    s: &'a Scratch,
-    pub nodes: Nodes<'a>,
-    grid: &'a Grid,
+    s: &'a TileBuffers,
+    pub nodes: BlockNodes<'a>,
+    grid: &'a SamplingGrid,
     local: LocalSolid,
     /// First node of the block.
     from: [usize; 3],
@@ -173,13 +173,17 @@ pub(super) struct View<'a> {
 ///
 /// # Errors
 /// A surface that crosses itself when it is rounded to single precision, far from the origin.
-pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) -> Result<Option<View<'a>>, Fault> {
+pub(super) fn extract<'a>(
+    grid: &'a SamplingGrid,
+    tile: [usize; 3],
+    s: &'a mut TileBuffers,
+) -> Result<Option<View<'a>>, Fault> {
     let block = grid.block(tile);
     let range = grid.nodes(tile);
     let Some(local) = grid.local(&range, &block.bounds()) else {
         return Ok(None);
     };
-    let nodes = Nodes::new(&block);
+    let nodes = BlockNodes::new(&block);
     let from = range.map(|r| r.start);
     let own = grid.own(tile);
     trace_edges(s, grid, &local, &nodes, tile);
@@ -224,13 +228,13 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     if let Some(at) = s.extra.self_intersection {
         return Err(grid.too_far(at));
     }
-    let own_triangles = s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
+    let own_triangles = s.plain.kinds.iter().any(|k| *k != TriangleRole::Neighbour) || !s.extra.triangles.is_empty();
     Ok((own_triangles || hole.is_some()).then_some(View { s, nodes, grid, local, from, own, hole }))
 }
 
 /// Fills the samples and signs of the live surfaces. Those of the lattice are expensive, so they are evaluated only where the
 /// region can contain solid.
-fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes: &Nodes) {
+fn sample(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, block: &Block, nodes: &BlockNodes) {
     s.signs.shape = block.shape();
     let count = local.live.len();
     if s.samples.len() < count {
@@ -242,7 +246,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
     let mut wanted = None;
     let mut live = local.live.iter().map(|f| &grid.surfaces[*f]).enumerate().peekable();
     while let Some((i, surface)) = live.next() {
-        let is_other = |p: &Arc<dyn Pair>, next: &Surface| next.pair.as_ref().is_some_and(|n| Arc::ptr_eq(p, n));
+        let is_other = |p: &Arc<dyn SurfacePair>, next: &Surface| next.pair.as_ref().is_some_and(|n| Arc::ptr_eq(p, n));
         let pair = surface.pair.as_ref().filter(|p| live.next_if(|(_, next)| is_other(p, next)).is_some());
         let both = i..i + 1 + usize::from(pair.is_some());
         if surface.cut {
@@ -266,7 +270,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
 }
 
 /// Traces the feature edges of all live surfaces.
-fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, tile: [usize; 3]) {
+fn trace_edges(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, nodes: &BlockNodes, tile: [usize; 3]) {
     s.edges.clear(nodes.shape);
     let padded = grid.padded(tile);
     for (surface, &id) in local.live.iter().enumerate() {
@@ -278,7 +282,7 @@ fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, 
 }
 
 /// Claims the cells in which surfaces with feature edges make the surface, alone or with others.
-fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
+fn claim_cells(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, nodes: &BlockNodes) {
     for (surface, &id) in local.live.iter().enumerate() {
         if grid.has_creases(id) {
             s.edges.claims.claim_sole(local, &mut s.signs, nodes, surface);
@@ -292,8 +296,8 @@ fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) 
 }
 
 /// Makes the contours of surfaces with feature edges.
-fn edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
-    let Scratch { edges, samples, signs, numbers, positions, .. } = s;
+fn edges(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, nodes: &BlockNodes) {
+    let TileBuffers { edges, samples, signs, numbers, positions, .. } = s;
     for (surface, &id) in local.live.iter().enumerate() {
         if edges.has(surface) {
             let context = SurfaceContext {
@@ -317,11 +321,11 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
 
 /// The builder of feature and fitted cells; the vertices of plain cells, and the seams.
 fn features<'a>(
-    s: &'a mut Scratch,
-    grid: &'a Grid,
+    s: &'a mut TileBuffers,
+    grid: &'a SamplingGrid,
     local: &'a LocalSolid,
-    nodes: &'a Nodes,
-) -> (FeatureCells<'a>, &'a [Vertex], &'a [Seam]) {
+    nodes: &'a BlockNodes,
+) -> (FeatureCells<'a>, &'a [EdgeVertex], &'a [Seam]) {
     s.extra.clear();
     let mut divided_faces = std::mem::take(&mut s.divided_faces);
     divided_faces.clear(local.live.len());
@@ -343,7 +347,7 @@ fn features<'a>(
 }
 
 /// Snaps the vertices that plain cells share with feature cells to the positions these give them.
-fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
+fn snap(features: &mut FeatureCells, vertices: &[EdgeVertex]) {
     for (i, v) in vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
         let low = v.low(features.nodes);
         let key = VertexId::new(low, &[1 << v.axis], &[usize::from(v.surface)]);
@@ -352,7 +356,7 @@ fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
 }
 
 /// Adds all that marching cubes does not make: feature and fitted cells, the seams around them, and caps.
-fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
+fn finish(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, nodes: &BlockNodes, own: &[Range<usize>; 3]) {
     let featured = s.signs.has_features();
     if !featured && local.grid_planes.is_empty() && !s.edges.claims.any() {
         s.extra.clear();
@@ -392,10 +396,10 @@ impl View<'_> {
     pub fn triangles(&self, part: usize) -> impl Iterator<Item = ([u32; 3], bool)> {
         let part = part as u8 + 1;
         let Plain { triangles, kinds, sides, .. } = &self.s.plain;
-        let plain = triangles.iter().zip(kinds).enumerate().filter(|(_, (_, k))| **k != Kind::Neighbour);
+        let plain = triangles.iter().zip(kinds).enumerate().filter(|(_, (_, k))| **k != TriangleRole::Neighbour);
         let plain = plain.filter_map(move |(n, (t, k))| {
             let seen = sides.get(n).map_or(Some(*t), |s| s.seen(*t, part));
-            Some((seen?, *k == Kind::Cut))
+            Some((seen?, *k == TriangleRole::Cut))
         });
         let extra = self.s.extra.triangles.iter();
         plain.chain(extra.filter_map(move |(t, s)| Some((s.seen(*t, part)?, s.cut))))
@@ -412,7 +416,7 @@ impl View<'_> {
     }
 
     /// For each live surface, the numbers of its vertices on grid edges.
-    pub fn numbers(&self) -> &[Numbers] {
+    pub fn numbers(&self) -> &[VertexNumbers] {
         &self.s.numbers[..self.local.live.len()]
     }
 

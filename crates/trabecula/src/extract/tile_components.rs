@@ -15,12 +15,12 @@ use rustc_hash::FxHashMap;
 
 use super::sampling_grid::TILE;
 use super::sign_words::{bits, within};
-use super::tile::{Patch, View};
+use super::tile::{TileSurface, View};
 use crate::surface_maker::{ComponentGraph, Islands, NONE, Resolved, Totals};
 
 /// The components that a grid line in x crosses in a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
+pub(super) struct GridLine {
     /// The line's number among those of the tile.
     pub row: u32,
     /// The component where it first leaves the solid, if it enters the tile inside the solid.
@@ -42,7 +42,7 @@ pub(super) struct TileComponents {
     pub border: Vec<(u128, u32)>,
     /// Pairs of components with an interval of solid between them.
     pub adjacent: Vec<(u32, u32)>,
-    pub lines: Vec<Line>,
+    pub lines: Vec<GridLine>,
     /// For each component, the longest interval of void adjacent to it that was met on a line: length (mm) and middle.
     pub gaps: Vec<Gap>,
 }
@@ -242,7 +242,7 @@ fn sorted(view: &View, part: usize, component: &[u32], count: usize) -> Vec<Vec<
 
 /// The components that grid lines in x cross, and the pairs of components with an interval of solid between them. In `gaps` go
 /// the intervals of void.
-fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<Line>, Vec<(u32, u32)>) {
+fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<GridLine>, Vec<(u32, u32)>) {
     // Row, position, whether the solid begins there, component, vertex: in parts that are in order already.
     let mut met: Vec<(u32, f64, bool, u32, u32)> = Vec::new();
     view.each_crossing(part, &mut |row, v, x, enters| {
@@ -279,7 +279,7 @@ fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<
             open = NONE;
         }
         if first != NONE || open != NONE {
-            lines.push(Line { row, first, last: open });
+            lines.push(GridLine { row, first, last: open });
         }
     }
     (lines, adjacent)
@@ -287,8 +287,8 @@ fn lines(view: &View, part: usize, component: &[u32], gaps: &mut [Gap]) -> (Vec<
 
 impl View<'_> {
     /// The surface of a part of the solid in the tile by components, with what stitching needs; and the components.
-    pub fn patch(&self, part: usize, middle: Vec3) -> (Patch, TileComponents) {
-        let mut patch = Patch::default();
+    pub fn patch(&self, part: usize, middle: Vec3) -> (TileSurface, TileComponents) {
+        let mut patch = TileSurface::default();
         let mut renamed = vec![u32::MAX; self.positions().len()];
         let mut shared = vec![false; self.positions().len()];
         self.each_shared(&mut |v| shared[v as usize] = true);

@@ -8,8 +8,8 @@ use geometry::fault::Fault;
 use geometry::progress::{Progress, Stopped};
 use rayon::Scope;
 
-use super::sampling_grid::Grid;
-use super::tile::{self, Scratch, View};
+use super::sampling_grid::SamplingGrid;
+use super::tile::{self, TileBuffers, View};
 
 /// A used buffer, or a new one: memory that is not returned to the system need not be cleared by it again.
 pub(super) fn borrow<T: Default>(pool: &Mutex<Vec<T>>) -> T {
@@ -47,7 +47,7 @@ struct Queue<T> {
 /// Every thread extracts the next tile, then consumes what is ready unless another thread does. A thread that is too far
 /// ahead ends and is started again when a tile has been consumed: none ever blocks, so there is no deadlock.
 pub(super) fn each_tile<T: Send>(
-    (grid, spare): (&Grid, &Mutex<Vec<Scratch>>),
+    (grid, spare): (&SamplingGrid, &Mutex<Vec<TileBuffers>>),
     tiles: Range<usize>,
     progress: &dyn Progress,
     map: impl Fn(View) -> T + Sync,
@@ -55,7 +55,7 @@ pub(super) fn each_tile<T: Send>(
 ) -> Result<(), Stopped> {
     let start = tiles.start;
     let threads = rayon::current_num_threads();
-    let work = Work {
+    let work = TileWork {
         grid,
         progress,
         tiles,
@@ -78,18 +78,18 @@ pub(super) fn each_tile<T: Send>(
 }
 
 /// The work on these tiles.
-struct Work<'a, T, C, K> {
-    grid: &'a Grid,
+struct TileWork<'a, T, C, K> {
+    grid: &'a SamplingGrid,
     progress: &'a dyn Progress,
     tiles: Range<usize>,
     ahead: usize,
-    spare: &'a Mutex<Vec<Scratch>>,
+    spare: &'a Mutex<Vec<TileBuffers>>,
     map: C,
     take: Mutex<K>,
     queue: Mutex<Queue<T>>,
 }
 
-impl<T, C, K> Work<'_, T, C, K>
+impl<T, C, K> TileWork<'_, T, C, K>
 where
     T: Send,
     C: Fn(View) -> T + Sync,

@@ -9,8 +9,8 @@ use geometry::math::Vec3;
 use geometry::progress::{Progress, Stopped};
 
 use super::range_partial::RangeSweep;
-use super::sampling_grid::Grid;
-use super::tile::{Scratch, View};
+use super::sampling_grid::SamplingGrid;
+use super::tile::{TileBuffers, View};
 use super::tile_components::TileComponents;
 use super::tile_figures::{FigureSums, TileFigures};
 use super::tile_queue::{borrow, each_tile, give_back};
@@ -18,11 +18,11 @@ use crate::solid::Solid;
 
 /// A solid on its grid, whose tiles are taken range by range. Tiles are numbered, x fastest.
 pub struct TileRanges {
-    grid: Grid,
+    grid: SamplingGrid,
     /// The apex of the cones by which volumes are summed.
     middle: Vec3,
     /// Buffers of threads, and of tiles' triangles: a range of few tiles is made in the memory of the one before.
-    scratch: Mutex<Vec<Scratch>>,
+    scratch: Mutex<Vec<TileBuffers>>,
     spare: Mutex<Vec<Vec<u8>>>,
 }
 
@@ -43,7 +43,7 @@ impl TileRanges {
     /// A spacing at which there is no grid.
     pub fn new(solid: &Solid, edge: f64) -> Result<TileRanges, Fault> {
         let (scratch, spare) = Default::default();
-        Ok(TileRanges { grid: Grid::new(solid, edge)?, middle: solid.region.bounds().center(), scratch, spare })
+        Ok(TileRanges { grid: SamplingGrid::new(solid, edge)?, middle: solid.region.bounds().center(), scratch, spare })
     }
 
     /// Number of tiles.
@@ -77,7 +77,7 @@ impl TileRanges {
         progress: &dyn Progress,
         take: impl FnMut(RangeMade) -> Result<(), Stopped> + Send,
     ) -> Result<(), Stopped> {
-        self.each(&Figures { middle: self.middle }, tiles, size, progress, take)
+        self.each(&MeasureWork { middle: self.middle }, tiles, size, progress, take)
     }
 
     /// Does some work in tiles, in ranges that end at multiples of `size` and at the last tile.
@@ -93,7 +93,7 @@ impl TileRanges {
         let start = tiles.start.min(end);
         let begin = |start: usize| {
             let tiles = start..((start / size + 1).saturating_mul(size)).min(end);
-            Open::<W> { sweep: RangeSweep::new(tiles.clone()), sum: W::Sum::default(), tiles }
+            OpenRange::<W> { sweep: RangeSweep::new(tiles.clone()), sum: W::Sum::default(), tiles }
         };
         let mut open = begin(start);
         each_tile(
@@ -169,11 +169,11 @@ impl RangeWork for Triangles<'_> {
 }
 
 /// What is measured of a surface.
-struct Figures {
+struct MeasureWork {
     middle: Vec3,
 }
 
-impl RangeWork for Figures {
+impl RangeWork for MeasureWork {
     type Made = TileFigures;
     type Sum = FigureSums;
 
@@ -195,14 +195,14 @@ impl RangeWork for Figures {
 }
 
 /// A range whose tiles come in.
-struct Open<W: RangeWork> {
+struct OpenRange<W: RangeWork> {
     tiles: Range<usize>,
     sweep: RangeSweep,
     sum: W::Sum,
 }
 
-impl<W: RangeWork> Open<W> {
-    fn close(self, grid: &Grid) -> RangeMade {
+impl<W: RangeWork> OpenRange<W> {
+    fn close(self, grid: &SamplingGrid) -> RangeMade {
         let (records, figures) = W::finish(self.sum);
         RangeMade { tiles: self.tiles, records, partial: self.sweep.finish(grid, figures).pack() }
     }

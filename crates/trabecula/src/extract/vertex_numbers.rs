@@ -1,16 +1,16 @@
 //! Numbers of the vertices on the grid edges of a block.
 
-use super::block_nodes::Nodes;
+use super::block_nodes::BlockNodes;
 use super::vertex_id::VertexId;
 
 /// Numbers of the vertices of one surface: those on x-edges, then y, then z, each in node order.
 #[derive(Default)]
-pub(super) struct Numbers {
+pub(super) struct VertexNumbers {
     pub crossed: [Vec<u64>; 3],
     pub offset: [Vec<u32>; 3],
 }
 
-impl Numbers {
+impl VertexNumbers {
     /// The number of the vertex on the edge along `axis` from node i of a row, if it has one.
     #[inline]
     pub fn get(&self, axis: usize, row: usize, i: usize) -> Option<u32> {
@@ -29,7 +29,7 @@ impl Numbers {
 }
 
 /// The number of a vertex of a plain cell by its id.
-pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: VertexId) -> Option<u32> {
+pub(super) fn numbered(numbers: &[VertexNumbers], nodes: &BlockNodes, key: VertexId) -> Option<u32> {
     let steps = key.steps();
     if !(steps.is_power_of_two() && steps < 8) {
         return None;

@@ -8,12 +8,12 @@ use geometry::progress::{Progress, Stopped};
 use geometry::voxels::Voxels;
 use rayon::prelude::*;
 
-use super::sampling_grid::Grid;
+use super::sampling_grid::SamplingGrid;
 use crate::field::{Block, Field};
 use crate::solid::Solid;
 
 /// The voxels that cover a region's bounds, centred on them.
-pub struct VoxelGrid {
+pub struct VoxelCentres {
     /// Lower corner of the first voxel, mm.
     pub origin: Vec3,
     /// Edge of a voxel, mm.
@@ -24,19 +24,19 @@ pub struct VoxelGrid {
     axes: [Vec<f64>; 3],
 }
 
-impl VoxelGrid {
+impl VoxelCentres {
     /// Voxels of edge `step` (mm) of a solid.
     ///
     /// # Errors
     /// A step or region for which no grid can be made.
-    pub fn new(solid: &Solid, step: f64) -> Result<VoxelGrid, Fault> {
-        Grid::new(solid, step).map_err(|f| Fault::new("step", f.message))?;
+    pub fn new(solid: &Solid, step: f64) -> Result<VoxelCentres, Fault> {
+        SamplingGrid::new(solid, step).map_err(|f| Fault::new("step", f.message))?;
         let bounds = solid.region.bounds();
         let shape = bounds.size().map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
         let extent = shape.map(|n| n as f64 * step);
         let origin = [0, 1, 2].map(|a| bounds.center()[a] - extent[a] / 2.0);
         let axes = [0, 1, 2].map(|a| (0..shape[a]).map(|i| origin[a] + (i as f64 + 0.5) * step).collect());
-        Ok(VoxelGrid { origin, step, shape, axes })
+        Ok(VoxelCentres { origin, step, shape, axes })
     }
 
     /// Number of voxels.
@@ -76,7 +76,7 @@ impl VoxelGrid {
 /// # Errors
 /// A step or region for which no grid can be made; more than 2³³ voxels; an interruption.
 pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxels, Stopped> {
-    let grid = VoxelGrid::new(solid, step).map_err(Stopped::Refused)?;
+    let grid = VoxelCentres::new(solid, step).map_err(Stopped::Refused)?;
     let count = grid.count();
     if count > (1u64 << 33) as f64 {
         let message = format!(

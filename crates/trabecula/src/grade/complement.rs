@@ -1,13 +1,13 @@
 //! The complement of a number: 1 − value.
 
-use super::Varying;
+use super::VaryingNumber;
 use crate::field::Field;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// One less a number.
 pub(super) struct Complement<V>(pub V);
 
-impl<V: Varying> Varying for Complement<V> {
+impl<V: VaryingNumber> VaryingNumber for Complement<V> {
     fn varies(&self) -> [bool; 3] {
         self.0.varies()
     }
@@ -17,7 +17,7 @@ impl<V: Varying> Varying for Complement<V> {
     }
 }
 
-impl<V: Varying> Field for Complement<V> {
+impl<V: VaryingNumber> Field for Complement<V> {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         self.0.values(points, out);
         out.iter_mut().for_each(|v| *v = 1.0 - *v);

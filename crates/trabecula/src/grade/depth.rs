@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildGrade, Grade, Quantity, Stops, Varying};
+use super::{BuildGrade, Grade, Quantity, Stops, VaryingNumber};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind, Warning};
 use crate::region::{DistanceTable, Region, RegionKind, joint};
@@ -89,4 +89,4 @@ impl Field for Depth {
     }
 }
 
-impl Varying for Depth {}
+impl VaryingNumber for Depth {}

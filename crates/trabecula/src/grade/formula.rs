@@ -1,6 +1,6 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
 
-use super::{BuildGrade, Grade, Quantity, Varying};
+use super::{BuildGrade, Grade, Quantity, VaryingNumber};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
@@ -74,14 +74,14 @@ impl Operand for Interval {
 
 /// A value and its slopes along some axes (forward differentiation).
 #[derive(Clone, Copy)]
-struct Dual<const N: usize>(f64, [f64; N]);
+struct DualNumber<const N: usize>(f64, [f64; N]);
 
-impl<const N: usize> Operand for Dual<N> {
-    fn constant(v: f64) -> Dual<N> {
-        Dual(v, [0.0; N])
+impl<const N: usize> Operand for DualNumber<N> {
+    fn constant(v: f64) -> DualNumber<N> {
+        DualNumber(v, [0.0; N])
     }
     #[inline(always)]
-    fn apply(op: Operation, args: [Dual<N>; 3]) -> Dual<N> {
+    fn apply(op: Operation, args: [DualNumber<N>; 3]) -> DualNumber<N> {
         let at = args.map(|d| d.0);
         let partials = op.partials(at);
         let mut slopes = [0.0; N];
@@ -93,7 +93,7 @@ impl<const N: usize> Operand for Dual<N> {
                 }
             }
         }
-        Dual(op.value(at), slopes)
+        DualNumber(op.value(at), slopes)
     }
 }
 
@@ -134,7 +134,7 @@ impl Formula {
         for (points, (values, gradients)) in points.chunks(LANES).zip(out) {
             let variable = |lane: usize, axis: usize| {
                 let slopes = axes.map(|a| f64::from(u8::from(a == axis)));
-                Dual(points.get(lane).map_or(0.0, |p| p[axis]), slopes)
+                DualNumber(points.get(lane).map_or(0.0, |p| p[axis]), slopes)
             };
             let found = self.run_lanes(variable, &mut stack);
             for ((v, g), d) in values.iter_mut().zip(gradients).zip(found) {
@@ -215,7 +215,7 @@ impl Field for Formula {
     }
 }
 
-impl Varying for Formula {
+impl VaryingNumber for Formula {
     /// The axes that it names.
     fn varies(&self) -> [bool; 3] {
         [0, 1, 2].map(|a| self.has_variable(a))

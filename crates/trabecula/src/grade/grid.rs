@@ -6,7 +6,7 @@ use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension, names_pictures, picture_stack};
 use crate::kind::{DesignError, Kind, OneOrThree};
 use geometry::fault::Fault;
-use geometry::formats::{self, Shape};
+use geometry::formats::{self, DataSet};
 
 /// Numbers on a grid, from a file; linear between them.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -58,7 +58,7 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
         }
         "vti" | "vtk" => {
             let data = formats::read_vtk(&file).map_err(wrong)?;
-            let Shape::Image { origin, step, nodes } = data.shape else {
+            let DataSet::Image { origin, step, nodes } = data.shape else {
                 return Err(wrong(Fault::new("", "the file holds a mesh; use the grade field for it")));
             };
             let array =

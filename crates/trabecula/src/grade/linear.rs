@@ -1,6 +1,6 @@
 //! A grade along a direction.
 
-use super::{BuildGrade, Grade, Quantity, Stops, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Stops, VaryingNumber, directed};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
@@ -95,7 +95,7 @@ impl Field for Linear {
     }
 }
 
-impl Varying for Linear {
+impl VaryingNumber for Linear {
     fn varies(&self) -> [bool; 3] {
         self.along.varies()
     }

@@ -1,7 +1,7 @@
 //! Distance to a line of control points.
 
 use super::control_points::ControlPoints;
-use super::{BuildGrade, Grade, Quantity, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, VaryingNumber, directed};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
@@ -255,7 +255,7 @@ impl Field for Polyline {
     }
 }
 
-impl Varying for Polyline {}
+impl VaryingNumber for Polyline {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

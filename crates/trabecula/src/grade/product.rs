@@ -1,6 +1,6 @@
 //! The product of two numbers.
 
-use super::{Grade, Varying};
+use super::{Grade, VaryingNumber};
 use crate::field::Field;
 use geometry::math::{Aabb, Interval, Vec3, add, scale};
 
@@ -17,7 +17,7 @@ impl Product {
     }
 }
 
-impl Varying for Product {
+impl VaryingNumber for Product {
     fn varies(&self) -> [bool; 3] {
         let [a, b] = self.0.each_ref().map(Grade::varies);
         [0, 1, 2].map(|i| a[i] || b[i])

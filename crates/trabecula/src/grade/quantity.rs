@@ -1,7 +1,7 @@
 //! A quantity of a design: its path, limits and environment, from which its grade is built.
 
 use super::complement::Complement;
-use super::{Grade, Stops, Varying};
+use super::{Grade, Stops, VaryingNumber};
 use crate::environment::Environment;
 use crate::kind::{DesignError, Key, Table};
 use geometry::fault::{Fault, position};
@@ -42,14 +42,14 @@ impl<'a> Quantity<'a> {
     }
 
     /// A function whose values cannot be checked where they are declared: they are sampled in the region.
-    pub fn checked(&self, of: impl Varying + 'static) -> Result<Grade, DesignError> {
+    pub fn checked(&self, of: impl VaryingNumber + 'static) -> Result<Grade, DesignError> {
         let grade = Grade::from(of);
         self.check(&grade, |v, position| self.key.admit_at(v, position))?;
         Ok(grade)
     }
 
     /// The same of a function that does not know of complements.
-    pub fn function<V: Varying + 'static>(&self, of: Result<V, Fault>) -> Result<Grade, DesignError> {
+    pub fn function<V: VaryingNumber + 'static>(&self, of: Result<V, Fault>) -> Result<Grade, DesignError> {
         let of = of.map_err(|f| DesignError::fault(&self.path, f))?;
         if self.complement { self.checked(Complement(of)) } else { self.checked(of) }
     }

@@ -1,6 +1,6 @@
 //! A grade by distance from a point or a line.
 
-use super::{BuildGrade, Grade, Quantity, Stops, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Stops, VaryingNumber, directed};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
@@ -93,4 +93,4 @@ impl Field for Radial {
     }
 }
 
-impl Varying for Radial {}
+impl VaryingNumber for Radial {}

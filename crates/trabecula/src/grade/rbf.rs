@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::control_points::ControlPoints;
-use super::{BuildGrade, Grade, Quantity, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, VaryingNumber, directed};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
@@ -286,7 +286,7 @@ impl Field for Rbf {
     }
 }
 
-impl Varying for Rbf {}
+impl VaryingNumber for Rbf {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

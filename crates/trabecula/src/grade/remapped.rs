@@ -1,6 +1,6 @@
 //! A grade, each number mapped by a piecewise linear function.
 
-use super::{Grade, Quantity, Samples, Stops, Varying};
+use super::{Grade, Quantity, Samples, Stops, VaryingNumber};
 use crate::field::Field;
 use crate::kind::DesignError;
 use geometry::math::{Aabb, Interval, Vec3, scale};
@@ -51,7 +51,7 @@ impl Field for Remapped {
     }
 }
 
-impl Varying for Remapped {
+impl VaryingNumber for Remapped {
     fn varies(&self) -> [bool; 3] {
         self.of.varies()
     }

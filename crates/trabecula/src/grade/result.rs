@@ -6,7 +6,7 @@ use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
 use crate::kind::{DesignError, Key, Kind, Unit, Warning};
 use geometry::fault::{Fault, counted};
-use geometry::formats::{self, Shape};
+use geometry::formats::{self, DataSet};
 use geometry::math::{Aabb, Vec3, norm, scale};
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
@@ -72,7 +72,7 @@ impl BuildGrade for FieldKind {
 }
 
 /// The array of this name, or the only one.
-pub(super) fn pick<'a>(arrays: &'a [formats::Array], name: Option<&str>) -> Result<&'a formats::Array, String> {
+pub(super) fn pick<'a>(arrays: &'a [formats::DataArray], name: Option<&str>) -> Result<&'a formats::DataArray, String> {
     let listed = || {
         let names: Vec<String> = arrays
             .iter()
@@ -125,7 +125,7 @@ fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Sampl
 }
 
 /// The invariant that is meant, if one is.
-fn invariant(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<Option<Invariant>, DesignError> {
+fn invariant(spec: &FieldKind, path: &str, array: &formats::DataArray) -> Result<Option<Invariant>, DesignError> {
     let Some(invariant) = spec.invariant else { return Ok(None) };
     let at = format!("{path}.invariant");
     if spec.component.is_some() {
@@ -140,7 +140,7 @@ fn invariant(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<Opt
 }
 
 /// The component that is meant.
-fn component(spec: &FieldKind, path: &str, array: &formats::Array) -> Result<usize, DesignError> {
+fn component(spec: &FieldKind, path: &str, array: &formats::DataArray) -> Result<usize, DesignError> {
     let at = format!("{path}.component");
     match (spec.component, array.components) {
         (_, 0) => Err(DesignError::new(path, format!("the array \"{}\" has no components", array.name))),
@@ -197,7 +197,7 @@ pub(crate) fn lines(spec: &FieldKind, path: &str, environment: &Environment) -> 
     Ok(grades(made))
 }
 
-fn wrong_components(path: &str, array: &formats::Array, needed: &str) -> DesignError {
+fn wrong_components(path: &str, array: &formats::DataArray, needed: &str) -> DesignError {
     let message = format!("the array \"{}\" has {} components; {needed}", array.name, array.components);
     DesignError::new(format!("{path}.array"), message)
 }
@@ -232,7 +232,11 @@ pub(crate) fn pairs<const N: usize>(
 }
 
 /// The shape of a file's data, and the array that is meant.
-fn loaded(spec: &FieldKind, path: &str, environment: &Environment) -> Result<(Shape, formats::Array), DesignError> {
+fn loaded(
+    spec: &FieldKind,
+    path: &str,
+    environment: &Environment,
+) -> Result<(DataSet, formats::DataArray), DesignError> {
     let at = format!("{path}.path");
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let kind = extension(&spec.path);
@@ -264,7 +268,7 @@ fn columns<F: Fn(&[f64], usize) -> f64>(
     spec: &FieldKind,
     path: &str,
     environment: &Environment,
-    choose: impl Fn(&formats::Array) -> Result<(usize, F), DesignError>,
+    choose: impl Fn(&formats::DataArray) -> Result<(usize, F), DesignError>,
 ) -> Result<Vec<Samples>, DesignError> {
     let (shape, array) = loaded(spec, path, environment)?;
     let (count, number) = choose(&array)?;
@@ -277,7 +281,7 @@ fn on_grids(
     spec: &FieldKind,
     path: &str,
     environment: &Environment,
-    shape: Shape,
+    shape: DataSet,
     of_cells: bool,
     columns: Vec<Vec<f64>>,
 ) -> Result<Vec<Samples>, DesignError> {
@@ -290,11 +294,11 @@ fn on_grids(
     };
     let unit = spec.unit.map_or(1.0, Unit::in_mm);
     let (points, tets, of): (Vec<Vec3>, _, _) = match shape {
-        Shape::Mesh(elements) => {
+        DataSet::Mesh(elements) => {
             let (tets, of) = elements.tets();
             (elements.points.into_iter().map(|p| scale(p, unit)).collect(), tets, of)
         }
-        Shape::Image { origin, step, nodes } => {
+        DataSet::Image { origin, step, nodes } => {
             let (origin, step) = (scale(origin, unit), scale(step, unit));
             let (origin, shape) = if of_cells {
                 (core::array::from_fn(|a| origin[a] + 0.5 * step[a]), nodes.map(|n| n.saturating_sub(1).max(1)))

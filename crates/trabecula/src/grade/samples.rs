@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::Varying;
+use super::VaryingNumber;
 use crate::field::Field;
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, sub};
@@ -341,7 +341,7 @@ impl Field for Samples {
     }
 }
 
-impl Varying for Samples {
+impl VaryingNumber for Samples {
     fn likely_extreme(&self, b: &Aabb) -> Vec3 {
         // The node next to the middle, if the box holds it.
         let middle = b.center();

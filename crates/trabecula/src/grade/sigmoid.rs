@@ -1,6 +1,6 @@
 //! A smooth step: how a weight passes from 0 to 1 across a boundary.
 
-use super::{BuildGrade, Grade, GradeSpec, Quantity, Varying};
+use super::{BuildGrade, Grade, GradeSpec, Quantity, VaryingNumber};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, number};
@@ -97,7 +97,7 @@ impl Field for Sigmoid {
     }
 }
 
-impl Varying for Sigmoid {}
+impl VaryingNumber for Sigmoid {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -1,7 +1,7 @@
 //! A grade in steps along a direction.
 
 use super::linear::Along;
-use super::{BuildGrade, Grade, Quantity, Stops, Varying};
+use super::{BuildGrade, Grade, Quantity, Stops, VaryingNumber};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
@@ -55,7 +55,7 @@ impl Field for Steps {
     }
 }
 
-impl Varying for Steps {
+impl VaryingNumber for Steps {
     fn varies(&self) -> [bool; 3] {
         self.along.varies()
     }

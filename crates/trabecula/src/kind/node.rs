@@ -168,13 +168,13 @@ impl Node {
     }
 
     /// The line of every path in the tree.
-    pub fn lines(&self) -> Lines {
-        let mut lines = Lines::default();
+    pub fn lines(&self) -> LineNumbers {
+        let mut lines = LineNumbers::default();
         self.collect("", &mut lines);
         lines
     }
 
-    fn collect(&self, path: &str, lines: &mut Lines) {
+    fn collect(&self, path: &str, lines: &mut LineNumbers) {
         match &self.value {
             Value::List(items) => {
                 for (i, item) in items.iter().enumerate() {
@@ -197,9 +197,9 @@ impl Node {
 
 /// Where each path of a design stands in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Lines(BTreeMap<String, usize>);
+pub struct LineNumbers(BTreeMap<String, usize>);
 
-impl Lines {
+impl LineNumbers {
     fn put(&mut self, path: &str, line: Option<usize>) {
         if let Some(line) = line {
             self.0.insert(path.to_string(), line);

@@ -23,25 +23,25 @@ impl Defs {
 
 /// A table whose keys are being collected.
 #[derive(Default)]
-pub(crate) struct Open {
+pub(crate) struct OpenTable {
     doc: &'static str,
     properties: Vec<(String, Option<usize>, Node)>,
     required: Vec<Node>,
-    choices: Vec<Open>,
+    choices: Vec<OpenTable>,
 }
 
-impl Open {
+impl OpenTable {
     /// The keys of `T`.
-    pub fn of<T: Table>(defs: &mut Defs) -> Open {
-        let mut out = Open { doc: T::DOC, ..Open::default() };
+    pub fn of<T: Table>(defs: &mut Defs) -> OpenTable {
+        let mut out = OpenTable { doc: T::DOC, ..OpenTable::default() };
         T::open(defs, &mut out);
         out
     }
 
     /// The one key of a kind in a choice.
-    pub fn named<T: Kind>(key: Key, defs: &mut Defs) -> Open {
+    pub fn named<T: Kind>(key: Key, defs: &mut Defs) -> OpenTable {
         let doc = if key.doc.is_empty() { T::DOC } else { key.doc };
-        let mut out = Open { doc, ..Open::default() };
+        let mut out = OpenTable { doc, ..OpenTable::default() };
         out.property::<T>(Key { doc, required: true, ..key }, None, defs);
         out
     }
@@ -65,13 +65,13 @@ impl Open {
     }
 
     /// Adds sets of keys, of which one is given.
-    pub fn choices(&mut self, choices: Vec<Open>) {
+    pub fn choices(&mut self, choices: Vec<OpenTable>) {
         self.choices.extend(choices);
     }
 
     /// The same with another description, if there is one to give.
-    pub fn described(self, doc: &'static str) -> Open {
-        if doc.is_empty() { self } else { Open { doc, ..self } }
+    pub fn described(self, doc: &'static str) -> OpenTable {
+        if doc.is_empty() { self } else { OpenTable { doc, ..self } }
     }
 
     /// The table: it has no other keys.
@@ -100,7 +100,7 @@ impl Open {
             node = node.with("required", self.required.clone().into());
         }
         let Some(conditions) = conditions else { return node };
-        let alternatives: Vec<Node> = self.choices.iter().map(Open::alternative).collect();
+        let alternatives: Vec<Node> = self.choices.iter().map(OpenTable::alternative).collect();
         let node = node.with("x-alternatives", alternatives.into());
         conditions.entries().fold(node, |node, (key, of)| node.with(key, of.clone()))
     }
@@ -116,7 +116,7 @@ impl Open {
     }
 
     /// The set of which a needed key is given is the one that is meant; if there is none, the first.
-    fn told_apart(&self, first: &Open, others: &[Open]) -> Node {
+    fn told_apart(&self, first: &OpenTable, others: &[OpenTable]) -> Node {
         others.iter().rev().fold(self.only(first), |rest, other| {
             let given = |key: &Node| Node::table([("required", vec![key.clone()].into())]);
             let mut given: Vec<Node> = other.required.iter().map(given).collect();
@@ -126,7 +126,7 @@ impl Open {
     }
 
     /// What holds where one set is meant: its needed keys are there, and those of others are not.
-    fn only(&self, meant: &Open) -> Node {
+    fn only(&self, meant: &OpenTable) -> Node {
         let foreign =
             |key: &&str| !meant.keys().any(|k| k == *key) && self.choices.iter().any(|c| c.keys().any(|k| k == *key));
         let foreign = self.keys().filter(foreign).map(|key| (key.to_string(), None, false.into())).collect();
@@ -151,7 +151,7 @@ fn words_schema(words: &[Key]) -> Node {
 }
 
 /// One of several kinds: a word, or a table with one of the keys of `tables`.
-pub(crate) fn choice_schema(doc: &str, choices: &[Choice], tables: Vec<Open>) -> Node {
+pub(crate) fn choice_schema(doc: &str, choices: &[Choice], tables: Vec<OpenTable>) -> Node {
     let words: Vec<Key> = choices.iter().filter(|c| c.word).map(|c| c.key).collect();
     if tables.is_empty() {
         return words_schema(&words).with("type", "string".into()).described(doc);

@@ -13,23 +13,23 @@ use geometry::math::{Complex, Vec3, add, apply, complex_product, dot, sin_cos_tu
 /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
 /// multiplications per distinct wave number along x and no trigonometry; a distance is looked up in its table.
 /// Under any other map phases come row by row, and waves are summed at each node.
-pub(crate) enum Rows<'a> {
+pub(crate) enum LatticeRows<'a> {
     Waves(RowWaves),
     Distance(&'a Distance, &'a Affine, Block<'a>),
-    Phases(&'a Series, Box<dyn map::Rows + 'a>, [Vec<f64>; 3]),
+    Phases(&'a Series, Box<dyn map::PhaseRows + 'a>, [Vec<f64>; 3]),
     Points(&'a Lattice, Block<'a>),
 }
 
-impl<'a> Rows<'a> {
-    pub(crate) fn new(lattice: &'a Lattice, block: &Block<'a>) -> Rows<'a> {
+impl<'a> LatticeRows<'a> {
+    pub(crate) fn new(lattice: &'a Lattice, block: &Block<'a>) -> LatticeRows<'a> {
         let series = lattice.cell.series();
         match (&lattice.distance, lattice.map.affine()) {
-            (Some(d), Some(map)) => Rows::Distance(d, map, *block),
-            (None, Some(map)) => Rows::Waves(RowWaves::new(series.terms(), map, block)),
-            (Some(_), None) => Rows::Points(lattice, *block),
+            (Some(d), Some(map)) => LatticeRows::Distance(d, map, *block),
+            (None, Some(map)) => LatticeRows::Waves(RowWaves::new(series.terms(), map, block)),
+            (Some(_), None) => LatticeRows::Points(lattice, *block),
             (None, None) => {
                 let row = || vec![0.0; block.axes[0].len()];
-                Rows::Phases(series, lattice.map.rows(block), [row(), row(), row()])
+                LatticeRows::Phases(series, lattice.map.rows(block), [row(), row(), row()])
             }
         }
     }
@@ -37,20 +37,20 @@ impl<'a> Rows<'a> {
     /// Makes ready for the rows of layer k.
     pub(crate) fn enter_layer(&mut self, k: usize) {
         match self {
-            Rows::Waves(waves) => waves.enter_layer(k),
-            Rows::Phases(_, map, _) => map.enter_layer(k),
-            Rows::Distance(..) | Rows::Points(..) => {}
+            LatticeRows::Waves(waves) => waves.enter_layer(k),
+            LatticeRows::Phases(_, map, _) => map.enter_layer(k),
+            LatticeRows::Distance(..) | LatticeRows::Points(..) => {}
         }
     }
 
     /// Fills the row (j, k) of the layer entered last; nodes whose bit in `wanted` is not set may be left out.
     pub(crate) fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
         match self {
-            Rows::Phases(series, map, u) => {
+            LatticeRows::Phases(series, map, u) => {
                 map.fill(j, u);
                 series.fill(u, row);
             }
-            Rows::Points(lattice, block) => {
+            LatticeRows::Points(lattice, block) => {
                 let [xs, ys, zs] = block.axes;
                 // Blocks wider than a word are wanted whole.
                 let here = |i: &usize| wanted == u64::MAX || wanted >> i & 1 == 1;
@@ -61,8 +61,8 @@ impl<'a> Rows<'a> {
                     row[i] = v as f32;
                 }
             }
-            Rows::Waves(waves) => sum_waves(waves, j, row),
-            Rows::Distance(d, map, block) => {
+            LatticeRows::Waves(waves) => sum_waves(waves, j, row),
+            LatticeRows::Distance(d, map, block) => {
                 let [xs, ys, zs] = block.axes;
                 let base = add(apply(&map.matrix, [0.0, ys[j], zs[k]]), map.shift);
                 d.fill_row(base, map.matrix.map(|r| r[0]), xs, row);

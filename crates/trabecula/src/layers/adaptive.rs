@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::Slicer;
 use super::leaf_cells::LeafCells;
 use super::outline::Outline;
-use super::roots::{Plane, solve};
+use super::roots::{SurfacesAtHeight, solve};
 
 /// The share of a section's contour on which the cusp is kept to: the rest is where the surface is nearly level, as it is about every
 /// summit.
@@ -51,7 +51,7 @@ impl Slicer {
 
     /// The vertical component of the unit normal below which it is on most of the contour at a height.
     fn slope(&self, z: f64) -> f64 {
-        let plane = Plane { surfaces: &self.surfaces, z };
+        let plane = SurfacesAtHeight { surfaces: &self.surfaces, z };
         let mut outline = Outline::default();
         let mut cells = LeafCells::new(&self.grid, &self.surfaces, &self.tree, z);
         cells.each_polygon(&mut |cells, block, corners| outline.add(cells, &self.grid, block, corners));

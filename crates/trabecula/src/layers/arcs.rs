@@ -5,7 +5,7 @@
 //! too far the section's point nearest to the middle is added. A surface with creases has corners inside arcs: where the tangents
 //! at both ends meet in a point of the surface, that is added.
 
-use super::roots::{IntersectionPoint, Plane};
+use super::roots::{IntersectionPoint, SurfacesAtHeight};
 use geometry::layer::{Point, length};
 
 /// A part of a contour on one surface, solid on its left.
@@ -23,7 +23,7 @@ pub(super) struct Arc {
 
 /// A point inside an arc.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inner {
+pub(super) struct ArcPoint {
     pub arc: u32,
     /// Its position in the arc: 0 to 1, rising along it.
     pub at: f64,
@@ -44,14 +44,14 @@ pub(super) struct Excess {
 
 /// A chord that is still to be checked.
 #[derive(Clone, Copy)]
-struct Piece {
+struct UncheckedChord {
     arc: u32,
     at: [f64; 2],
     ends: [Point; 2],
     gradients: [Point; 2],
 }
 
-impl Piece {
+impl UncheckedChord {
     fn length(&self) -> f64 {
         let [a, b] = self.ends;
         length([b[0] - a[0], b[1] - a[1]])
@@ -63,12 +63,12 @@ impl Piece {
     }
 
     /// The two pieces that a point makes of it, with the gradients of each there.
-    fn divided(&self, point: Point, gradients: [Point; 2]) -> [Piece; 2] {
+    fn divided(&self, point: Point, gradients: [Point; 2]) -> [UncheckedChord; 2] {
         let at = 0.5 * (self.at[0] + self.at[1]);
         let ([a, b], [g, h]) = (self.ends, self.gradients);
         [
-            Piece { at: [self.at[0], at], ends: [a, point], gradients: [g, gradients[0]], ..*self },
-            Piece { at: [at, self.at[1]], ends: [point, b], gradients: [gradients[1], h], ..*self },
+            UncheckedChord { at: [self.at[0], at], ends: [a, point], gradients: [g, gradients[0]], ..*self },
+            UncheckedChord { at: [at, self.at[1]], ends: [point, b], gradients: [gradients[1], h], ..*self },
         ]
     }
 }
@@ -78,13 +78,13 @@ const ROUNDS: usize = 14;
 
 /// Divides all arcs so that their chords are within `most` (mm) of the surfaces at their middles; points are on the surfaces to
 /// `accuracy` (mm). Gives points and chords, sorted along the arcs.
-pub(super) fn divide(arcs: &[Arc], plane: Plane, most: f64, accuracy: f64) -> (Vec<Inner>, Vec<Excess>) {
+pub(super) fn divide(arcs: &[Arc], plane: SurfacesAtHeight, most: f64, accuracy: f64) -> (Vec<ArcPoint>, Vec<Excess>) {
     let (mut inner, mut excess) = (Vec::new(), Vec::new());
     let mut order: Vec<u32> = (0..arcs.len() as u32).filter(|a| arcs[*a as usize].surface.is_some()).collect();
     order.sort_by_key(|a| arcs[*a as usize].surface);
     for of in order.chunk_by(|a, b| arcs[*a as usize].surface == arcs[*b as usize].surface) {
         let Some(surface) = arcs[of[0] as usize].surface else { continue };
-        let mut work = Work { plane, surface, most, accuracy, inner: &mut inner };
+        let mut work = ArcRefinement { plane, surface, most, accuracy, inner: &mut inner };
         let mut pieces = work.first(arcs, of);
         for round in 0..ROUNDS {
             pieces = work.check(&pieces, round + 1 == ROUNDS, &mut excess);
@@ -99,21 +99,21 @@ pub(super) fn divide(arcs: &[Arc], plane: Plane, most: f64, accuracy: f64) -> (V
 }
 
 /// The work on the arcs of one surface.
-struct Work<'a> {
-    plane: Plane<'a>,
+struct ArcRefinement<'a> {
+    plane: SurfacesAtHeight<'a>,
     surface: u32,
     most: f64,
     accuracy: f64,
-    inner: &'a mut Vec<Inner>,
+    inner: &'a mut Vec<ArcPoint>,
 }
 
-impl Work<'_> {
+impl ArcRefinement<'_> {
     fn creased(&self) -> bool {
         self.plane.surfaces[self.surface as usize].has_creases
     }
 
     /// The first division of arcs, by the cubics through their ends.
-    fn first(&mut self, arcs: &[Arc], of: &[u32]) -> Vec<Piece> {
+    fn first(&mut self, arcs: &[Arc], of: &[u32]) -> Vec<UncheckedChord> {
         let (mut guesses, mut counts) = (Vec::new(), Vec::new());
         for &a in of {
             let arc = &arcs[a as usize];
@@ -131,12 +131,17 @@ impl Work<'_> {
             for k in 0..count {
                 let (point, gradient, at) = (guesses[next], gradients[next], (k + 1) as f64 / (count + 1) as f64);
                 next += 1;
-                self.inner.push(Inner { arc: a, at, point, normal: unit(gradient) });
-                pieces.push(Piece { arc: a, at: [begin, at], ends: [from, point], gradients: [slope, gradient] });
+                self.inner.push(ArcPoint { arc: a, at, point, normal: unit(gradient) });
+                pieces.push(UncheckedChord {
+                    arc: a,
+                    at: [begin, at],
+                    ends: [from, point],
+                    gradients: [slope, gradient],
+                });
                 (from, slope, begin) = (point, gradient, at);
             }
             let last = [slope, arc.gradients[1]];
-            pieces.push(Piece { arc: a, at: [begin, 1.0], ends: [from, arc.ends[1]], gradients: last });
+            pieces.push(UncheckedChord { arc: a, at: [begin, 1.0], ends: [from, arc.ends[1]], gradients: last });
         }
         pieces
     }
@@ -169,8 +174,8 @@ impl Work<'_> {
     }
 
     /// Checks chords at their middles; gives those into which the ones that are too far off are divided.
-    fn check(&mut self, pieces: &[Piece], last: bool, excess: &mut Vec<Excess>) -> Vec<Piece> {
-        let found = self.plane.evaluate(self.surface, pieces.iter().map(Piece::middle));
+    fn check(&mut self, pieces: &[UncheckedChord], last: bool, excess: &mut Vec<Excess>) -> Vec<UncheckedChord> {
+        let found = self.plane.evaluate(self.surface, pieces.iter().map(UncheckedChord::middle));
         let mut far = Vec::new();
         for (i, piece) in pieces.iter().enumerate() {
             let (value, _, slope) = found.at(i);
@@ -185,7 +190,7 @@ impl Work<'_> {
             }
         }
         let corners = if self.creased() { self.creases(&far) } else { far.iter().map(|_| None).collect() };
-        let mut middles: Vec<Point> = far.iter().map(Piece::middle).collect();
+        let mut middles: Vec<Point> = far.iter().map(UncheckedChord::middle).collect();
         let gradients = self.project(&mut middles);
         let mut next = Vec::new();
         for (i, piece) in far.iter().enumerate() {
@@ -200,7 +205,7 @@ impl Work<'_> {
                 }
                 None => (middles[i], unit(gradients[i]), [gradients[i]; 2]),
             };
-            self.inner.push(Inner { arc: piece.arc, at, point, normal });
+            self.inner.push(ArcPoint { arc: piece.arc, at, point, normal });
             next.extend(piece.divided(point, both));
         }
         next
@@ -208,10 +213,10 @@ impl Work<'_> {
 
     /// For each piece the corner of the section between its ends, if there is one: where the tangents of both meet, taken ever nearer
     /// to the corner.
-    fn creases(&self, pieces: &[Piece]) -> Vec<Option<Crease>> {
+    fn creases(&self, pieces: &[UncheckedChord]) -> Vec<Option<Crease>> {
         let mut found: Vec<Option<Crease>> = pieces.iter().map(|p| Crease::of(p.ends, p)).collect();
         for halving in 1..=HALVINGS {
-            let near = |(crease, piece): (&Crease, &Piece)| {
+            let near = |(crease, piece): (&Crease, &UncheckedChord)| {
                 let share = 0.5f64.powi(halving);
                 piece.ends.map(|e| [0, 1].map(|k| crease.point[k] + share * (e[k] - crease.point[k])))
             };
@@ -257,12 +262,12 @@ struct Crease {
 
 impl Crease {
     /// Where the tangents at the ends of a piece meet.
-    fn of(ends: [Point; 2], piece: &Piece) -> Option<Crease> {
+    fn of(ends: [Point; 2], piece: &UncheckedChord) -> Option<Crease> {
         Crease::between([0, 1].map(|k| (ends[k], piece.gradients[k])), piece)
     }
 
     /// Where two tangents meet, if that is ahead of both ends of a piece.
-    fn between(tangents: [(Point, Point); 2], piece: &Piece) -> Option<Crease> {
+    fn between(tangents: [(Point, Point); 2], piece: &UncheckedChord) -> Option<Crease> {
         let [t, u] = tangents.map(|(_, g)| tangent(unit(g)));
         let turn = t[0] * u[1] - t[1] * u[0];
         let [p, q] = tangents.map(|(p, _)| p);

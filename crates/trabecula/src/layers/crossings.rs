@@ -7,12 +7,12 @@ use geometry::layer::{Point, length};
 use robust::{Coord, orient2d};
 
 /// A segment of a ring by number.
-type Segment = (u32, u32);
+type RingSegment = (u32, u32);
 
 /// The segments, as (ring, segment), that are nearer than `near` (mm) to another one elsewhere than about a common corner, or fold
 /// back on it. Looked for in boxes of edge `edge` (mm).
-pub(super) fn conflicts(rings: &[&[Point]], edge: f64, near: f64) -> Vec<Segment> {
-    let mut entries: Vec<(u64, Segment)> = Vec::new();
+pub(super) fn conflicts(rings: &[&[Point]], edge: f64, near: f64) -> Vec<RingSegment> {
+    let mut entries: Vec<(u64, RingSegment)> = Vec::new();
     for (r, ring) in rings.iter().enumerate() {
         for i in 0..ring.len() {
             each_box(ends(ring, i), edge, near, &mut |at| entries.push((at, (r as u32, i as u32))));
@@ -61,7 +61,7 @@ fn each_box([a, b]: [Point; 2], edge: f64, near: f64, found: &mut impl FnMut(u64
 }
 
 /// Whether two segments meet where they must not, or nearly.
-fn conflict(rings: &[&[Point]], a: Segment, b: Segment, near: f64) -> bool {
+fn conflict(rings: &[&[Point]], a: RingSegment, b: RingSegment, near: f64) -> bool {
     let [a, b] = [a, b].map(|(r, i)| (r as usize, i as usize));
     let ([p, q], [r, s]) = (ends(rings[a.0], a.1), ends(rings[b.0], b.1));
     let apart = (0..2).any(|k| p[k].max(q[k]) + near < r[k].min(s[k]) || r[k].max(s[k]) + near < p[k].min(q[k]));

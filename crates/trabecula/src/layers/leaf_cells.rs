@@ -7,7 +7,7 @@
 use geometry::progress::checkpoint;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::plane_grid::{FINE, LiveBlock, Node, PlaneGrid, lifted};
+use super::plane_grid::{FINE, LiveBlock, PlaneGrid, PlaneNode, lifted};
 use crate::csg_tree::CsgTree;
 use crate::implicit::Surface;
 use geometry::math::Aabb;
@@ -25,13 +25,13 @@ const DIP: f64 = 0.5;
 const CREASED_DIP: f64 = 1.0;
 
 /// A corner of a polygon: its node and the signs of its block's live surfaces there.
-pub(super) type Corner = (Node, u64);
+pub(super) type SignedNode = (PlaneNode, u64);
 
 /// A cell that is to be contoured.
 #[derive(Clone, Copy)]
 struct Leaf {
     block: u32,
-    at: Node,
+    at: PlaneNode,
     size: u32,
 }
 
@@ -46,13 +46,13 @@ pub(super) struct LeafCells<'a> {
     /// For each live block and live surface, how far it may go beyond its values at the corners of each cell of a row.
     dips: Vec<Vec<Vec<f32>>>,
     /// For each live block the values at nodes of refined cells.
-    extra: Vec<FxHashMap<Node, Vec<f64>>>,
+    extra: Vec<FxHashMap<PlaneNode, Vec<f64>>>,
 }
 
 const NONE: u32 = u32::MAX;
 
 /// What the grid says of the cells in a row of a block, a bit for each.
-struct Row {
+struct CellRow {
     /// The solid's boundary passes.
     crossed: u64,
     /// To be refined.
@@ -81,32 +81,32 @@ impl<'a> LeafCells<'a> {
 
     /// Calls `found` for each polygon that the boundary may cross, with the number of its block: adjacent ones have whole sides
     /// in common.
-    pub fn each_polygon(&mut self, found: &mut impl FnMut(&Self, u32, &[Corner])) {
+    pub fn each_polygon(&mut self, found: &mut impl FnMut(&Self, u32, &[SignedNode])) {
         let (mut crossed, mut refined) = (Vec::new(), Vec::new());
         for b in 0..self.blocks.len() {
             checkpoint();
             self.classify(b as u32, &mut crossed, &mut refined);
         }
-        let coarse: FxHashSet<Node> = refined.iter().map(|l: &Leaf| l.at).collect();
+        let coarse: FxHashSet<PlaneNode> = refined.iter().map(|l: &Leaf| l.at).collect();
         let leaves = self.refine(refined);
         let hanging = hanging(&leaves);
         let around = self.around(&coarse);
-        let near: FxHashSet<Node> = around.iter().map(|l| l.at).collect();
+        let near: FxHashSet<PlaneNode> = around.iter().map(|l| l.at).collect();
         for leaf in &crossed {
             if !near.contains(&leaf.at) {
                 let corners = corners(leaf).map(|n| (n, self.signs(leaf.block, n)));
                 found(self, leaf.block, &corners);
             }
         }
-        let divided: Vec<(Leaf, Vec<Node>)> =
+        let divided: Vec<(Leaf, Vec<PlaneNode>)> =
             leaves.iter().chain(&around).map(|leaf| (*leaf, boundary(leaf, &hanging))).collect();
         self.evaluate(divided.iter().flat_map(|(leaf, nodes)| {
             let centre = leaf.at.map(|x| x + leaf.size / 2);
             nodes.iter().copied().chain([centre]).map(|n| (leaf.block, n))
         }));
         for (leaf, nodes) in &divided {
-            let of = |n: Node| (n, self.signs(leaf.block, n));
-            let around: Vec<Corner> = nodes.iter().map(|n| of(*n)).collect();
+            let of = |n: PlaneNode| (n, self.signs(leaf.block, n));
+            let around: Vec<SignedNode> = nodes.iter().map(|n| of(*n)).collect();
             if around.iter().all(|c| c.1 == around[0].1) {
                 continue;
             }
@@ -122,7 +122,7 @@ impl<'a> LeafCells<'a> {
     }
 
     /// The value of a live surface of a block at a node, where it was sampled.
-    pub fn value(&self, block: u32, node: Node, surface: usize) -> f64 {
+    pub fn value(&self, block: u32, node: PlaneNode, surface: usize) -> f64 {
         let of = &self.blocks[block as usize];
         match self.extra[block as usize].get(&node) {
             Some(values) => values[surface],
@@ -130,7 +130,7 @@ impl<'a> LeafCells<'a> {
         }
     }
 
-    fn signs(&self, block: u32, node: Node) -> u64 {
+    fn signs(&self, block: u32, node: PlaneNode) -> u64 {
         let of = &self.blocks[block as usize];
         match self.extra[block as usize].get(&node) {
             Some(values) => values.iter().enumerate().fold(0, |w, (f, v)| w | u64::from(*v <= 0.0) << f),
@@ -230,7 +230,7 @@ impl<'a> LeafCells<'a> {
         }
         let dip = self.dip(leaf, f);
         // Bounds are dear to ask, and narrow enough to be asked, where there are creases.
-        let varies = |a: Node, b: Node| {
+        let varies = |a: PlaneNode, b: PlaneNode| {
             let [min, max] = [[0, 1].map(|k| a[k].min(b[k])), [0, 1].map(|k| a[k].max(b[k]))];
             let [min, max] = [min, max].map(|n| lifted(self.grid.position(n), self.z));
             let range = surface.field.bound(&Aabb { min, max });
@@ -247,8 +247,8 @@ impl<'a> LeafCells<'a> {
     }
 
     /// Evaluates the live surfaces of blocks at nodes that are not nodes of the grid.
-    fn evaluate(&mut self, wanted: impl Iterator<Item = (u32, Node)>) {
-        let mut nodes: Vec<(u32, Node)> = wanted.filter(|(_, n)| n[0] % FINE != 0 || n[1] % FINE != 0).collect();
+    fn evaluate(&mut self, wanted: impl Iterator<Item = (u32, PlaneNode)>) {
+        let mut nodes: Vec<(u32, PlaneNode)> = wanted.filter(|(_, n)| n[0] % FINE != 0 || n[1] % FINE != 0).collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes.retain(|(b, n)| !self.extra[*b as usize].contains_key(n));
@@ -267,7 +267,7 @@ impl<'a> LeafCells<'a> {
     }
 
     /// The cells of the grid next to refined ones that are not refined themselves.
-    fn around(&self, refined: &FxHashSet<Node>) -> Vec<Leaf> {
+    fn around(&self, refined: &FxHashSet<PlaneNode>) -> Vec<Leaf> {
         let [nx, ny] = self.grid.cells.map(|n| n as u32);
         let blocks = self.grid.blocks()[0];
         let mut next = Vec::new();
@@ -279,7 +279,7 @@ impl<'a> LeafCells<'a> {
         next.retain(|n| !refined.contains(n));
         next.sort_unstable();
         next.dedup();
-        let leaf = |at: Node| {
+        let leaf = |at: PlaneNode| {
             let [bx, by] = at.map(|x| (x / FINE) as usize / self.grid.block);
             let block = self.numbers[bx + by * blocks];
             (block != NONE).then_some(Leaf { block, at, size: FINE })
@@ -289,35 +289,35 @@ impl<'a> LeafCells<'a> {
 }
 
 /// Where a node of the grid is in its block.
-fn place(block: &LiveBlock, node: Node) -> [usize; 2] {
+fn place(block: &LiveBlock, node: PlaneNode) -> [usize; 2] {
     [0, 1].map(|a| (node[a] / FINE) as usize - block.first[a])
 }
 
-fn index(block: &LiveBlock, node: Node) -> usize {
+fn index(block: &LiveBlock, node: PlaneNode) -> usize {
     let [i, j] = place(block, node);
     i + j * block.shape[0]
 }
 
 /// The corners of a cell, counter-clockwise.
-fn corners(leaf: &Leaf) -> [Node; 4] {
+fn corners(leaf: &Leaf) -> [PlaneNode; 4] {
     let ([x, y], s) = (leaf.at, leaf.size);
     [[x, y], [x + s, y], [x + s, y + s], [x, y + s]]
 }
 
 /// Whether a surface has one sign at two opposite corners and the other at the others.
-fn ambiguous(of: &[Corner]) -> bool {
+fn ambiguous(of: &[SignedNode]) -> bool {
     let [a, b, c, d] = [0, 1, 2, 3].map(|i| of[i].1);
     !(a ^ c) & !(b ^ d) & (a ^ b) != 0
 }
 
 /// The corners of refined cells.
-fn hanging(leaves: &[Leaf]) -> FxHashSet<Node> {
+fn hanging(leaves: &[Leaf]) -> FxHashSet<PlaneNode> {
     leaves.iter().flat_map(corners).collect()
 }
 
 /// The nodes on the boundary of a cell, counter-clockwise.
-fn boundary(leaf: &Leaf, hanging: &FxHashSet<Node>) -> Vec<Node> {
-    fn side(a: Node, b: Node, hanging: &FxHashSet<Node>, out: &mut Vec<Node>) {
+fn boundary(leaf: &Leaf, hanging: &FxHashSet<PlaneNode>) -> Vec<PlaneNode> {
+    fn side(a: PlaneNode, b: PlaneNode, hanging: &FxHashSet<PlaneNode>, out: &mut Vec<PlaneNode>) {
         let middle = [0, 1].map(|i| (a[i] + b[i]) / 2);
         if middle != a && middle != b && hanging.contains(&middle) {
             side(a, middle, hanging, out);
@@ -361,7 +361,7 @@ fn second_differences(values: &[f32], nx: usize) -> Vec<f32> {
 }
 
 /// Classifies the cells of a row, 64 at a time.
-fn classify_row(of: &LiveBlock, dip: &[Vec<f32>], hides: &impl Fn(usize, usize) -> bool, j: usize) -> Row {
+fn classify_row(of: &LiveBlock, dip: &[Vec<f32>], hides: &impl Fn(usize, usize) -> bool, j: usize) -> CellRow {
     let nx = of.shape[0];
     let mask = (1u64 << (nx - 1)) - 1;
     let rows = |f: usize| (of.negative[f][j], of.negative[f][j + 1]);
@@ -391,5 +391,5 @@ fn classify_row(of: &LiveBlock, dip: &[Vec<f32>], hides: &impl Fn(usize, usize) 
         one |= here;
         undecided |= three | here & (saddle[f] | dips[f]);
     });
-    Row { crossed, undecided }
+    CellRow { crossed, undecided }
 }

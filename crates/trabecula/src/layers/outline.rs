@@ -6,16 +6,16 @@
 
 use rustc_hash::FxHashMap;
 
-use super::leaf_cells::{Corner, LeafCells};
-use super::plane_grid::{Node, PlaneGrid};
+use super::leaf_cells::{LeafCells, SignedNode};
+use super::plane_grid::{PlaneGrid, PlaneNode};
 use geometry::layer::{Point, length};
 
 const NONE: u32 = u32::MAX;
 
 /// A root of a surface on a side.
-pub(super) struct Root {
+pub(super) struct SurfaceRoot {
     /// The ends of the side, in order.
-    pub side: [Node; 2],
+    pub side: [PlaneNode; 2],
     pub surface: u32,
     /// Position from the first end (0) to the second (1).
     pub at: f64,
@@ -27,7 +27,7 @@ pub(super) struct Root {
     next: u32,
 }
 
-impl Root {
+impl SurfaceRoot {
     /// Its position, mm.
     pub fn position(&self, grid: &PlaneGrid) -> Point {
         let [a, b] = self.side.map(|n| grid.position(n));
@@ -36,7 +36,7 @@ impl Root {
 }
 
 /// A side of a polygon on which a surface changes sign.
-struct Side {
+struct CrossedEdge {
     /// Its first root.
     head: u32,
     /// Whether the polygon has the solid on its left along the side as it is numbered.
@@ -46,7 +46,7 @@ struct Side {
 }
 
 /// A polygon that surfaces cross.
-struct Polygon {
+struct CrossedPolygon {
     block: u32,
     /// One past its last side.
     end: u32,
@@ -63,7 +63,7 @@ pub(super) struct Chord {
 }
 
 /// The roots on a side, from its first.
-fn chain(roots: &[Root], head: u32) -> impl Iterator<Item = u32> {
+fn chain(roots: &[SurfaceRoot], head: u32) -> impl Iterator<Item = u32> {
     let some = |r: u32| (r != NONE).then_some(r);
     std::iter::successors(some(head), move |r| some(roots[*r as usize].next))
 }
@@ -71,15 +71,15 @@ fn chain(roots: &[Root], head: u32) -> impl Iterator<Item = u32> {
 /// Roots and polygons of a layer.
 #[derive(Default)]
 pub(super) struct Outline {
-    pub roots: Vec<Root>,
-    heads: FxHashMap<[Node; 2], u32>,
-    sides: Vec<Side>,
-    polygons: Vec<Polygon>,
+    pub roots: Vec<SurfaceRoot>,
+    heads: FxHashMap<[PlaneNode; 2], u32>,
+    sides: Vec<CrossedEdge>,
+    polygons: Vec<CrossedPolygon>,
 }
 
 impl Outline {
     /// Adds a polygon, counter-clockwise.
-    pub fn add(&mut self, cells: &LeafCells, grid: &PlaneGrid, block: u32, corners: &[Corner]) {
+    pub fn add(&mut self, cells: &LeafCells, grid: &PlaneGrid, block: u32, corners: &[SignedNode]) {
         let of = &cells.blocks[block as usize];
         let first = self.sides.len();
         for (i, &(a, from)) in corners.iter().enumerate() {
@@ -104,25 +104,25 @@ impl Outline {
                 let at = low / (low - high);
                 let at = if at.is_finite() { at.clamp(0.01, 0.99) } else { 0.5 };
                 let falls = signs >> f & 1 == 1;
-                self.roots.push(Root { side, surface, at, falls, gradient: [0.0; 2], next: head });
+                self.roots.push(SurfaceRoot { side, surface, at, falls, gradient: [0.0; 2], next: head });
                 head = (self.roots.len() - 1) as u32;
             }
             self.heads.insert(side, head);
-            self.sides.push(Side { head, forward, signs: [from, to] });
+            self.sides.push(CrossedEdge { head, forward, signs: [from, to] });
         }
         if self.sides.len() > first {
             let ends = corners.iter().map(|c| grid.position(c.0));
             let bounds = ends.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], p| {
                 [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
             });
-            self.polygons.push(Polygon { block, end: self.sides.len() as u32, bounds });
+            self.polygons.push(CrossedPolygon { block, end: self.sides.len() as u32, bounds });
         }
     }
 
     /// Separates the roots of each side by at least `gap` (mm) from each other and from its ends, in an order that ties do not
     /// change.
     pub fn separate(&mut self, grid: &PlaneGrid, gap: f64) {
-        let share = |root: &Root, count: usize| {
+        let share = |root: &SurfaceRoot, count: usize| {
             let [a, b] = root.side.map(|n| grid.position(n));
             (gap / length([b[0] - a[0], b[1] - a[1]])).min(0.4 / (count + 1) as f64)
         };
@@ -170,7 +170,7 @@ impl Outline {
     }
 
     /// Lists the roots at which the solid begins (true) or ends along a side.
-    fn pass(&self, cells: &LeafCells, block: u32, side: &Side, out: &mut Vec<(u32, bool)>) {
+    fn pass(&self, cells: &LeafCells, block: u32, side: &CrossedEdge, out: &mut Vec<(u32, bool)>) {
         let of = &cells.blocks[block as usize];
         let [from, to] = side.signs;
         if (from ^ to).is_power_of_two() {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::csg_tree::{CsgTree, Sign};
 use crate::field::Block;
-use crate::implicit::{Pair, Surface};
+use crate::implicit::{Surface, SurfacePair};
 use geometry::fault::Fault;
 use geometry::layer::Point;
 use geometry::math::{Aabb, Vec3};
@@ -21,7 +21,7 @@ const MOST_LIVE: usize = 64;
 pub(super) const FINE: u32 = 64;
 
 /// A grid node or a node of a refined cell, in units of the grid.
-pub(super) type Node = [u32; 2];
+pub(super) type PlaneNode = [u32; 2];
 
 /// The grid, the same for all layers.
 pub(super) struct PlaneGrid {
@@ -93,7 +93,7 @@ impl PlaneGrid {
 
     /// The position of a node, mm.
     #[inline]
-    pub fn position(&self, node: Node) -> Point {
+    pub fn position(&self, node: PlaneNode) -> Point {
         let unit = self.step / f64::from(FINE);
         [0, 1].map(|a| self.origin[a] + f64::from(node[a]) * unit)
     }
@@ -189,7 +189,7 @@ fn sample(surfaces: &[Surface], live: &[usize], nodes: &Block) -> Vec<Vec<f32>> 
     let mut at = 0;
     while at < live.len() {
         let surface = &surfaces[live[at]];
-        let twin = |p: &&Arc<dyn Pair>| {
+        let twin = |p: &&Arc<dyn SurfacePair>| {
             let next = live.get(at + 1).and_then(|f| surfaces[*f].pair.as_ref());
             next.is_some_and(|n| Arc::ptr_eq(p, n))
         };

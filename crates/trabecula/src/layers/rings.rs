@@ -3,9 +3,9 @@
 //! Points that the tolerance can do without are left out. Chords lie on one side of a curve, so polygons with their corners on it
 //! have a wrong area: every chord knows by how much, and its ends share the shift along their normals that makes up for it.
 
-use super::arcs::{Arc, Excess, Inner, divide};
+use super::arcs::{Arc, ArcPoint, Excess, divide};
 use super::crossings::conflicts;
-use super::roots::Plane;
+use super::roots::SurfacesAtHeight;
 use geometry::layer::{Point, length, signed_area};
 
 /// The arcs of closed contours.
@@ -17,7 +17,7 @@ pub(super) struct Rings {
 
 /// A point of a contour before simplification.
 #[derive(Clone, Copy)]
-struct Knot {
+struct ContourPoint {
     point: Point,
     /// Outward unit normal; zero where the point must stay.
     normal: Point,
@@ -53,7 +53,7 @@ const ROUNDS: usize = 8;
 
 impl Rings {
     /// The polygons of all contours, in order.
-    pub fn polygons(mut self, plane: Plane, limits: Limits) -> Vec<Vec<Point>> {
+    pub fn polygons(mut self, plane: SurfacesAtHeight, limits: Limits) -> Vec<Vec<Point>> {
         // Half the tolerance for points left out, and seven tenths for curvature: two thirds of both is how far corners are shifted
         // out, a third is left between them.
         let (inner, excess) = divide(&self.arcs, plane, 0.7 * limits.tolerance, limits.accuracy);
@@ -115,7 +115,7 @@ impl Rings {
         }
     }
 
-    fn rings(&self, inner: &[Inner], excess: &[Excess], plain: &[bool], tolerance: f64) -> Vec<Ring> {
+    fn rings(&self, inner: &[ArcPoint], excess: &[Excess], plain: &[bool], tolerance: f64) -> Vec<Ring> {
         let (mut first, mut i, mut e) = (0, 0, 0);
         let mut rings = Vec::with_capacity(self.ends.len());
         for &end in &self.ends {
@@ -139,38 +139,38 @@ impl Rings {
     }
 
     /// Adds the points of an arc but its last.
-    fn knots(&self, a: u32, inner: &[Inner], excess: &[Excess], plain: &[bool], out: &mut Vec<Knot>) {
+    fn knots(&self, a: u32, inner: &[ArcPoint], excess: &[Excess], plain: &[bool], out: &mut Vec<ContourPoint>) {
         let arc = &self.arcs[a as usize];
         let stays = plain[a as usize] || arc.surface.is_none();
         let movable = !(stays || arc.corners[0]);
         let normal = if movable { super::arcs::unit(arc.gradients[0]) } else { [0.0; 2] };
         let mut area = excess.iter().map(|e| e.area);
         let mut next = || if stays { 0.0 } else { area.next().unwrap_or(0.0) };
-        out.push(Knot { point: arc.ends[0], normal, arc: a, excess: next() });
+        out.push(ContourPoint { point: arc.ends[0], normal, arc: a, excess: next() });
         if !stays {
-            out.extend(inner.iter().map(|p| Knot { point: p.point, normal: p.normal, arc: a, excess: next() }));
+            out.extend(inner.iter().map(|p| ContourPoint { point: p.point, normal: p.normal, arc: a, excess: next() }));
         }
     }
 }
 
 /// The entries of an arc in a sorted list, from `at` on.
-trait OfArc {
+trait OnArc {
     fn arc(&self) -> u32;
 }
 
-impl OfArc for Inner {
+impl OnArc for ArcPoint {
     fn arc(&self) -> u32 {
         self.arc
     }
 }
 
-impl OfArc for Excess {
+impl OnArc for Excess {
     fn arc(&self) -> u32 {
         self.arc
     }
 }
 
-fn entries<'a, T: OfArc>(of: &'a [T], at: &mut usize, arc: u32) -> &'a [T] {
+fn entries<'a, T: OnArc>(of: &'a [T], at: &mut usize, arc: u32) -> &'a [T] {
     let first = *at + of[*at..].partition_point(|x| x.arc() < arc);
     let end = first + of[first..].partition_point(|x| x.arc() == arc);
     *at = end;
@@ -178,7 +178,7 @@ fn entries<'a, T: OfArc>(of: &'a [T], at: &mut usize, arc: u32) -> &'a [T] {
 }
 
 /// A contour with fewer points, its area kept: the points, rounded to single precision, and the arcs that follow.
-fn simplified(knots: &[Knot], tolerance: f64) -> (Vec<Point>, Vec<u32>) {
+fn simplified(knots: &[ContourPoint], tolerance: f64) -> (Vec<Point>, Vec<u32>) {
     let n = knots.len();
     let fixed = |k: usize| knots[k % n].normal == [0.0; 2];
     let start = (0..n).find(|k| fixed(*k)).unwrap_or(0);
@@ -233,7 +233,7 @@ fn simplified(knots: &[Knot], tolerance: f64) -> (Vec<Point>, Vec<u32>) {
 }
 
 /// The farthest point to which a chord from `anchor` passes all points between within `most`, and no fixed one.
-fn reach(knots: &[Knot], anchor: usize, last: usize, most: f64, fixed: &impl Fn(usize) -> bool) -> usize {
+fn reach(knots: &[ContourPoint], anchor: usize, last: usize, most: f64, fixed: &impl Fn(usize) -> bool) -> usize {
     let at = |k: usize| knots[k % knots.len()].point;
     let origin = at(anchor);
     let mut wedge: Option<[Point; 2]> = None;

@@ -1,7 +1,7 @@
 //! Roots of implicit surfaces in a layer's plane, many at a time: on sides of polygons, where two surfaces meet, and nearest to a
 //! point.
 
-use super::outline::{Outline, Root};
+use super::outline::{Outline, SurfaceRoot};
 use super::plane_grid::{PlaneGrid, lifted};
 use crate::implicit::Surface;
 use geometry::layer::{Point, length};
@@ -10,13 +10,13 @@ use geometry::roots::Bracket;
 
 /// Surfaces at a height.
 #[derive(Clone, Copy)]
-pub(super) struct Plane<'a> {
+pub(super) struct SurfacesAtHeight<'a> {
     pub surfaces: &'a [Surface],
     pub z: f64,
 }
 
 /// Values and gradients in the plane at points.
-pub(super) struct Evaluated {
+pub(super) struct PlaneValues {
     pub values: Vec<f64>,
     pub gradients: Vec<Vec3>,
 }
@@ -24,11 +24,11 @@ pub(super) struct Evaluated {
 /// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
 const BATCH: usize = 1024;
 
-impl Plane<'_> {
+impl SurfacesAtHeight<'_> {
     /// Evaluates a surface at points of the plane.
-    pub fn evaluate(&self, surface: u32, points: impl Iterator<Item = Point>) -> Evaluated {
+    pub fn evaluate(&self, surface: u32, points: impl Iterator<Item = Point>) -> PlaneValues {
         let points: Vec<Vec3> = points.map(|p| lifted(p, self.z)).collect();
-        let mut out = Evaluated { values: vec![0.0; points.len()], gradients: vec![[0.0; 3]; points.len()] };
+        let mut out = PlaneValues { values: vec![0.0; points.len()], gradients: vec![[0.0; 3]; points.len()] };
         let field = &self.surfaces[surface as usize].field;
         let parts = out.values.chunks_mut(BATCH).zip(out.gradients.chunks_mut(BATCH));
         for (points, (values, gradients)) in points.chunks(BATCH).zip(parts) {
@@ -38,7 +38,7 @@ impl Plane<'_> {
     }
 }
 
-impl Evaluated {
+impl PlaneValues {
     /// The value, the gradient in the plane and its length, of a point.
     pub fn at(&self, i: usize) -> (f64, Point, f64) {
         let [x, y, _] = self.gradients[i];
@@ -50,7 +50,7 @@ impl Evaluated {
 const ROUNDS: usize = 40;
 
 /// Solves for the roots of all surfaces on their sides to `accuracy` (mm): Newton's method within a bracket.
-pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accuracy: f64) {
+pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: SurfacesAtHeight, accuracy: f64) {
     let mut order: Vec<u32> = (0..outline.roots.len() as u32).collect();
     order.sort_by_key(|r| outline.roots[*r as usize].surface);
     let roots = &mut outline.roots;
@@ -60,7 +60,7 @@ pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accur
         .collect::<Vec<_>>()
     {
         let surface = roots[of[0] as usize].surface;
-        let bracket = |r: &Root| if r.falls { Bracket::of_signs(0.0, 1.0) } else { Bracket::of_signs(1.0, 0.0) };
+        let bracket = |r: &SurfaceRoot| if r.falls { Bracket::of_signs(0.0, 1.0) } else { Bracket::of_signs(1.0, 0.0) };
         let mut open: Vec<(u32, Bracket)> = of.iter().map(|&r| (r, bracket(&roots[r as usize]))).collect();
         for round in 0..ROUNDS {
             let found = plane.evaluate(surface, open.iter().map(|(r, _)| roots[*r as usize].position(grid)));
@@ -80,7 +80,7 @@ pub(super) fn solve(outline: &mut Outline, grid: &PlaneGrid, plane: Plane, accur
 
 /// One step for a root; whether it is near enough.
 fn step(
-    root: &mut Root,
+    root: &mut SurfaceRoot,
     bracket: &mut Bracket,
     grid: &PlaneGrid,
     (value, gradient): (f64, Point),
@@ -109,7 +109,7 @@ pub(super) struct IntersectionPoint {
 }
 
 /// Solves for points where two surfaces meet, to `accuracy` (mm), by Newton's method.
-pub(super) fn solve_intersections(points: &mut [IntersectionPoint], plane: Plane, accuracy: f64) {
+pub(super) fn solve_intersections(points: &mut [IntersectionPoint], plane: SurfacesAtHeight, accuracy: f64) {
     let mut open: Vec<usize> = (0..points.len()).collect();
     for _ in 0..ROUNDS / 2 {
         let mut values = vec![[0.0; 2]; open.len()];

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::columns::columns;
-use super::phase_grid::Grid;
+use super::grade_values::grade_values;
+use super::phase_grid::PhaseGrid;
 use super::principal::Principal;
 use super::smooth_frames::{LEAST_AVERAGE, Smoothing};
 use crate::grade::Grade;
@@ -31,7 +31,7 @@ impl Axis {
     pub(super) fn vectors(&self, points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
         match self {
             Axis::Vector(of) => vectors(of, points, key),
-            Axis::Line(of) => along(&columns(of, points, key)?, points, key),
+            Axis::Line(of) => along(&grade_values(of, points, key)?, points, key),
         }
     }
 
@@ -50,7 +50,7 @@ impl Axis {
                 Box::new(move |n, v| dot(given[n], v) > MEANT)
             }
             Axis::Line(of) => {
-                let given = columns(of, points, key)?;
+                let given = grade_values(of, points, key)?;
                 Box::new(move |n, v| {
                     let [xx, yy, zz, yz, xz, xy] = given[n];
                     let [x, y, z] = square(v).as_chunks::<3>().0[0];
@@ -65,7 +65,7 @@ impl Axis {
     /// Unit vectors at the nodes of a grid, smoothed, of arbitrary signs.
     pub(super) fn smoothed(
         &self,
-        grid: &Grid,
+        grid: &PhaseGrid,
         nodes: &[Vec3],
         key: &str,
         smoothing: &Smoothing,
@@ -114,7 +114,7 @@ fn no_direction(key: &str, p: Vec3) -> Fault {
 
 /// Unit vectors.
 fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
-    let mut found = columns(of, points, key)?;
+    let mut found = grade_values(of, points, key)?;
     for (v, p) in found.iter_mut().zip(points) {
         if norm(*v) < 1e-12 {
             return Err(no_direction(key, *p));

@@ -29,7 +29,7 @@ const NEAR: f64 = 1e-13;
 pub(super) const FLAT: u32 = u32::MAX;
 
 /// An edge of the mesh's boundary.
-pub(crate) struct BoundaryEdge {
+pub(crate) struct SurfaceEdge {
     /// Its nodes, ascending.
     pub nodes: [u32; 2],
     /// Its two faces.
@@ -41,7 +41,7 @@ pub(crate) struct Curves {
     /// The region whose surface they meet.
     pub region: Region,
     /// The edges of the boundary, ascending.
-    pub edges: Vec<BoundaryEdge>,
+    pub edges: Vec<SurfaceEdge>,
     /// Number of each tetrahedron in `bent`, or [`FLAT`].
     pub(super) index: Vec<u32>,
     pub(super) bent: Vec<Bent>,

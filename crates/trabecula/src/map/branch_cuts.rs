@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::winding::{Filament, to_segment};
 use geometry::math::{
     IDENTITY, Mat3, Vec3, add, apply, cross, dot, norm, product, scale, sin_cos_turns, sub, transpose, unit,
@@ -20,47 +20,47 @@ const DIRECTIONS: usize = 48;
 
 /// A motion of phases: u becomes turn · u + by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Move {
+pub(super) struct PhaseMotion {
     pub turn: Mat3,
     pub by: Vec3,
 }
 
-impl Move {
-    pub const NONE: Move = Move { turn: IDENTITY, by: [0.0; 3] };
+impl PhaseMotion {
+    pub const NONE: PhaseMotion = PhaseMotion { turn: IDENTITY, by: [0.0; 3] };
 
     pub fn of(&self, u: Vec3) -> Vec3 {
         add(apply(&self.turn, u), self.by)
     }
 
     /// This one, then another.
-    pub fn then(&self, next: &Move) -> Move {
-        Move { turn: product(&next.turn, &self.turn), by: next.of(self.by) }
+    pub fn then(&self, next: &PhaseMotion) -> PhaseMotion {
+        PhaseMotion { turn: product(&next.turn, &self.turn), by: next.of(self.by) }
     }
 
-    pub fn back(&self) -> Move {
+    pub fn back(&self) -> PhaseMotion {
         let turn = transpose(&self.turn);
-        Move { turn, by: scale(apply(&turn, self.by), -1.0) }
+        PhaseMotion { turn, by: scale(apply(&turn, self.by), -1.0) }
     }
 }
 
 /// The cut of a line: the angle about it at the nodes, turns, and what phases become where the cut is crossed in the common sense.
 #[derive(Clone)]
-struct Cut {
+struct BranchCut {
     angle: Vec<f64>,
-    step: Move,
+    step: PhaseMotion,
 }
 
 /// The cuts of all lines, in the order in which they are crossed.
 #[derive(Clone)]
 pub(super) struct BranchCuts {
-    cuts: Vec<Cut>,
+    cuts: Vec<BranchCut>,
     /// Whether that order is the one of falling angles.
     sense: f64,
 }
 
 impl BranchCuts {
     /// The cuts of lines, which are sorted into their order.
-    pub fn new(grid: &Grid, lines: &mut [Vec<Vec3>]) -> BranchCuts {
+    pub fn new(grid: &PhaseGrid, lines: &mut [Vec<Vec3>]) -> BranchCuts {
         let along = like_oriented(lines);
         let aside = aside(lines, along);
         let across = unit(cross(along, aside));
@@ -82,13 +82,13 @@ impl BranchCuts {
         };
         let filaments: Vec<Filament> = lines.iter().map(filament).collect();
         let angles = |f: &Filament| (0..grid.len()).into_par_iter().map(|n| f.angle(grid.node(n))).collect();
-        let cut = |f: &Filament| Cut { angle: angles(f), step: Move::NONE };
+        let cut = |f: &Filament| BranchCut { angle: angles(f), step: PhaseMotion::NONE };
         BranchCuts { sense: filaments.first().map_or(1.0, sense), cuts: filaments.iter().map(cut).collect() }
     }
 
     /// The same cuts on a grid of some of the nodes.
     pub fn at(&self, nodes: &[usize]) -> BranchCuts {
-        let cut = |c: &Cut| Cut { angle: nodes.iter().map(|n| c.angle[*n]).collect(), step: c.step };
+        let cut = |c: &BranchCut| BranchCut { angle: nodes.iter().map(|n| c.angle[*n]).collect(), step: c.step };
         BranchCuts { cuts: self.cuts.iter().map(cut).collect(), sense: self.sense }
     }
 
@@ -96,11 +96,11 @@ impl BranchCuts {
         self.cuts.len()
     }
 
-    pub fn step(&self, line: usize) -> Move {
+    pub fn step(&self, line: usize) -> PhaseMotion {
         self.cuts[line].step
     }
 
-    pub fn set(&mut self, line: usize, step: Move) {
+    pub fn set(&mut self, line: usize, step: PhaseMotion) {
         self.cuts[line].step = step;
     }
 
@@ -113,11 +113,11 @@ impl BranchCuts {
     }
 
     /// Whether a cut may lie between each node and another that is up to one step below it and up to two above it along each axis.
-    pub fn near(&self, grid: &Grid) -> Vec<bool> {
+    pub fn near(&self, grid: &PhaseGrid) -> Vec<bool> {
         let strides = grid.strides();
         let steep = |n: &usize| {
             let at = grid.index(*n);
-            let rise = |c: &Cut, m: usize| (c.angle[m] - c.angle[*n]).abs();
+            let rise = |c: &BranchCut, m: usize| (c.angle[m] - c.angle[*n]).abs();
             let above = (0..3).filter(|a| at[*a] + 1 < grid.shape[*a]).map(|a| n + strides[a]);
             above.into_iter().any(|m| self.cuts.iter().any(|c| rise(c, m) > STEEP))
         };
@@ -141,8 +141,8 @@ impl BranchCuts {
     }
 
     /// What phases become on the way from one node to a near one.
-    pub fn between(&self, ends: [usize; 2]) -> Move {
-        let mut all = Move::NONE;
+    pub fn between(&self, ends: [usize; 2]) -> PhaseMotion {
+        let mut all = PhaseMotion::NONE;
         for line in 0..self.len() {
             if self.crossed(line, ends) > 0 {
                 all = all.then(&self.step(line));
@@ -205,14 +205,14 @@ mod tests {
     /// Once round a line its cut is crossed once, round two lines both, and back is back.
     #[test]
     fn round_lines_their_cuts_are_crossed_once() {
-        let grid = Grid::over(&Aabb { min: [-5.0, -5.0, 0.0], max: [5.0, 5.0, 2.0] }, [41, 41, 5]);
+        let grid = PhaseGrid::over(&Aabb { min: [-5.0, -5.0, 0.0], max: [5.0, 5.0, 2.0] }, [41, 41, 5]);
         let line = |x: f64, y: f64| vec![[x, y, -1.0], [x, y, 1.0], [x, y, 3.0]];
         let mut lines = vec![line(1.6, 0.4), line(-2.1, 0.3)];
         lines[1].reverse();
         let mut cuts = BranchCuts::new(&grid, &mut lines);
         let half = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
-        cuts.set(0, Move { turn: half, by: [0.0; 3] });
-        cuts.set(1, Move { turn: half, by: [3.0, 5.0, 0.0] });
+        cuts.set(0, PhaseMotion { turn: half, by: [0.0; 3] });
+        cuts.set(1, PhaseMotion { turn: half, by: [3.0, 5.0, 0.0] });
         let node = |i: usize, j: usize| (2 * 41 + j) * 41 + i;
         let ring = |from: [usize; 2], to: [usize; 2]| {
             let ([a, b], [c, d]) = (from, to);
@@ -223,9 +223,9 @@ mod tests {
             all
         };
         let round = |all: &[usize]| {
-            (0..all.len()).fold(Move::NONE, |m, i| m.then(&cuts.between([all[i], all[(i + 1) % all.len()]])))
+            (0..all.len()).fold(PhaseMotion::NONE, |m, i| m.then(&cuts.between([all[i], all[(i + 1) % all.len()]])))
         };
-        let one: Vec<Move> = (0..2).map(|i| cuts.step(i)).collect();
+        let one: Vec<PhaseMotion> = (0..2).map(|i| cuts.step(i)).collect();
         let rings = [ring([24, 14], [38, 30]), ring([2, 14], [16, 30])];
         for (all, x) in rings.iter().zip([1.6, -2.1]) {
             let line = (0..2).find(|i| (lines[*i][0][0] - x).abs() < 1e-9).expect("a line");
@@ -235,8 +235,8 @@ mod tests {
         let both = round(&ring([1, 1], [39, 39]));
         assert_eq!(both.turn, IDENTITY);
         assert_eq!([both.by[0].abs(), both.by[1].abs()], [3.0, 5.0]);
-        assert_eq!(round(&ring([17, 5], [22, 12])), Move::NONE);
+        assert_eq!(round(&ring([17, 5], [22, 12])), PhaseMotion::NONE);
         let m = one[1].then(&one[0]);
-        assert_eq!(m.then(&m.back()), Move::NONE);
+        assert_eq!(m.then(&m.back()), PhaseMotion::NONE);
     }
 }

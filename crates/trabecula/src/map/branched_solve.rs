@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
-use super::branch_cuts::{BranchCuts, Move};
+use super::branch_cuts::{BranchCuts, PhaseMotion};
 use super::conjugate_gradients::{self, Solved, sums};
 use super::multigrid::Multigrid;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::math::{IDENTITY, Vec3, add, apply, dot, scale, sub, transpose};
 
 /// The error, relative to that of no phases, at which conjugate gradients end: of a map, and of what tells which whole numbers have the
@@ -20,30 +20,30 @@ const ROUGH: f64 = 1e-3;
 const STEPS: usize = 600;
 
 /// An edge across a cut: its lower node and axis, and what phases become along it.
-struct Crossing {
+struct CutCrossing {
     node: usize,
     axis: usize,
-    to: Move,
+    to: PhaseMotion,
 }
 
 /// The problem on a grid.
 pub(super) struct Branched<'a> {
-    grid: &'a Grid,
+    grid: &'a PhaseGrid,
     k: &'a [Vec<Vec3>; 3],
     /// What the square of a difference along each edge counts.
     edges: [Vec<f64>; 3],
-    crossings: Vec<Crossing>,
+    crossings: Vec<CutCrossing>,
     multigrid: Multigrid,
 }
 
 impl<'a> Branched<'a> {
     /// With what edges count, and the cuts.
-    pub fn new(grid: &'a Grid, k: &'a [Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &BranchCuts) -> Branched<'a> {
+    pub fn new(grid: &'a PhaseGrid, k: &'a [Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &BranchCuts) -> Branched<'a> {
         let strides = grid.strides();
         let mut crossings = Vec::new();
         for (axis, stride) in strides.into_iter().enumerate() {
             let crossed = |n: &usize| grid.index(*n)[axis] + 1 < grid.shape[axis] && cuts.any([*n, n + stride]);
-            let crossing = |node| Crossing { node, axis, to: cuts.between([node, node + stride]) };
+            let crossing = |node| CutCrossing { node, axis, to: cuts.between([node, node + stride]) };
             let found = (0..grid.len()).into_par_iter().filter(crossed).map(crossing);
             crossings.par_extend(found);
         }
@@ -66,7 +66,7 @@ impl<'a> Branched<'a> {
     }
 
     /// What phases are to rise by along each edge above a node, in the branch of the node: of the target, or of the translations alone.
-    fn steps(&self, with: impl Fn(&Move) -> Vec3, target: bool) -> [Vec<Vec3>; 3] {
+    fn steps(&self, with: impl Fn(&PhaseMotion) -> Vec3, target: bool) -> [Vec<Vec3>; 3] {
         let (grid, strides) = (self.grid, self.grid.strides());
         let at = |n: usize, a: usize| [0, 1, 2].map(|i| self.k[i][n][a]);
         let mut steps: [Vec<Vec3>; 3] = core::array::from_fn(|a| {
@@ -140,16 +140,16 @@ impl<'a> Branched<'a> {
 }
 
 /// The whole numbers that are free, and the error of the phases for them.
-pub(super) struct Numbers {
+pub(super) struct FreeIntegers {
     /// The cut and the axis of each.
     pub free: Vec<(usize, usize)>,
     /// The quadratic form of the error in (1, n), row by row.
     pub form: Vec<f64>,
 }
 
-impl Numbers {
+impl FreeIntegers {
     /// Of the phases with these gradients over cuts that have no translations yet.
-    pub fn new(grid: &Grid, k: &[Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &mut BranchCuts) -> Numbers {
+    pub fn new(grid: &PhaseGrid, k: &[Vec<Vec3>; 3], edges: [Vec<f64>; 3], cuts: &mut BranchCuts) -> FreeIntegers {
         let free = free(cuts);
         let mut problem = Branched::new(grid, k, edges, cuts);
         let left = |problem: &Branched, steps: &[Vec<Vec3>; 3]| problem.fit(steps, ROUGH).1;
@@ -158,18 +158,18 @@ impl Numbers {
             let plain = cuts.step(*line);
             let mut by = [0.0; 3];
             by[*axis] = 1.0;
-            cuts.set(*line, Move { by, ..plain });
+            cuts.set(*line, PhaseMotion { by, ..plain });
             problem.translate(cuts);
             cuts.set(*line, plain);
             all.push(left(&problem, &problem.steps(|m| m.by, false)));
         }
         let pairs = all.iter().flat_map(|a| all.iter().map(move |b| (a, b)));
-        Numbers { free, form: pairs.map(|(a, b)| problem.product(a, b)).collect() }
+        FreeIntegers { free, form: pairs.map(|(a, b)| problem.product(a, b)).collect() }
     }
 
     /// Gives cuts their translations.
     pub fn set(&self, numbers: &[i64], cuts: &mut BranchCuts) {
-        (0..cuts.len()).for_each(|line| cuts.set(line, Move { by: [0.0; 3], ..cuts.step(line) }));
+        (0..cuts.len()).for_each(|line| cuts.set(line, PhaseMotion { by: [0.0; 3], ..cuts.step(line) }));
         for ((line, axis), n) in self.free.iter().zip(numbers) {
             let mut step = cuts.step(*line);
             step.by[*axis] = *n as f64;
@@ -199,14 +199,14 @@ mod tests {
     use geometry::math::{Aabb, unit};
 
     /// Axes that come back turned by a quarter round three lines: the grid, gradients, what edges count, and the cuts.
-    fn example(fine: usize) -> (Grid, [Vec<Vec3>; 3], [Vec<f64>; 3], BranchCuts) {
+    fn example(fine: usize) -> (PhaseGrid, [Vec<Vec3>; 3], [Vec<f64>; 3], BranchCuts) {
         let b = Aabb { min: [-5.0, -4.0, 0.0], max: [5.0, 6.0, 2.0] };
-        let grid = Grid::over(&b, [20 * fine + 1, 20 * fine + 2, 4 * fine + 1]);
+        let grid = PhaseGrid::over(&b, [20 * fine + 1, 20 * fine + 2, 4 * fine + 1]);
         let at = [[1.63, 0.41], [-2.17, 0.33], [0.48, 3.57]];
         let mut lines = at.map(|[x, y]| vec![[x, y, -1.0], [x, y, 1.0], [x, y, 3.0]]);
         let mut cuts = BranchCuts::new(&grid, &mut lines);
         let quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        (0..3).for_each(|line| cuts.set(line, Move { turn: quarter, by: [0.0; 3] }));
+        (0..3).for_each(|line| cuts.set(line, PhaseMotion { turn: quarter, by: [0.0; 3] }));
         let root = |n: usize| {
             let [x, y, _] = grid.node(n);
             let from = |p: [f64; 2]| ((x - p[0]).hypot(y - p[1]) / 0.8).min(1.0).powi(2).max(1e-3);
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn the_error_of_whole_numbers_is_that_of_their_phases() {
         let (grid, k, edges, mut cuts) = example(2);
-        let numbers = Numbers::new(&grid, &k, edges.clone(), &mut cuts);
+        let numbers = FreeIntegers::new(&grid, &k, edges.clone(), &mut cuts);
         let mut problem = Branched::new(&grid, &k, edges, &cuts);
         for n in [[0, 0, 1, 0], [1, 0, 0, 1], [2, -1, 1, 3], [-1, 2, 2, 0]] {
             numbers.set(&n, &mut cuts);

@@ -9,7 +9,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::progress::checkpoint;
 use geometry::union_find::{singles, unite};
 use geometry::voxel_distances::distances;
@@ -21,7 +21,7 @@ const UNKNOWN: u32 = u32::MAX;
 
 /// The number of holes, as rings have, of the nodes that are inside, with the edges, faces and cubes between them: by Euler's
 /// characteristic, the number of components and that of cavities.
-pub(super) fn holes(grid: &Grid, inside: &[bool]) -> usize {
+pub(super) fn holes(grid: &PhaseGrid, inside: &[bool]) -> usize {
     if inside.iter().all(|i| *i) || !inside.iter().any(|i| *i) {
         return 0;
     }
@@ -99,7 +99,7 @@ impl Forms {
 /// A cochain on the edges of a grid that is not known yet everywhere. Edge 3 n + a goes from node n along axis a; face 3 n + c is at
 /// right angles to axis c above node n.
 struct Cochain<'a> {
-    grid: &'a Grid,
+    grid: &'a PhaseGrid,
     /// For each node its distance from the region in parts of a step; 0 is the region.
     shell: &'a [u32],
     edges: Vec<u32>,
@@ -191,7 +191,7 @@ pub(super) struct Cohomology {
 }
 
 /// The closed cochains of the nodes that are inside, with the edges, faces and cubes between them.
-pub(super) fn cohomology(grid: &Grid, inside: &[bool]) -> Cohomology {
+pub(super) fn cohomology(grid: &PhaseGrid, inside: &[bool]) -> Cohomology {
     let distance = distances(inside, grid.shape, grid.step);
     let width = grid.step.into_iter().fold(f64::INFINITY, f64::min) / SHELLS;
     let shells: Vec<u32> = distance.iter().map(|d| (d / width).ceil().min(1e5) as u32).collect();
@@ -326,11 +326,11 @@ mod tests {
     use super::*;
     use geometry::math::{Aabb, Vec3, norm};
 
-    fn grid(n: [usize; 3]) -> Grid {
-        Grid::over(&Aabb { min: [-1.0; 3], max: [1.0; 3] }, n)
+    fn grid(n: [usize; 3]) -> PhaseGrid {
+        PhaseGrid::over(&Aabb { min: [-1.0; 3], max: [1.0; 3] }, n)
     }
 
-    fn nodes_in(g: &Grid, f: impl Fn(Vec3) -> f64) -> Vec<bool> {
+    fn nodes_in(g: &PhaseGrid, f: impl Fn(Vec3) -> f64) -> Vec<bool> {
         (0..g.len()).map(|n| f(g.node(n)) <= 0.0).collect()
     }
 

@@ -5,13 +5,13 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::progress::checkpoint;
 
 /// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
 /// nodes come last, so that none depends on them. Returns the first, which has the value that `first` gives it.
 pub(super) fn comb<T: Copy>(
-    grid: &Grid,
+    grid: &PhaseGrid,
     values: &mut [T],
     sure: impl Fn(usize) -> f64,
     first: impl Fn(usize, &T) -> T,

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::branch_cuts::{BranchCuts, Move};
-use super::cube_turns::nearest_turn;
+use super::branch_cuts::{BranchCuts, PhaseMotion};
+use super::cube_rotations::nearest_turn;
 use super::phase_request::PhaseRequest;
 use super::phase_target::{SolveDomain, Target};
 use super::singular_lines::FrameEquivalence;
@@ -47,7 +47,7 @@ pub(super) fn labels(
 }
 
 /// An edge of the grid along which axes change, or across cuts: its lower node, the rotation, and the cuts with the sense of each.
-struct Turned {
+struct TurnedEdge {
     node: usize,
     turn: Mat3,
     cuts: Vec<(usize, i32)>,
@@ -73,12 +73,12 @@ pub(super) fn rotations(
     let crossed = |n: usize, m: usize| -> Vec<(usize, i32)> {
         (0..cuts.len()).map(|line| (line, cuts.crossed(line, [n, m]))).filter(|(_, sense)| *sense != 0).collect()
     };
-    let some: Vec<Turned> = edges
-        .map(|(node, m, turn)| Turned { node, turn, cuts: crossed(node, m) })
+    let some: Vec<TurnedEdge> = edges
+        .map(|(node, m, turn)| TurnedEdge { node, turn, cuts: crossed(node, m) })
         .filter(|e| e.turn != IDENTITY || !e.cuts.is_empty())
         .collect();
     let mut found: Vec<Option<Mat3>> = vec![None; cuts.len()];
-    for Turned { node, turn, cuts } in &some {
+    for TurnedEdge { node, turn, cuts } in &some {
         let at = grid.node(*node);
         match cuts[..] {
             [] => return Err(unlike(at, wanted)),
@@ -99,7 +99,7 @@ pub(super) fn rotations(
         return Err(Fault::new("core", message));
     }
     check_lengths(domain, target, &all)?;
-    all.into_iter().enumerate().for_each(|(line, turn)| cuts.set(line, Move { turn, by: [0.0; 3] }));
+    all.into_iter().enumerate().for_each(|(line, turn)| cuts.set(line, PhaseMotion { turn, by: [0.0; 3] }));
     Ok(())
 }
 

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::bent_tets::{self, Bent, BoundaryEdge, Curves, FIT, MOST};
+use super::bent_tets::{self, Bent, Curves, FIT, MOST, SurfaceEdge};
 use super::surface_feet::{EdgeFaces, edge_feet, feet};
-use super::tet_map::Tets;
+use super::tet_map::CarrierMesh;
 use crate::field::Field;
 use crate::region::Region;
 use geometry::fault::Fault;
@@ -15,15 +15,16 @@ use geometry::tetmesh::{EDGES, TetMesh};
 const FARTHEST: f64 = 0.35;
 /// |δ| below this share of the edge is rounding.
 const FLAT: f64 = 1e-9;
-impl Tets {
+impl CarrierMesh {
     /// As `new`, the tetrahedra at the boundary bent onto the surface of a region of which it is a mesh.
     ///
     /// # Errors
     /// As `new`.
-    pub fn of_region(mesh: &TetMesh, overlap: f64, region: &Region) -> Result<Tets, Fault> {
-        let flat = Tets::new(mesh, overlap)?;
+    pub fn of_region(mesh: &TetMesh, overlap: f64, region: &Region) -> Result<CarrierMesh, Fault> {
+        let flat = CarrierMesh::new(mesh, overlap)?;
         let nodes = settled(&flat, &**region);
-        let out = if nodes == flat.nodes() { flat } else { Tets::new(&TetMesh { nodes, ..mesh.clone() }, overlap)? };
+        let out =
+            if nodes == flat.nodes() { flat } else { CarrierMesh::new(&TetMesh { nodes, ..mesh.clone() }, overlap)? };
         let curves = Curves::new(&out, region);
         Ok(out.with(curves))
     }
@@ -31,9 +32,9 @@ impl Tets {
 
 impl Curves {
     /// Bends the boundary edges of a mesh whose nodes on the boundary are on the surface of a region.
-    pub fn new(map: &Tets, region: &Region) -> Curves {
+    pub fn new(map: &CarrierMesh, region: &Region) -> Curves {
         let edges = boundary_edges(map);
-        let ends = |e: &BoundaryEdge| e.nodes.map(|n| map.nodes()[n as usize]);
+        let ends = |e: &SurfaceEdge| e.nodes.map(|n| map.nodes()[n as usize]);
         let middles: Vec<Vec3> = edges.iter().map(|e| middle(ends(e), 0.5)).collect();
         let faces: Vec<EdgeFaces> = edges.iter().map(|e| e.faces).collect();
         let targets = edge_feet(&**region, &middles, &faces);
@@ -67,7 +68,7 @@ impl Curves {
     }
 
     /// Makes the bent tetrahedra, and reduces the bends until all are one to one.
-    fn bend(&mut self, map: &Tets, moved: &mut HashMap<[u32; 2], Vec3>) {
+    fn bend(&mut self, map: &CarrierMesh, moved: &mut HashMap<[u32; 2], Vec3>) {
         let keys = |t: usize| {
             let n = map.tet(t);
             EDGES.map(|[i, j]| [n[i], n[j]])
@@ -103,7 +104,7 @@ impl Curves {
     }
 
     /// Places on the bent boundary, at the middles of faces and the quarters of edges, and their distances from the surface, in edges.
-    fn distances(&self, map: &Tets, moved: &HashMap<[u32; 2], Vec3>) -> (Vec<Vec3>, Vec<f64>) {
+    fn distances(&self, map: &CarrierMesh, moved: &HashMap<[u32; 2], Vec3>) -> (Vec<Vec3>, Vec<f64>) {
         let at = |n: u32| map.nodes()[n as usize];
         let bend = |a: u32, b: u32| moved.get(&[a.min(b), a.max(b)]).copied().unwrap_or_default();
         let boundary = map.boundary_nodes();
@@ -115,7 +116,7 @@ impl Curves {
             points.push(bent);
             lengths.push(length);
         }
-        for BoundaryEdge { nodes: [a, b], .. } in &self.edges {
+        for SurfaceEdge { nodes: [a, b], .. } in &self.edges {
             for s in [0.25, 0.5, 0.75] {
                 let flat = middle([at(*a), at(*b)], s);
                 points.push(add(flat, scale(bend(*a, *b), 4.0 * s * (1.0 - s))));
@@ -134,7 +135,7 @@ fn middle([a, b]: [Vec3; 2], s: f64) -> Vec3 {
 }
 
 /// The edges of the boundary that have two faces, ascending.
-pub(crate) fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
+pub(crate) fn boundary_edges(map: &CarrierMesh) -> Vec<SurfaceEdge> {
     let mut halves: Vec<([u32; 2], [u32; 3])> = Vec::new();
     for f in map.boundary_nodes() {
         for i in 0..3 {
@@ -151,7 +152,7 @@ pub(crate) fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
     let edge = |pair: &[([u32; 2], [u32; 3])]| match pair {
         [(nodes, f), (_, g)] => {
             let outward = unit(add(normal(*f), normal(*g)));
-            Some(BoundaryEdge { nodes: *nodes, faces: EdgeFaces { middles: [third(*f), third(*g)], outward } })
+            Some(SurfaceEdge { nodes: *nodes, faces: EdgeFaces { middles: [third(*f), third(*g)], outward } })
         }
         _ => None,
     };
@@ -160,7 +161,7 @@ pub(crate) fn boundary_edges(map: &Tets) -> Vec<BoundaryEdge> {
 
 /// The nodes of a mesh, those on the boundary that are a little off the surface of a region moved onto it, where all
 /// tetrahedra keep at least half their volume.
-pub(crate) fn settled(map: &Tets, region: &dyn Field) -> Vec<Vec3> {
+pub(crate) fn settled(map: &CarrierMesh, region: &dyn Field) -> Vec<Vec3> {
     let boundary = map.boundary_nodes();
     let old = map.nodes();
     let mut shortest: HashMap<u32, f64> = HashMap::new();

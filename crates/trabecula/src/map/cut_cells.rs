@@ -9,9 +9,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::branch_cuts::{BranchCuts, Move};
-use super::phase_grid::Grid;
-use super::spline::Spline;
+use super::branch_cuts::{BranchCuts, PhaseMotion};
+use super::phase_grid::PhaseGrid;
+use super::spline::MapSpline;
 use geometry::cubic_spline::{slopes, weights};
 use geometry::math::{Aabb, Mat3, Vec3, add, norm, product, scale, sub};
 
@@ -19,13 +19,13 @@ use geometry::math::{Aabb, Mat3, Vec3, add, norm, product, scale, sub};
 const APART: f64 = 1e-6;
 
 /// A cell's coefficients, x fastest.
-type Local = [Vec3; 64];
+type CellCoefficients = [Vec3; 64];
 
 /// Cells that have coefficients of their own.
 pub(super) struct CutCells {
-    grid: Grid,
+    grid: PhaseGrid,
     cuts: BranchCuts,
-    cells: HashMap<usize, Box<Local>>,
+    cells: HashMap<usize, Box<CellCoefficients>>,
     /// Rows of cells along x in which there are some.
     rows: Vec<bool>,
     /// Torn cells, by their first nodes.
@@ -33,7 +33,7 @@ pub(super) struct CutCells {
 }
 
 /// A spline through values with branches, and the cells of it that cuts pass.
-pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline, CutCells) {
+pub(super) fn through(grid: PhaseGrid, values: &[Vec3], cuts: BranchCuts) -> (MapSpline, CutCells) {
     let at = |n: usize| grid.index(n);
     let offset = |n: usize, by: [isize; 3]| -> Option<usize> {
         let i = at(n);
@@ -75,7 +75,8 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
         near(n, -1..=2).zip(own.iter_mut()).for_each(|((_, m), c)| *c = cuts.between([m, n]).of(coefficients[m]));
         Some((n, own))
     };
-    let cells: HashMap<usize, Box<Local>> = (0..grid.len()).into_par_iter().filter(inner).filter_map(local).collect();
+    let cells: HashMap<usize, Box<CellCoefficients>> =
+        (0..grid.len()).into_par_iter().filter(inner).filter_map(local).collect();
     let mut rows = vec![false; grid.shape[1] * grid.shape[2]];
     cells.keys().for_each(|n| rows[n / grid.shape[0]] = true);
     let mut torn = vec![false; grid.len()];
@@ -99,7 +100,7 @@ pub(super) fn through(grid: Grid, values: &[Vec3], cuts: BranchCuts) -> (Spline,
             }
         }
     }
-    let spline = Spline::of(grid, &coefficients, |cell| cells.get(&cell).map(|c| &**c));
+    let spline = MapSpline::of(grid, &coefficients, |cell| cells.get(&cell).map(|c| &**c));
     (spline, CutCells { grid, cuts, cells, rows, torn })
 }
 
@@ -158,7 +159,7 @@ impl CutCells {
     }
 
     /// What phases become from one node to a near one.
-    pub fn between(&self, ends: [usize; 2]) -> Move {
+    pub fn between(&self, ends: [usize; 2]) -> PhaseMotion {
         self.cuts.between(ends)
     }
 
@@ -173,7 +174,7 @@ impl CutCells {
     }
 }
 
-fn sum(c: &Local, [x, y, z]: [[f64; 4]; 3]) -> Vec3 {
+fn sum(c: &CellCoefficients, [x, y, z]: [[f64; 4]; 3]) -> Vec3 {
     let mut sum = [0.0; 3];
     for (k, z) in z.iter().enumerate() {
         for (j, y) in y.iter().enumerate() {

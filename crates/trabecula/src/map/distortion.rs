@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use rayon::prelude::*;
 
 use super::cut_cells::CutCells;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::singular_lines::SingularLine;
 use geometry::math::{Aabb, Mat3, Vec3, cross, determinant, dot, norm, product, spectral_norm, transpose};
 
@@ -172,7 +172,7 @@ impl Distortion {
 }
 
 /// |curl Kᵢ| / |Kᵢ|², the greatest of the three gratings, by differences at a node.
-pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
+pub(super) fn curl(grid: &PhaseGrid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
     let (at, strides) = (grid.index(n), grid.strides());
     let mut most = 0.0f64;
     for k in k {
@@ -190,8 +190,8 @@ pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
 }
 
 /// Frames at the nodes of a grid.
-pub(super) struct Frames<'a> {
-    pub grid: &'a Grid,
+pub(super) struct FrameField<'a> {
+    pub grid: &'a PhaseGrid,
     pub frames: &'a [Mat3],
     /// Across these they turn by what is left after the rotation there.
     pub cuts: Option<&'a CutCells>,
@@ -199,7 +199,7 @@ pub(super) struct Frames<'a> {
     pub inside: &'a [bool],
 }
 
-impl Frames<'_> {
+impl FrameField<'_> {
     /// The most that they turn within one cell of edge `length` (mm), degrees, or twice what they turn within half of one or less, and
     /// where.
     pub fn turning(&self, length: f64) -> (f64, Vec3) {
@@ -213,7 +213,7 @@ impl Frames<'_> {
 
     /// The same along an axis between nodes `cells` cells apart.
     fn turning_along(&self, a: usize, cells: f64, length: f64) -> (f64, Vec3) {
-        let Frames { grid, frames, cuts, inside } = *self;
+        let FrameField { grid, frames, cuts, inside } = *self;
         let strides = grid.strides();
         // Nodes nearly that far apart; where that is less than a step, what a step turns is shared out.
         let apart = ((cells * length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);

@@ -9,10 +9,10 @@
 
 use rayon::prelude::*;
 
+use super::angle_weight::AngleWeight;
 use super::conjugate_gradients::{self, Solved, sums};
 use super::multigrid::Multigrid;
-use super::phase_grid::Grid;
-use super::tilt::Tilt;
+use super::phase_grid::PhaseGrid;
 use geometry::math::Vec3;
 
 /// The energy of the error, relative to the first, of which conjugate gradients end at the square.
@@ -23,12 +23,12 @@ const STEPS: usize = 400;
 const BEYOND: f64 = 1e-5;
 /// Least squares on the edges of a grid.
 pub(super) struct EdgeSquares {
-    grid: Grid,
+    grid: PhaseGrid,
     multigrid: Multigrid,
 }
 
 /// What was found: values at the nodes, the number of steps taken, and the error left, relative to the first.
-pub(super) struct Fit {
+pub(super) struct LeastSquaresSolution {
     pub values: Vec<f64>,
     pub steps: usize,
     #[cfg_attr(not(test), expect(dead_code))]
@@ -38,13 +38,13 @@ pub(super) struct Fit {
 impl EdgeSquares {
     /// Edges that count as the product of `roots` at their ends and by their share of the grid's box, and, if the `depth` of nodes below
     /// the surface of a region is given (mm, positive outside), of the region.
-    pub fn new(grid: Grid, roots: &[f64], depth: Option<&[f64]>) -> EdgeSquares {
+    pub fn new(grid: PhaseGrid, roots: &[f64], depth: Option<&[f64]>) -> EdgeSquares {
         let edges = weights(grid, roots, depth);
         EdgeSquares { grid, multigrid: Multigrid::new(grid.shape, grid.step, edges, Vec::new()) }
     }
 
     /// The function whose steps are nearest to none and whose values are near to those given, where they count: Σ m (Φᵢ − vᵢ)² is added.
-    pub fn pulled(&self, mass: Vec<f64>, values: &[f64], tilt: Option<&Tilt>) -> Vec<f64> {
+    pub fn pulled(&self, mass: Vec<f64>, values: &[f64], tilt: Option<&AngleWeight>) -> Vec<f64> {
         let right = mass.iter().zip(values).map(|(m, v)| m * v).collect();
         let multigrid = Multigrid::new(self.grid.shape, self.grid.step, self.multigrid.finest().edges.clone(), mass);
         EdgeSquares { grid: self.grid, multigrid }.solve(right, vec![0.0; values.len()], tilt).values
@@ -58,7 +58,7 @@ impl EdgeSquares {
     }
 
     /// The sum of the products of two sets of slopes along the edges above nodes, as errors count.
-    pub fn product(&self, a: &[Vec3], b: &[Vec3], tilt: Option<&Tilt>) -> f64 {
+    pub fn product(&self, a: &[Vec3], b: &[Vec3], tilt: Option<&AngleWeight>) -> f64 {
         let (h, edges) = (self.grid.step.map(|h| h * h), &self.multigrid.finest().edges);
         let of = |n: usize| (0..3).map(|i| edges[i][n] * h[i] * a[n][i] * b[n][i]).sum::<f64>();
         sums(a.len(), of) + tilt.map_or(0.0, |t| t.product(a, b))
@@ -66,7 +66,7 @@ impl EdgeSquares {
 
     /// The function whose steps along the edges above the nodes are nearest to those of slopes, from `start` on; errors across the target
     /// count more or less than those along it, if there is a tilt.
-    pub fn fit(&self, slopes: &[Vec3], start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
+    pub fn fit(&self, slopes: &[Vec3], start: Vec<f64>, tilt: Option<&AngleWeight>) -> LeastSquaresSolution {
         let mut right = flow(&self.grid, &self.multigrid.finest().edges, slopes);
         if let Some(tilt) = tilt {
             right.par_iter_mut().zip(tilt.wanted(slopes)).for_each(|(r, more)| *r += more);
@@ -75,7 +75,7 @@ impl EdgeSquares {
     }
 
     /// The solution of the normal equations, from `start` on.
-    fn solve(&self, right: Vec<f64>, start: Vec<f64>, tilt: Option<&Tilt>) -> Fit {
+    fn solve(&self, right: Vec<f64>, start: Vec<f64>, tilt: Option<&AngleWeight>) -> LeastSquaresSolution {
         let operator = |x: &[f64], out: &mut [f64]| {
             self.multigrid.apply(x, out);
             if let Some(tilt) = tilt {
@@ -84,12 +84,12 @@ impl EdgeSquares {
         };
         let Solved { x, steps, left } =
             conjugate_gradients::solve(right, start, operator, self.multigrid.cycle(), (RESIDUAL, STEPS));
-        Fit { values: x, steps, left }
+        LeastSquaresSolution { values: x, steps, left }
     }
 }
 
 /// What the square of a difference along each edge counts, as in `EdgeSquares::new`.
-pub(super) fn weights(grid: Grid, roots: &[f64], depth: Option<&[f64]>) -> [Vec<f64>; 3] {
+pub(super) fn weights(grid: PhaseGrid, roots: &[f64], depth: Option<&[f64]>) -> [Vec<f64>; 3] {
     let strides = grid.strides();
     let weight = |a: usize, n: usize| {
         let at = grid.index(n);
@@ -104,7 +104,7 @@ pub(super) fn weights(grid: Grid, roots: &[f64], depth: Option<&[f64]>) -> [Vec<
 }
 
 /// What slopes along edges give of the right-hand side: for each node those of the edges below less those of the edges above.
-fn flow(grid: &Grid, edges: &[Vec<f64>; 3], slopes: &[Vec3]) -> Vec<f64> {
+fn flow(grid: &PhaseGrid, edges: &[Vec<f64>; 3], slopes: &[Vec3]) -> Vec<f64> {
     let (h, strides) = (grid.step, grid.strides());
     let edge = |a: usize, n: usize| edges[a][n] * h[a] * slopes[n][a];
     let of =
@@ -113,7 +113,7 @@ fn flow(grid: &Grid, edges: &[Vec<f64>; 3], slopes: &[Vec3]) -> Vec<f64> {
 }
 
 /// Half the sum of a gradient at both ends of each edge above a node.
-pub(super) fn slopes(grid: &Grid, k: &[Vec3]) -> Vec<Vec3> {
+pub(super) fn slopes(grid: &PhaseGrid, k: &[Vec3]) -> Vec<Vec3> {
     let (shape, strides) = (grid.shape, grid.strides());
     let mean = |n: usize, a: usize| match grid.index(n)[a] + 1 < shape[a] {
         true => 0.5 * (k[n][a] + k[n + strides[a]][a]),
@@ -123,7 +123,7 @@ pub(super) fn slopes(grid: &Grid, k: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// The slopes of a function along the edges above the nodes; zero where there is none.
-pub(super) fn gradient(grid: &Grid, f: &[f64]) -> Vec<Vec3> {
+pub(super) fn gradient(grid: &PhaseGrid, f: &[f64]) -> Vec<Vec3> {
     let strides = grid.strides();
     let of = |n: usize| {
         let at = grid.index(n);
@@ -134,7 +134,7 @@ pub(super) fn gradient(grid: &Grid, f: &[f64]) -> Vec<Vec3> {
 
 /// The region's share of the face at right angles to the edge above a node along an axis, as much of it as is in the grid's box: a plane
 /// boundary at the distance and with the slopes of the nodes.
-fn share(grid: &Grid, depth: &[f64], a: usize, n: usize) -> f64 {
+fn share(grid: &PhaseGrid, depth: &[f64], a: usize, n: usize) -> f64 {
     let (at, strides) = (grid.index(n), grid.strides());
     let mut middle = 0.5 * (depth[n] + depth[n + strides[a]]);
     let mut spans = [0.0; 2];

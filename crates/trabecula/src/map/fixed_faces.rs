@@ -7,7 +7,7 @@
 use super::integral::Problem;
 use super::phase_target::SolveDomain;
 use super::solution::Solution;
-use super::spline::Spline;
+use super::spline::MapSpline;
 use crate::field::Field;
 use crate::region::Region;
 use geometry::fault::{Fault, number, position};
@@ -37,7 +37,7 @@ struct Near {
 }
 
 /// A face, and the axis of the cell along its normal.
-struct Face {
+struct FixedFace {
     /// The number of its region among those given.
     index: usize,
     nodes: Vec<Near>,
@@ -63,7 +63,7 @@ pub(super) fn fixed(
     for (i, of) in fix.iter().enumerate() {
         faces.extend(faces_in(domain, region, &**of, i)?.into_iter().map(|nodes| face(nodes, domain, &solution, i)));
     }
-    let mut faces = faces.into_iter().collect::<Result<Vec<Face>, Fault>>()?;
+    let mut faces = faces.into_iter().collect::<Result<Vec<FixedFace>, Fault>>()?;
     for face in &mut faces {
         let sum: f64 = face.nodes.iter().map(|n| on_face(n, face.axis, domain, &solution, shift)).sum();
         face.mean = sum / face.nodes.len() as f64;
@@ -86,14 +86,15 @@ pub(super) fn fixed(
                 values.iter_mut().zip(change).for_each(|(v, d)| *v += d);
             }
         }
-        solution = Solution { spline: Spline::through(domain.grid, values), winding: solution.winding, branches: None };
+        solution =
+            Solution { spline: MapSpline::through(domain.grid, values), winding: solution.winding, branches: None };
     }
     Ok(solution)
 }
 
 /// Gives the faces along an axis their whole numbers. A phase may be moved by any constant: what counts is how many cells there are
 /// between faces, from the largest one on.
-fn number_faces(faces: &mut [Face], axis: usize) {
+fn number_faces(faces: &mut [FixedFace], axis: usize) {
     let own = || faces.iter().filter(|f| f.axis == axis);
     let first = own().max_by_key(|f| f.nodes.len()).map_or(0.0, |f| f.mean);
     for face in faces.iter_mut().filter(|f| f.axis == axis) {
@@ -102,10 +103,11 @@ fn number_faces(faces: &mut [Face], axis: usize) {
 }
 
 /// Refuses two sides of a wall between which there is less than half a cell: no whole cell can be there.
-fn check_apart(faces: &[Face], domain: &SolveDomain) -> Result<(), Fault> {
+fn check_apart(faces: &[FixedFace], domain: &SolveDomain) -> Result<(), Fault> {
     for (i, b) in faces.iter().enumerate() {
-        let opposite =
-            |a: &&Face| a.axis == b.axis && a.whole == b.whole && dot(a.nodes[0].normal, b.nodes[0].normal) < -SMOOTH;
+        let opposite = |a: &&FixedFace| {
+            a.axis == b.axis && a.whole == b.whole && dot(a.nodes[0].normal, b.nodes[0].normal) < -SMOOTH
+        };
         if let Some(a) = faces[..i].iter().find(opposite) {
             let message = format!(
                 "only {:.2} cells lie between the face at {} and that of fix[{}] at {}: no whole cell can be there. Use smaller cells, or fix \
@@ -130,7 +132,7 @@ fn on_face(near: &Near, axis: usize, domain: &SolveDomain, solution: &Solution, 
 }
 
 /// A face, with the axis whose phase changes most along its normal.
-fn face(nodes: Vec<Near>, domain: &SolveDomain, solution: &Solution, index: usize) -> Result<Face, Fault> {
+fn face(nodes: Vec<Near>, domain: &SolveDomain, solution: &Solution, index: usize) -> Result<FixedFace, Fault> {
     let mut along = [0.0; 3];
     for n in &nodes {
         let j = solution.jacobian(domain.nodes[n.node]);
@@ -147,7 +149,7 @@ fn face(nodes: Vec<Near>, domain: &SolveDomain, solution: &Solution, index: usiz
         );
         return Err(Fault::new(format!("fix[{index}]"), message));
     }
-    Ok(Face { index, nodes, axis, mean: 0.0, whole: 0.0 })
+    Ok(FixedFace { index, nodes, axis, mean: 0.0, whole: 0.0 })
 }
 
 /// The faces of the surface that lie in a region, by the nodes next to each, without slivers.

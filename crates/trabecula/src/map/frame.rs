@@ -3,16 +3,16 @@
 use rayon::prelude::*;
 
 use super::axis::{Axis, constant, toward};
-use super::columns::columns;
 use super::comb::{comb, first_in};
-use super::cube_turns::{cube, nearest};
+use super::cube_rotations::{cube, nearest};
 use super::cut_cells::CutCells;
+use super::grade_values::grade_values;
 use super::load_cases::Stress;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::principal::{Principal, range};
 use super::singular_lines::FrameEquivalence;
 use super::smooth_frames::{Octahedral, Smoothing};
-use super::surface_frames::Surface;
+use super::surface_frames::SurfaceDistances;
 use super::two_axes::TwoAxes;
 use crate::grade::Grade;
 use geometry::fault::Fault;
@@ -36,12 +36,12 @@ impl Orientation {
     /// to the part first, if it is known how far each is `outside` (0 in it), and how sure those of a stress are depends on what is in it.
     pub(super) fn frames(
         &self,
-        grid: &Grid,
+        grid: &PhaseGrid,
         nodes: &[Vec3],
         smoothing: Option<&Smoothing>,
-        surface: Option<&Surface>,
+        surface: Option<&SurfaceDistances>,
         outside: Option<&[f64]>,
-    ) -> Result<Frames, Fault> {
+    ) -> Result<TargetFrames, Fault> {
         let octahedral = surface.is_some() || matches!(self, Orientation::Stress(_) | Orientation::Frame(_));
         if let (Some(smoothing), true) = (smoothing, octahedral) {
             let (own, range) = self.asked(grid, nodes, outside)?;
@@ -60,12 +60,12 @@ impl Orientation {
             if let Orientation::Frame(of) = self {
                 found = of.labelled(found, nodes, start)?;
             }
-            return Ok(Frames { at_nodes: found, trust: Some(averages.trust()), range });
+            return Ok(TargetFrames { at_nodes: found, trust: Some(averages.trust()), range });
         }
-        let sure = |at_nodes| Ok(Frames { at_nodes, trust: None, range: 0.0 });
+        let sure = |at_nodes| Ok(TargetFrames { at_nodes, trust: None, range: 0.0 });
         match self {
             Orientation::Angles(of) => {
-                let angles = columns(of, nodes, "rotate")?;
+                let angles = grade_values(of, nodes, "rotate")?;
                 if constant(of) {
                     return sure(vec![rotation(angles[0]); nodes.len()]);
                 }
@@ -88,14 +88,14 @@ impl Orientation {
                 let turns = cube();
                 let agree = |n: usize, f: &Mat3, to: &Mat3| settled(f, &found[n].own_gaps(range), to, &turns);
                 comb(grid, &mut frames, first_in(outside, least), |n, f| agree(n, f, &IDENTITY), agree);
-                Ok(Frames { at_nodes: frames, trust: None, range })
+                Ok(TargetFrames { at_nodes: frames, trust: None, range })
             }
         }
     }
 
     /// The frames that are asked for at nodes, without signs and order, and the range of a stress in the part. Where cells are not turned
     /// at all, nothing is asked for.
-    fn asked(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Asked, f64), Fault> {
+    fn asked(&self, grid: &PhaseGrid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Asked, f64), Fault> {
         match self {
             Orientation::Stress(_) => {
                 let (found, range) = self.ranged(nodes, outside)?;
@@ -176,7 +176,7 @@ impl Orientation {
     pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3], range: f64) -> Result<Vec<Mat3>, Fault> {
         match self {
             Orientation::Angles(of) => {
-                let angles = columns(of, points, "rotate")?;
+                let angles = grade_values(of, points, "rotate")?;
                 Ok(angles.into_iter().map(rotation).collect())
             }
             Orientation::Direction(of) => {
@@ -200,7 +200,7 @@ impl Orientation {
 type Asked = Box<dyn Fn(usize) -> Octahedral>;
 
 /// Frames at the nodes of a grid.
-pub(super) struct Frames {
+pub(super) struct TargetFrames {
     pub at_nodes: Vec<Mat3>,
     /// How sure they are, from 0 to 1, where that differs.
     pub trust: Option<Vec<f64>>,
@@ -218,7 +218,7 @@ fn no_principal() -> Fault {
 
 /// The frame between those at the nodes about a point, in the branch of the first of them: their mean, made orthonormal; of the nearest
 /// node where they are too far apart for a mean.
-pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], cuts: Option<&CutCells>, p: Vec3) -> Mat3 {
+pub(super) fn interpolated(grid: &PhaseGrid, frames: &[Mat3], cuts: Option<&CutCells>, p: Vec3) -> Mat3 {
     let (mut mean, mut nearest) = ([[0.0; 3]; 3], (0.0, IDENTITY));
     let around = grid.around(p);
     for (n, weight) in around {

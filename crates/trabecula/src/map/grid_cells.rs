@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::math::{Mat3, Vec3, add, scale};
 
 /// The cells of a grid of nodes.
 pub(super) struct GridCells {
-    grid: Grid,
+    grid: PhaseGrid,
     shape: [usize; 3],
 }
 
 impl GridCells {
-    pub fn new(grid: Grid) -> GridCells {
+    pub fn new(grid: PhaseGrid) -> GridCells {
         GridCells { grid, shape: grid.shape.map(|n| n - 1) }
     }
 

@@ -2,21 +2,21 @@
 
 use rayon::prelude::*;
 
-use super::edge_squares::{EdgeSquares, Fit, slopes};
-use super::phase_grid::Grid;
+use super::angle_weight::AngleWeight;
+use super::edge_squares::{EdgeSquares, LeastSquaresSolution, slopes};
+use super::phase_grid::PhaseGrid;
 use super::poisson::Poisson;
-use super::tilt::Tilt;
 use geometry::math::{Mat3, Vec3, add, dot, norm, scale, sub};
 use geometry::progress::Cancellation;
 
 /// The roots of the weights of nodes, and the edges' squares; `None` where all count alike.
-pub(super) type Weights = Option<(Vec<f64>, EdgeSquares)>;
+pub(super) type EdgeWeights = Option<(Vec<f64>, EdgeSquares)>;
 
 /// Targets at the nodes of a grid, and what errors count.
 pub(super) struct Problem<'a> {
-    pub grid: Grid,
+    pub grid: PhaseGrid,
     pub k: &'a [Vec<Vec3>; 3],
-    pub weights: Weights,
+    pub weights: EdgeWeights,
     /// What an error of angle counts.
     pub ratio: f64,
 }
@@ -34,7 +34,7 @@ pub(super) struct Integral {
 
 impl<'a> Problem<'a> {
     /// With the roots of the weights of nodes, if they differ.
-    pub fn new(grid: Grid, k: &'a [Vec<Vec3>; 3], roots: Option<Vec<f64>>, ratio: f64) -> Problem<'a> {
+    pub fn new(grid: PhaseGrid, k: &'a [Vec<Vec3>; 3], roots: Option<Vec<f64>>, ratio: f64) -> Problem<'a> {
         let even = || (ratio != 1.0).then(|| vec![1.0; grid.len()]);
         let weights = roots.or_else(even).map(|roots| {
             let squares = EdgeSquares::new(grid, &roots, None);
@@ -44,18 +44,18 @@ impl<'a> Problem<'a> {
     }
 
     /// What errors across the target of an axis count more or less than those along it.
-    pub fn tilt(&self, axis: usize) -> Option<Tilt> {
-        self.weights.as_ref().and_then(|(roots, _)| Tilt::new(self.grid, &self.k[axis], self.ratio, roots))
+    pub fn tilt(&self, axis: usize) -> Option<AngleWeight> {
+        self.weights.as_ref().and_then(|(roots, _)| AngleWeight::new(self.grid, &self.k[axis], self.ratio, roots))
     }
 
     /// The function whose steps are nearest to slopes along edges.
-    pub fn fit(&self, slopes: &[Vec3], tilt: Option<&Tilt>) -> Vec<f64> {
+    pub fn fit(&self, slopes: &[Vec3], tilt: Option<&AngleWeight>) -> Vec<f64> {
         let start = vec![0.0; slopes.len()];
         self.weights.as_ref().map_or_else(Vec::new, |(_, squares)| squares.fit(slopes, start, tilt).values)
     }
 
     /// The sum of products of two sets of slopes along edges, as errors count.
-    pub fn product(&self, a: &[Vec3], b: &[Vec3], tilt: Option<&Tilt>) -> f64 {
+    pub fn product(&self, a: &[Vec3], b: &[Vec3], tilt: Option<&AngleWeight>) -> f64 {
         self.weights.as_ref().map_or(0.0, |(_, squares)| squares.product(a, b, tilt))
     }
 
@@ -107,7 +107,7 @@ impl<'a> Problem<'a> {
                     None => (poisson.integrate(&rest), 0),
                     Some((_, squares)) => {
                         let tilt = self.tilt(axis);
-                        let Fit { values, steps, .. } =
+                        let LeastSquaresSolution { values, steps, .. } =
                             squares.fit(&slopes(grid, &rest), poisson.integrate(&rest), tilt.as_ref());
                         (values, steps)
                     }

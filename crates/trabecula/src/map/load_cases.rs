@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-use super::columns::columns;
+use super::grade_values::grade_values;
 use super::principal::{Principal, matrix};
 use crate::grade::Grade;
 use crate::kind::Kind;
@@ -75,7 +75,7 @@ impl Stress {
 
     /// The principal directions at points.
     pub(super) fn principal(&self, points: &[Vec3]) -> Result<Vec<Principal>, Fault> {
-        let values = |(of, _): &([Grade; 6], f64)| columns(of, points, "stress");
+        let values = |(of, _): &([Grade; 6], f64)| grade_values(of, points, "stress");
         let all = self.cases.iter().map(values).collect::<Result<Vec<_>, Fault>>()?;
         if let [one] = &all[..] {
             return Ok(one.par_iter().map(Principal::of).collect());
@@ -101,9 +101,9 @@ fn common(tensors: &[([f64; 6], f64)]) -> Principal {
     let all: f64 = tensors.iter().map(|(_, w)| w).sum();
     let weighted: Vec<(Mat3, f64)> = tensors.iter().map(|(t, w)| (matrix(t), w / all)).collect();
     let own: Vec<Principal> = tensors.iter().map(|(t, _)| Principal::of(t)).collect();
-    let mut best = Turned::from(&own[0].frame, &weighted);
+    let mut best = RotatedTensors::from(&own[0].frame, &weighted);
     for p in &own[1..] {
-        let next = Turned::from(&p.frame, &weighted);
+        let next = RotatedTensors::from(&p.frame, &weighted);
         if next.score() > (1.0 + ROUNDING) * best.score() {
             best = next;
         }
@@ -121,17 +121,17 @@ fn common(tensors: &[([f64; 6], f64)]) -> Principal {
 }
 
 /// A frame, and weighted tensors in its coordinates.
-struct Turned {
+struct RotatedTensors {
     frame: Mat3,
     tensors: Vec<(Mat3, f64)>,
 }
 
-impl Turned {
+impl RotatedTensors {
     /// The frame that turns in its planes do not improve, from a first one on.
-    fn from(first: &Mat3, tensors: &[(Mat3, f64)]) -> Turned {
+    fn from(first: &Mat3, tensors: &[(Mat3, f64)]) -> RotatedTensors {
         let back = transpose(first);
         let seen = tensors.iter().map(|(t, w)| (product(&back, &product(t, first)), *w));
-        let mut made = Turned { frame: *first, tensors: seen.collect() };
+        let mut made = RotatedTensors { frame: *first, tensors: seen.collect() };
         for _ in 0..ROUNDS {
             let most = [[1, 2], [0, 2], [0, 1]].map(|[k, l]| made.improve(k, l)).into_iter().fold(0.0, f64::max);
             if most < CHANGE {
@@ -181,7 +181,7 @@ impl Turned {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cube_turns::cube;
+    use super::super::cube_rotations::cube;
     use super::*;
     use geometry::math::{IDENTITY, rotation};
     use geometry::random::random;

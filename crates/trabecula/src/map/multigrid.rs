@@ -27,21 +27,21 @@ const SHARED: usize = 16_384;
 
 /// A grid and the grids coarser than it.
 pub(super) struct Multigrid {
-    levels: Vec<Level>,
+    levels: Vec<GridLevel>,
     /// Values at each node.
     parts: usize,
 }
 
 /// Two nodes, the second of another level where values are interpolated; what that counts; and what values of the first are turned by on
 /// the way to the second.
-struct Link {
+struct Coupling {
     ends: [usize; 2],
     counts: f64,
     turn: Mat3,
 }
 
 /// Σ w (Φⱼ − Φᵢ)² over the edges of a grid, x running fastest, and Σ m Φᵢ² over its nodes.
-pub(super) struct Level {
+pub(super) struct GridLevel {
     shape: [usize; 3],
     /// For the edge above each node along each axis what the square of a difference counts; zero where there is no edge.
     pub edges: [Vec<f64>; 3],
@@ -52,13 +52,13 @@ pub(super) struct Level {
     /// The axes along which the next level has half as many nodes.
     halved: [bool; 3],
     /// Edges along which values turn, which `edges` lacks.
-    turned: Vec<Link>,
+    turned: Vec<Coupling>,
     /// Nodes of the next level whose values turn on the way to nodes of this one.
-    shared: Vec<Link>,
+    shared: Vec<Coupling>,
 }
 
 /// Vectors of one level: the right-hand side, the solution, its last change, and what is left.
-struct Work {
+struct LevelVectors {
     right: Vec<f64>,
     x: Vec<f64>,
     change: Vec<f64>,
@@ -69,7 +69,7 @@ impl Multigrid {
     /// For what the square of a difference along each edge counts, and what that of a node's value does (empty if nothing); `step` is the
     /// length of the edges along each axis.
     pub fn new(shape: [usize; 3], step: [f64; 3], edges: [Vec<f64>; 3], mass: Vec<f64>) -> Multigrid {
-        let (mut levels, mut step) = (vec![Level::new(shape, edges, mass)], step);
+        let (mut levels, mut step) = (vec![GridLevel::new(shape, edges, mass)], step);
         while let Some(coarser) = levels.last_mut().and_then(|l| l.coarsened(&mut step)) {
             levels.push(coarser);
         }
@@ -92,7 +92,7 @@ impl Multigrid {
         self
     }
 
-    pub fn finest(&self) -> &Level {
+    pub fn finest(&self) -> &GridLevel {
         &self.levels[0]
     }
 
@@ -103,11 +103,11 @@ impl Multigrid {
 
     /// A cycle: what takes residuals of the finest level to corrections.
     pub fn cycle(&self) -> impl FnMut(&[f64], &mut [f64]) + '_ {
-        let zeros = |l: &Level| {
+        let zeros = |l: &GridLevel| {
             let zeros = || vec![0.0; self.parts * l.inverse.len()];
-            Work { right: zeros(), x: zeros(), change: zeros(), left: zeros() }
+            LevelVectors { right: zeros(), x: zeros(), change: zeros(), left: zeros() }
         };
-        let mut work: Vec<Work> = self.levels.iter().map(zeros).collect();
+        let mut work: Vec<LevelVectors> = self.levels.iter().map(zeros).collect();
         move |r, z| {
             work[0].right.copy_from_slice(r);
             descend(&self.levels, &mut work);
@@ -116,11 +116,11 @@ impl Multigrid {
     }
 }
 
-fn descend(levels: &[Level], work: &mut [Work]) {
+fn descend(levels: &[GridLevel], work: &mut [LevelVectors]) {
     let ([level, coarser @ ..], [own, below @ ..]) = (levels, work) else { return };
     let ([_, ..], [next, ..]) = (coarser, &mut *below) else { return level.smooth(own, COARSEST, true) };
     level.smooth(own, SMOOTHER, true);
-    let Work { right, x, left, .. } = own;
+    let LevelVectors { right, x, left, .. } = own;
     level.apply(x, left, Some(right));
     level.restrict(&coarser[0], left, &mut next.right);
     descend(coarser, below);
@@ -128,8 +128,8 @@ fn descend(levels: &[Level], work: &mut [Work]) {
     level.smooth(own, SMOOTHER, false);
 }
 
-impl Level {
-    fn new(shape: [usize; 3], edges: [Vec<f64>; 3], mass: Vec<f64>) -> Level {
+impl GridLevel {
+    fn new(shape: [usize; 3], edges: [Vec<f64>; 3], mass: Vec<f64>) -> GridLevel {
         let strides = [1, shape[0], shape[0] * shape[1]];
         let sum = |n: usize| -> f64 {
             let around =
@@ -138,11 +138,11 @@ impl Level {
         };
         let all = shape.iter().product();
         let inverse = (0..all).into_par_iter().map(sum).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
-        Level { shape, edges, mass, inverse, halved: [false; 3], turned: Vec::new(), shared: Vec::new() }
+        GridLevel { shape, edges, mass, inverse, halved: [false; 3], turned: Vec::new(), shared: Vec::new() }
     }
 
     /// The next level; `None` where no axis can be halved.
-    fn coarsened(&mut self, step: &mut [f64; 3]) -> Option<Level> {
+    fn coarsened(&mut self, step: &mut [f64; 3]) -> Option<GridLevel> {
         let long = |a: usize| self.shape[a] >= LEAST;
         let least = (0..3).filter(|a| long(*a)).map(|a| step[a]).fold(f64::INFINITY, f64::min);
         self.halved = core::array::from_fn(|a| long(a) && step[a] < APART * least);
@@ -173,11 +173,11 @@ impl Level {
         };
         let all: usize = shape.iter().product();
         let edges = core::array::from_fn(|a| (0..all).into_par_iter().map(|n| edge(a, n)).collect());
-        let mut next = Level::new(shape, edges, Vec::new());
+        let mut next = GridLevel::new(shape, edges, Vec::new());
         if !self.mass.is_empty() {
             let mut mass = vec![0.0; all];
             self.restrict(&next, &self.mass, &mut mass);
-            next = Level::new(shape, next.edges, mass);
+            next = GridLevel::new(shape, next.edges, mass);
         }
         Some(next)
     }
@@ -206,14 +206,14 @@ impl Level {
         let strides = [1, self.shape[0], self.shape[0] * self.shape[1]];
         for (edges, stride) in self.edges.iter_mut().zip(strides) {
             let link = |(n, counts): (usize, &f64)| link([n, n + stride], *counts, &turn);
-            let found: Vec<Link> = edges.par_iter().enumerate().filter_map(link).collect();
+            let found: Vec<Coupling> = edges.par_iter().enumerate().filter_map(link).collect();
             found.iter().for_each(|l| edges[l.ends[0]] = 0.0);
             self.turned.extend(found);
         }
     }
 
     /// The nodes of this level and those of the next that have a share in them, where values turn on the way.
-    fn interpolated(&self, next: &Level, turn: impl Fn([usize; 2]) -> Option<Mat3> + Sync) -> Vec<Link> {
+    fn interpolated(&self, next: &GridLevel, turn: impl Fn([usize; 2]) -> Option<Mat3> + Sync) -> Vec<Coupling> {
         let ([nx, ny, _], [cx, cy, _]) = (self.shape, next.shape);
         let of = |n: usize| {
             let [x, y, z] = [n % nx, n / nx % ny, n / nx / ny];
@@ -230,7 +230,7 @@ impl Level {
     }
 
     /// The node at which node `n` of the next level is, or the nearest to it.
-    fn under(&self, next: &Level, n: usize) -> usize {
+    fn under(&self, next: &GridLevel, n: usize) -> usize {
         let at = [n % next.shape[0], n / next.shape[0] % next.shape[1], n / next.shape[0] / next.shape[1]];
         let [i, j, k]: [usize; 3] =
             core::array::from_fn(|a| if self.halved[a] { (2 * at[a]).min(self.shape[a] - 1) } else { at[a] });
@@ -244,7 +244,7 @@ impl Level {
             self.apply_untwisted(x, out, right.map(|r| &r[i * len..]));
         }
         let sign = if right.is_some() { -1.0 } else { 1.0 };
-        for Link { ends: [n, m], counts, turn } in &self.turned {
+        for Coupling { ends: [n, m], counts, turn } in &self.turned {
             let off = scale(sub(values(x, len, *n), apply(&transpose(turn), values(x, len, *m))), sign * counts);
             add_to(out, len, *n, off);
             add_to(out, len, *m, scale(apply(turn, off), -1.0));
@@ -286,9 +286,9 @@ impl Level {
 
     /// Improves the solution, or begins it, by a polynomial of D⁻¹A that is least on the eigenvalues from `low` to 2 (Saad, Iterative
     /// methods for sparse linear systems, 2003, algorithm 12.1).
-    fn smooth(&self, work: &mut Work, (degree, low): (usize, f64), anew: bool) {
+    fn smooth(&self, work: &mut LevelVectors, (degree, low): (usize, f64), anew: bool) {
         let (middle, half) = (0.5 * (2.0 + low), 0.5 * (2.0 - low));
-        let Work { right, x, change, left } = work;
+        let LevelVectors { right, x, change, left } = work;
         let mut rho = half / middle;
         for i in 0..degree {
             let (keep, more) = match i {
@@ -325,16 +325,16 @@ impl Level {
     }
 
     /// What a vector of this level is on the next: the transpose of `prolong`.
-    fn restrict(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+    fn restrict(&self, coarser: &GridLevel, from: &[f64], to: &mut [f64]) {
         let [own, next] = [self, coarser].map(|l| l.inverse.len());
         to.chunks_mut(next).zip(from.chunks(own)).for_each(|(to, from)| self.restrict_untwisted(coarser, from, to));
-        for Link { ends: [n, m], counts, turn } in &self.shared {
+        for Coupling { ends: [n, m], counts, turn } in &self.shared {
             let r = values(from, own, *n);
             add_to(to, next, *m, scale(sub(apply(turn, r), r), *counts));
         }
     }
 
-    fn restrict_untwisted(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+    fn restrict_untwisted(&self, coarser: &GridLevel, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
         to.par_chunks_mut(cx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
@@ -352,16 +352,16 @@ impl Level {
     }
 
     /// Adds the trilinear interpolation of a vector of the next level.
-    fn prolong(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+    fn prolong(&self, coarser: &GridLevel, from: &[f64], to: &mut [f64]) {
         let [own, next] = [self, coarser].map(|l| l.inverse.len());
         to.chunks_mut(own).zip(from.chunks(next)).for_each(|(to, from)| self.prolong_untwisted(coarser, from, to));
-        for Link { ends: [n, m], counts, turn } in &self.shared {
+        for Coupling { ends: [n, m], counts, turn } in &self.shared {
             let z = values(from, next, *m);
             add_to(to, own, *n, scale(sub(apply(&transpose(turn), z), z), *counts));
         }
     }
 
-    fn prolong_untwisted(&self, coarser: &Level, from: &[f64], to: &mut [f64]) {
+    fn prolong_untwisted(&self, coarser: &GridLevel, from: &[f64], to: &mut [f64]) {
         let [nx, ny, _] = self.shape;
         let [cx, cy, _] = coarser.shape;
         to.par_chunks_mut(nx).enumerate().with_min_len(SHARED.div_ceil(nx)).for_each(|(row, to)| {
@@ -382,9 +382,9 @@ impl Level {
 }
 
 /// The link between two nodes if it counts anything and values turn along it.
-fn link(ends: [usize; 2], counts: f64, turn: impl Fn([usize; 2]) -> Option<Mat3>) -> Option<Link> {
+fn link(ends: [usize; 2], counts: f64, turn: impl Fn([usize; 2]) -> Option<Mat3>) -> Option<Coupling> {
     let turn = if counts > 0.0 { turn(ends)? } else { return None };
-    Some(Link { ends, counts, turn })
+    Some(Coupling { ends, counts, turn })
 }
 
 /// The three values at a node.

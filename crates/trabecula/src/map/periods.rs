@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::edge_squares::{gradient, slopes};
 use super::integral::Problem;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::region_holes::Hole;
 use super::solution::Solution;
-use super::spline::Spline;
+use super::spline::MapSpline;
 use super::winding::Winding;
 use geometry::dense::{factorise, substitute};
 use geometry::fault::position;
@@ -37,7 +37,7 @@ pub struct Period {
 }
 
 /// What was tried to keep a map from folding: cells round holes.
-pub(super) fn tried(periods: &[Period]) -> String {
+pub(super) fn tried_periods(periods: &[Period]) -> String {
     let one = |p: &Period| {
         let [a, b, c] = p.asked.map(|v| format!("{:.2}", v + 0.0));
         format!("the hole at {} ({a}, {b} and {c} are asked for along the cell's axes)", position(p.at))
@@ -51,7 +51,7 @@ pub(super) fn tried(periods: &[Period]) -> String {
 }
 
 /// The angles about the holes of a region, and their single-valued parts.
-pub(super) struct Angles {
+pub(super) struct HoleAngles {
     holes: Vec<Hole>,
     /// For each hole the functions whose gradients are nearest to ∇θ, one for each axis or one for all.
     fits: Vec<Vec<Vec<f64>>>,
@@ -61,9 +61,9 @@ pub(super) struct Angles {
     asked: [Vec<f64>; 3],
 }
 
-impl Angles {
+impl HoleAngles {
     /// The angles of holes, in addition to the single-valued solution `single` of the whole target.
-    pub fn new(problem: &Problem, holes: Vec<Hole>, single: &[Vec<f64>; 3]) -> Angles {
+    pub fn new(problem: &Problem, holes: Vec<Hole>, single: &[Vec<f64>; 3]) -> HoleAngles {
         let grid = &problem.grid;
         let angles: Vec<Vec<Vec3>> = holes.iter().map(|hole| turns(grid, hole)).collect();
         // Where errors of angle and of spacing count alike, one for all axes.
@@ -85,20 +85,20 @@ impl Angles {
             pairs.map(|(a, b)| problem.product(a, b, tilt.as_ref())).collect::<Vec<f64>>()
         });
         let asked = error.each_ref().map(|m| least(m, holes.len()));
-        Angles { holes, fits, error, asked }
+        HoleAngles { holes, fits, error, asked }
     }
 
     /// The solutions of the best whole numbers, the one with the least error first.
     pub fn solutions<'a>(
         &'a self,
-        grid: &'a Grid,
+        grid: &'a PhaseGrid,
         single: &'a [Vec<f64>; 3],
     ) -> impl Iterator<Item = (Solution, Vec<Period>)> + 'a {
         self.choices().into_iter().map(move |cells| self.solution(grid, single, &cells))
     }
 
     /// The solution for whole numbers of cells, for each axis and hole.
-    fn solution(&self, grid: &Grid, single: &[Vec<f64>; 3], cells: &[Vec<i64>; 3]) -> (Solution, Vec<Period>) {
+    fn solution(&self, grid: &PhaseGrid, single: &[Vec<f64>; 3], cells: &[Vec<i64>; 3]) -> (Solution, Vec<Period>) {
         checkpoint();
         let values = core::array::from_fn(|i| {
             let mut values = single[i].clone();
@@ -115,7 +115,7 @@ impl Angles {
         });
         let core = CORE * grid.step.into_iter().fold(f64::INFINITY, f64::min);
         let solution =
-            Solution { spline: Spline::through(*grid, values), winding: Winding::new(lines, core), branches: None };
+            Solution { spline: MapSpline::through(*grid, values), winding: Winding::new(lines, core), branches: None };
         let periods = self.holes.iter().enumerate().map(|(h, hole)| {
             let (at, along) = hole.lines[0].place();
             Period { at, along, cells: round(h), asked: [0, 1, 2].map(|i| self.asked[i][h]) }
@@ -140,7 +140,7 @@ impl Angles {
 
 /// The slopes of the angle about a hole along the edges above the nodes, turns per mm: exact steps but for whole numbers, which an edge
 /// does not turn by.
-fn turns(grid: &Grid, hole: &Hole) -> Vec<Vec3> {
+fn turns(grid: &PhaseGrid, hole: &Hole) -> Vec<Vec3> {
     let angle = |n: usize| hole.lines.iter().map(|line| line.angle(grid.node(n))).sum();
     let mut slopes = gradient(grid, &(0..grid.len()).into_par_iter().map(angle).collect::<Vec<f64>>());
     slopes.par_iter_mut().for_each(|s| {

@@ -7,25 +7,25 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::covering::{Cores, Covered};
+use super::core_solve::{Cores, Covered};
 use super::distortion::{self, Distortion, Misfit};
 use super::edge_squares::EdgeSquares;
 use super::fixed_faces::fixed;
+use super::fold_advice::{folded, remedy};
+use super::grid_choice;
 use super::integral::{Integral, Problem};
-use super::pace;
-use super::periods::{Angles, Period, tried};
+use super::periods::{HoleAngles, Period, tried_periods};
 use super::phase_candidate::Candidate;
 use super::phase_request::{PhaseRequest, SolverOptions};
 use super::phase_target::{SolveDomain, Target};
 use super::region_holes::{HoleSearch, MOST};
-use super::remedy::{folded, remedy};
 use super::singular_lines::{SingularLine, singular_lines};
 use super::solution::Solution;
 use super::solution_quality::{SolutionQuality, fold_at_node, fold_between, targets};
-use super::spline::Spline;
+use super::spline::MapSpline;
 use super::stretch::{MARGINS, Stretch, bounded};
 use super::winding::Winding;
-use super::{Mapping, Rows};
+use super::{Mapping, PhaseRows};
 use crate::field::{Block, Field};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, norm, scale, spectral_norm};
@@ -61,7 +61,7 @@ pub struct Phase {
     distortion: Distortion,
     extremes: [Mat3; 2],
     steps: usize,
-    hasty: Option<String>,
+    undersampled: Option<String>,
     frames: OnceLock<Arc<[Mat3]>>,
     /// How far nodes are outside the region, mm, if they are made again.
     outside: Option<Vec<f64>>,
@@ -97,7 +97,7 @@ impl Phase {
     }
 
     fn solved_once(bounds: &Aabb, wanted: &PhaseRequest, settings: &SolverOptions) -> Result<Phase, Fault> {
-        let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
+        let chosen = grid_choice::choose(bounds, wanted, settings.step, settings.region)?;
         // A part mostly touches its bounds: there cells are held within a range only if the grid has some on both sides.
         let grid = match (wanted.stretch, settings.region) {
             (Some(_), Some(_)) => chosen.grid.padded(PADDING),
@@ -107,7 +107,7 @@ impl Phase {
         checkpoint();
         let target = Target::new(&domain, wanted)?;
         checkpoint();
-        pace::check_pace(&domain.grid, &wanted.wavelength, &domain.given, &domain.inside)?;
+        grid_choice::check_pace(&domain.grid, &wanted.wavelength, &domain.given, &domain.inside)?;
         chosen.refuse()?;
         let ratio = wanted.ratio()?;
         checkpoint();
@@ -120,7 +120,7 @@ impl Phase {
             };
             if let Some(Covered { domain, mut found, lines, cores }) = covered {
                 found.quality.distortion.singular = lines;
-                let made = Phase::of(bounds, wanted, settings, (domain, found), (chosen.hasty, String::new()))?;
+                let made = Phase::of(bounds, wanted, settings, (domain, found), (chosen.undersampled, String::new()))?;
                 return Ok(Phase { cores: Some(cores), ..made });
             }
         }
@@ -128,7 +128,7 @@ impl Phase {
         let (Integral { values, mean, steps }, weights) = (problem.solve(), problem.weights);
         checkpoint();
         let solution =
-            Solution { spline: Spline::through(domain.grid, values), winding: Winding::default(), branches: None };
+            Solution { spline: MapSpline::through(domain.grid, values), winding: Winding::default(), branches: None };
         let quality = SolutionQuality::of(&domain, wanted, settings.region, &target, &solution)?;
         let mut found = Candidate { target, weights, solution, periods: Vec::new(), mean, steps, quality };
         let mut tried = String::new();
@@ -146,7 +146,7 @@ impl Phase {
             found = found.fixed(&domain, wanted, region)?;
         }
         found.quality.distortion.singular = lines(&domain, wanted, &found.target);
-        Phase::of(bounds, wanted, settings, (domain, found), (chosen.hasty, tried))
+        Phase::of(bounds, wanted, settings, (domain, found), (chosen.undersampled, tried))
     }
 
     /// The map of what was found, if it does not fold.
@@ -155,7 +155,7 @@ impl Phase {
         wanted: &PhaseRequest,
         settings: &SolverOptions,
         (domain, found): (SolveDomain, Candidate),
-        (hasty, mut tried): (Option<String>, String),
+        (undersampled, mut tried): (Option<String>, String),
     ) -> Result<Phase, Fault> {
         let wavelength = found.target.wavelength(&domain);
         let mean_length = mean_within(&domain.inside, wavelength);
@@ -171,7 +171,7 @@ impl Phase {
             tried += &distortion.winds();
             return Err(folded(p, &remedy(wanted, lengths_range[1], false, &distortion.singular), &tried));
         }
-        let hasty = hasty.or_else(|| pace::thin(&domain.grid, found.quality.deepest));
+        let undersampled = undersampled.or_else(|| grid_choice::thin(&domain.grid, found.quality.deepest));
         let Candidate {
             target,
             solution,
@@ -205,7 +205,7 @@ impl Phase {
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
-            hasty,
+            undersampled,
             frames: if keep { OnceLock::from(Arc::<[Mat3]>::from(frames)) } else { OnceLock::new() },
             outside: outside.filter(|_| !keep),
             lengths,
@@ -287,8 +287,8 @@ impl Phase {
     }
 
     /// A target that varies faster than cells of its size can, in words; `None` where the solution's grid carries it.
-    pub fn hasty(&self) -> Option<&str> {
-        self.hasty.as_deref()
+    pub fn undersampled(&self) -> Option<&str> {
+        self.undersampled.as_deref()
     }
 
     /// What makes its directions vary more slowly, in words.
@@ -362,7 +362,7 @@ impl Mapping for Phase {
         self.searched(b)
     }
 
-    fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
+    fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn PhaseRows + 'a> {
         self.solution.rows(block, self.shift)
     }
 }
@@ -475,7 +475,7 @@ fn closed(
     let squares = EdgeSquares::new(domain.grid, &roots(f64::INFINITY)?, Some(&domain.depth));
     let problem = Problem { grid: domain.grid, k: &target.k, weights: Some((roots(SHARP)?, squares)), ratio };
     let Integral { values, mean, steps } = problem.solve();
-    let angles = Angles::new(&problem, holes, &values);
+    let angles = HoleAngles::new(&problem, holes, &values);
     let weights = problem.weights;
     let mut first = None;
     for (solution, periods) in angles.solutions(&domain.grid, &values) {
@@ -483,14 +483,14 @@ fn closed(
         if fold_at_node(&solution, domain).or_else(|| fold_between(&solution, &domain.inside)).is_none() {
             let quality = SolutionQuality::of(domain, wanted, settings.region, target, &solution)?;
             if quality.fold.is_none() {
-                let (words, target) = (tried(&periods), target.clone());
+                let (words, target) = (tried_periods(&periods), target.clone());
                 return Ok((Some(Candidate { target, weights, solution, periods, mean, steps, quality }), words));
             }
         }
         first.get_or_insert((solution, periods));
     }
     let Some((solution, periods)) = first else { return Ok((None, String::new())) };
-    let words = tried(&periods);
+    let words = tried_periods(&periods);
     if !settings.folds && wanted.stretch.is_none() {
         return Ok((None, words));
     }

@@ -1,6 +1,6 @@
 //! A solution of phases, and what it was found for.
 
-use super::integral::Weights;
+use super::integral::EdgeWeights;
 use super::periods::Period;
 use super::phase_target::Target;
 use super::solution::Solution;
@@ -11,7 +11,7 @@ use geometry::math::Mat3;
 pub(super) struct Candidate {
     pub target: Target,
     /// What errors count.
-    pub weights: Weights,
+    pub weights: EdgeWeights,
     pub solution: Solution,
     pub periods: Vec<Period>,
     /// The mean of the rows of K.

@@ -4,28 +4,28 @@ use geometry::math::{Aabb, Vec3};
 
 /// Nodes origin + step · (i, j, k), 0 ≤ i < shape, x running fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grid {
+pub(super) struct PhaseGrid {
     pub origin: Vec3,
     pub step: Vec3,
     pub shape: [usize; 3],
 }
 
-impl Grid {
+impl PhaseGrid {
     /// A grid over the box with `nodes` nodes along each axis (at least two).
-    pub fn over(b: &Aabb, shape: [usize; 3]) -> Grid {
+    pub fn over(b: &Aabb, shape: [usize; 3]) -> PhaseGrid {
         let size = b.size();
-        Grid { origin: b.min, step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape }
+        PhaseGrid { origin: b.min, step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape }
     }
 
     /// The same with more nodes on each side.
-    pub fn padded(&self, by: usize) -> Grid {
+    pub fn padded(&self, by: usize) -> PhaseGrid {
         let origin = core::array::from_fn(|a| self.origin[a] - by as f64 * self.step[a]);
-        Grid { origin, step: self.step, shape: self.shape.map(|n| n + 2 * by) }
+        PhaseGrid { origin, step: self.step, shape: self.shape.map(|n| n + 2 * by) }
     }
 
     /// The grid of every other node, from the first one on, and the numbers of its nodes in this one.
-    pub fn halved(&self) -> (Grid, Vec<usize>) {
-        let half = Grid { step: self.step.map(|s| 2.0 * s), shape: self.shape.map(|n| n.div_ceil(2)), ..*self };
+    pub fn halved(&self) -> (PhaseGrid, Vec<usize>) {
+        let half = PhaseGrid { step: self.step.map(|s| 2.0 * s), shape: self.shape.map(|n| n.div_ceil(2)), ..*self };
         let strides = self.strides();
         let here = |n: usize| half.index(n).into_iter().zip(strides).map(|(i, s)| 2 * i * s).sum();
         (half, (0..half.len()).map(here).collect())
@@ -96,7 +96,7 @@ impl Grid {
     }
 
     /// The number (from 2·3·5-smooth lengths plus one, so that transforms are fast) at or above `n`.
-    pub fn handy(n: usize) -> usize {
+    pub fn fft_friendly(n: usize) -> usize {
         let smooth = |mut m: usize| {
             for p in [2, 3, 5] {
                 while m.is_multiple_of(p) {

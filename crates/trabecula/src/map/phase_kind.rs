@@ -2,8 +2,8 @@
 
 use super::stress_kind::{StressKind, each};
 use super::{
-    Aligned, Axis, BuildMap, CoreFill, Covering, Map, NO_WAVELENGTH, Orientation, Phase, PhaseRequest, SolverOptions,
-    Stretch, TwoAxes, given_twice, shared,
+    Aligned, Axis, BuildMap, CoreFill, CoreOptions, Map, NO_WAVELENGTH, Orientation, Phase, PhaseRequest,
+    SolverOptions, Stretch, TwoAxes, given_twice, shared,
 };
 use crate::environment::Environment;
 use crate::field::Field;
@@ -298,14 +298,14 @@ impl PhaseKind {
     }
 
     /// How singular lines are covered.
-    fn covering(&self) -> Result<Option<Covering>, Fault> {
+    fn covering(&self) -> Result<Option<CoreOptions>, Fault> {
         match (self.core, self.core_radius) {
             (None, Some(radius)) => {
                 let message =
                     "core_radius is how far core reaches; give core = \"solid\" or \"void\" as well, or leave it out";
                 Err(Fault::new("core_radius", message).found(number(radius)))
             }
-            (fill, radius) => Ok(fill.map(|fill| Covering { fill, radius })),
+            (fill, radius) => Ok(fill.map(|fill| CoreOptions { fill, radius })),
         }
     }
 

@@ -1,8 +1,8 @@
 //! What a solved map is asked for, and how it is solved for.
 
-use super::core_cover::Covering;
-use super::cube_turns::cube;
+use super::cube_rotations::cube;
 use super::frame::Orientation;
+use super::singular_core::CoreOptions;
 use super::singular_lines::FrameEquivalence;
 use super::stretch::Stretch;
 use super::surface_frames::Aligned;
@@ -39,7 +39,7 @@ pub struct PhaseRequest {
     /// Moves the lattice (mm).
     pub offset: Vec3,
     /// How singular lines are covered, if they are.
-    pub core: Option<Covering>,
+    pub core: Option<CoreOptions>,
 }
 
 impl PhaseRequest {

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::frame::Frames;
-use super::phase_grid::Grid;
+use super::frame::TargetFrames;
+use super::phase_grid::PhaseGrid;
 use super::phase_request::PhaseRequest;
 use super::principal_lengths::along_axes;
 use super::smooth_frames::Smoothing;
-use super::surface_frames::Surface;
+use super::surface_frames::SurfaceDistances;
 use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number, position};
@@ -25,7 +25,7 @@ pub(super) const LEAST_ROOT: f64 = 1e-3;
 /// A grid over a region, and the wavelengths at its nodes.
 pub(super) struct SolveDomain {
     pub bounds: Aabb,
-    pub grid: Grid,
+    pub grid: PhaseGrid,
     pub nodes: Vec<Vec3>,
     /// The points of the bounds nearest to nodes, where nodes are beyond them: what is asked for is known there.
     pub clamped: Option<Vec<Vec3>>,
@@ -34,7 +34,7 @@ pub(super) struct SolveDomain {
     /// Whether nodes are in the region.
     pub inside: Vec<bool>,
     /// The surface that cells are aligned with, if they are.
-    pub surface: Option<Surface>,
+    pub surface: Option<SurfaceDistances>,
     /// The wavelengths that are given, mm.
     pub given: Vec<Vec3>,
 }
@@ -42,7 +42,7 @@ pub(super) struct SolveDomain {
 impl SolveDomain {
     pub fn over(
         bounds: &Aabb,
-        grid: Grid,
+        grid: PhaseGrid,
         wanted: &PhaseRequest,
         region: Option<&dyn Field>,
     ) -> Result<SolveDomain, Fault> {
@@ -56,7 +56,7 @@ impl SolveDomain {
         if let Some(region) = region {
             depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096)).for_each(|(d, p)| region.values(p, d));
         }
-        let surface = wanted.align.zip(region).map(|(within, region)| Surface::of(region, &nodes, within));
+        let surface = wanted.align.zip(region).map(|(within, region)| SurfaceDistances::of(region, &nodes, within));
         let reach = reach(bounds);
         let inside = |(p, d): (&Vec3, &f64)| {
             *d < -reach || *d <= reach && region.is_none_or(|region| touches(region, *p, reach))
@@ -183,7 +183,7 @@ impl Target {
         let combed = wanted.orientation.is_combed() || domain.surface.is_some();
         let outside = if combed { domain.outside() } else { None };
         let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
-        let Frames { at_nodes: frames, trust, range } = wanted.orientation.frames(
+        let TargetFrames { at_nodes: frames, trust, range } = wanted.orientation.frames(
             &domain.grid,
             domain.asked_at(),
             smoothing.as_ref(),
@@ -262,7 +262,8 @@ mod tests {
         let wanted = PhaseRequest::new(of(2.0), Orientation::Angles(of(0.0)));
         let bounds = block.bounds();
         let inside = |region: Difference| {
-            let domain = SolveDomain::over(&bounds, Grid::over(&bounds, [33, 33, 13]), &wanted, Some(&region)).unwrap();
+            let domain =
+                SolveDomain::over(&bounds, PhaseGrid::over(&bounds, [33, 33, 13]), &wanted, Some(&region)).unwrap();
             domain.inside
         };
         let (ends, through) = (inside(plate(0.0)), inside(plate(1.0)));

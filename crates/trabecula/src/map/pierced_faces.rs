@@ -3,7 +3,7 @@
 //! Through a cell a line goes from the middle of a face to the middle of another. Where a cell has more than two pierced faces, lines of the
 //! same turn pass it two faces each, opposite ones first, by way of the mean of the middles; what is left over ends there.
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
 /// A face that a line pierces: its first node, the axis along which it is pierced, the turn once round it.
@@ -25,7 +25,7 @@ enum Next {
 }
 
 /// The lines through faces, each from end to end with its turn; a closed one repeats its first point.
-pub(super) fn polylines(grid: &Grid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, f64)> {
+pub(super) fn polylines(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, f64)> {
     let middle = |i: usize| grid.face_middle(faces[i].node, faces[i].axis);
     let next = links(grid, faces);
     let mut seen = vec![false; faces.len()];
@@ -65,7 +65,7 @@ pub(super) fn polylines(grid: &Grid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, f64)>
 }
 
 /// How lines go on from each face, on both sides.
-fn links(grid: &Grid, faces: &[Pierced]) -> Vec<[Next; 2]> {
+fn links(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<[Next; 2]> {
     let sides = |(i, f): (usize, &Pierced)| {
         let cells = grid.cells_of_face(f.node, f.axis);
         [0, 1].into_iter().filter_map(move |side| cells[side].map(|c| (c, i, side)))
@@ -139,8 +139,8 @@ mod tests {
     use super::*;
     use geometry::math::Aabb;
 
-    fn grid() -> Grid {
-        Grid::over(&Aabb { min: [0.0; 3], max: [6.0; 3] }, [7; 3])
+    fn grid() -> PhaseGrid {
+        PhaseGrid::over(&Aabb { min: [0.0; 3], max: [6.0; 3] }, [7; 3])
     }
 
     /// The faces whose middles are these, in any order.

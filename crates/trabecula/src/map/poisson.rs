@@ -9,13 +9,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::math::Vec3;
 use geometry::progress::checkpoint;
 
 /// The mirrored second difference on a grid, and its inverse.
 pub(super) struct Poisson {
-    grid: Grid,
+    grid: PhaseGrid,
     /// Transforms of twice the length less two, one for each axis. Scalar ones: the same bits on every processor.
     plans: [Arc<dyn Fft<f64>>; 3],
     /// 2 (1 − cos(π m / (n − 1))) / h² for each axis.
@@ -23,7 +23,7 @@ pub(super) struct Poisson {
 }
 
 impl Poisson {
-    pub fn new(grid: Grid) -> Poisson {
+    pub fn new(grid: PhaseGrid) -> Poisson {
         let mut planner = FftPlannerScalar::new();
         let plans = grid.shape.map(|n| planner.plan_fft(2 * (n - 1), FftDirection::Forward));
         let modes = core::array::from_fn(|a| {
@@ -172,9 +172,9 @@ mod tests {
         move || geometry::random::random(&mut s)
     }
 
-    fn grid(shape: [usize; 3], size: Vec3) -> Grid {
+    fn grid(shape: [usize; 3], size: Vec3) -> PhaseGrid {
         let b = Aabb { min: [-1.0, 0.5, 2.0], max: core::array::from_fn(|a| [-1.0, 0.5, 2.0][a] + size[a]) };
-        Grid::over(&b, shape)
+        PhaseGrid::over(&b, shape)
     }
 
     fn largest(a: &[f64], b: &[f64]) -> f64 {

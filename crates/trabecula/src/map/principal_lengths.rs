@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::frame::DOUBT;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::principal::Principal;
 use super::smooth_frames::{Smoothing, trusted};
 use geometry::math::{Mat3, Vec3, exp, transpose};
@@ -16,7 +16,7 @@ use geometry::math::{Mat3, Vec3, exp, transpose};
 /// The lengths along the axes of the frames at nodes, of those along the principal directions of a stress in descending order of its
 /// values (tension positive); smoothed as the frames are.
 pub(super) fn along_axes(
-    grid: &Grid,
+    grid: &PhaseGrid,
     of: &[Principal],
     range: f64,
     lengths: &[Vec3],

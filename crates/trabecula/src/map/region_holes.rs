@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::cohomology::{Cohomology, cohomology, holes, reduce};
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::winding::{Filament, to_segment};
 use crate::field::Field;
 use geometry::math::{Vec3, add, cross, dot, eigen, norm, scale, sin_cos_turns, sub};
@@ -29,7 +29,7 @@ pub(super) struct Hole {
 
 /// Where holes are looked for: a region on a grid, with the distance from it at each node.
 pub(super) struct HoleSearch<'a> {
-    pub grid: &'a Grid,
+    pub grid: &'a PhaseGrid,
     pub depth: &'a [f64],
     pub region: &'a dyn Field,
 }
@@ -53,7 +53,7 @@ impl HoleSearch<'_> {
     pub fn all(&self) -> Vec<Hole> {
         let mut found = cohomology(self.grid, &self.inside());
         rebase(self.grid, &mut found);
-        let shape = Shape { grid: self.grid, region: self.region, step: self.step() };
+        let shape = SampledRegion { grid: self.grid, region: self.region, step: self.step() };
         let lines = |found: &Cohomology, k: usize| -> Vec<Filament> {
             runs(self.grid, found, k).iter().map(|run| shape.filament(run)).collect()
         };
@@ -74,12 +74,12 @@ impl HoleSearch<'_> {
 }
 
 /// The cells below and above a face, by their first nodes; `None` beyond the grid.
-fn sides(grid: &Grid, face: usize) -> [Option<usize>; 2] {
+fn sides(grid: &PhaseGrid, face: usize) -> [Option<usize>; 2] {
     grid.cells_of_face(face / 3, face % 3)
 }
 
 /// Changes the basis so that long runs of faces are round one hole each.
-fn rebase(grid: &Grid, found: &mut Cohomology) {
+fn rebase(grid: &PhaseGrid, found: &mut Cohomology) {
     // Runs between cubes where others join, and how many faces they have.
     let mut cubes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for face in found.pierced.keys() {
@@ -124,10 +124,10 @@ fn rebase(grid: &Grid, found: &mut Cohomology) {
 }
 
 /// Faces in the order of a line through them, each with the sense in which it is passed.
-type Run = Vec<(usize, bool)>;
+type FaceSequence = Vec<(usize, bool)>;
 
 /// The lines of a hole: through the grid from beyond it to beyond it, or closed.
-fn runs(grid: &Grid, found: &Cohomology, k: usize) -> Vec<Run> {
+fn runs(grid: &PhaseGrid, found: &Cohomology, k: usize) -> Vec<FaceSequence> {
     let mut left: BTreeMap<usize, i64> =
         found.pierced.iter().map(|(f, v)| (*f, v[k])).filter(|(_, v)| *v != 0).collect();
     let mut runs = Vec::new();
@@ -139,7 +139,7 @@ fn runs(grid: &Grid, found: &Cohomology, k: usize) -> Vec<Run> {
         let start = left.iter().find(|(f, v)| enters(**f, **v).0.is_none()).or(left.iter().next());
         let Some((mut face, mut flow)) = start.map(|(f, v)| (*f, *v)) else { return runs };
         let first = enters(face, flow).0;
-        let mut run = Run::new();
+        let mut run = FaceSequence::new();
         loop {
             run.push((face, flow > 0));
             let rest = flow - flow.signum();
@@ -162,15 +162,15 @@ fn runs(grid: &Grid, found: &Cohomology, k: usize) -> Vec<Run> {
 }
 
 /// What lines are measured against.
-struct Shape<'a> {
-    grid: &'a Grid,
+struct SampledRegion<'a> {
+    grid: &'a PhaseGrid,
     region: &'a dyn Field,
     step: f64,
 }
 
-impl Shape<'_> {
+impl SampledRegion<'_> {
     /// The line through the middles of faces: straight where it nearly is, or else with as few points as follow it within a step.
-    fn filament(&self, run: &Run) -> Filament {
+    fn filament(&self, run: &FaceSequence) -> Filament {
         let points: Vec<Vec3> = run.iter().map(|(f, _)| self.grid.face_middle(f / 3, f % 3)).collect();
         let along = |(face, up): (usize, bool), out: f64| {
             let mut d = [0.0; 3];

@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-use super::cube_turns::{is_near, nearest};
-use super::phase_grid::Grid;
+use super::cube_rotations::{is_near, nearest};
+use super::phase_grid::PhaseGrid;
 use super::pierced_faces::{Pierced, length, matched, polylines};
 use geometry::math::{IDENTITY, Mat3, Vec3, add, dot, norm, product, scale, sub, transpose};
 
@@ -61,7 +61,7 @@ impl SingularLine {
 /// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid; those that
 /// run within `near` mm of each other, or two steps, are one.
 pub(super) fn singular_lines(
-    grid: &Grid,
+    grid: &PhaseGrid,
     frames: &[Mat3],
     inside: &[bool],
     alike: &FrameEquivalence,
@@ -222,8 +222,8 @@ mod tests {
         FrameEquivalence::Turned(vec![IDENTITY])
     }
 
-    fn grid() -> Grid {
-        Grid::over(&Aabb { min: [-5.0, -4.0, 0.0], max: [6.0, 5.0, 8.0] }, [24, 22, 18])
+    fn grid() -> PhaseGrid {
+        PhaseGrid::over(&Aabb { min: [-5.0, -4.0, 0.0], max: [6.0, 5.0, 8.0] }, [24, 22, 18])
     }
 
     fn found(
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn disclinations_are_at_their_place() {
-        let quarter = FrameEquivalence::Turned(crate::map::cube_turns::cube());
+        let quarter = FrameEquivalence::Turned(crate::map::cube_rotations::cube());
         for (alike, index, turn) in [
             (&FrameEquivalence::Line, 0.5, 180.0),
             (&quarter, 0.5, 180.0),
@@ -273,7 +273,7 @@ mod tests {
     /// Where the line lies in a hole of the part there is none, nor in a field that turns by less.
     #[test]
     fn there_is_none_in_a_hole() {
-        let quarter = FrameEquivalence::Turned(crate::map::cube_turns::cube());
+        let quarter = FrameEquivalence::Turned(crate::map::cube_rotations::cube());
         let hole = |[x, _, z]: Vec3| (x - 0.7).hypot(z - 3.3) > 1.0;
         assert_eq!(found(&quarter, about(0.25), hole), []);
         let slow = |p: Vec3| rotation([20.0 * p[0], 5.0 * p[1] * p[2], -8.0 * p[0]]);
@@ -285,7 +285,7 @@ mod tests {
     /// Signs and axes of the frames do not count, whatever each node has.
     #[test]
     fn arbitrary_axes_change_nothing() {
-        let turns = crate::map::cube_turns::cube();
+        let turns = crate::map::cube_rotations::cube();
         let quarter = FrameEquivalence::Turned(turns.clone());
         let mut s = 3u64;
         let mut any: Vec<usize> =

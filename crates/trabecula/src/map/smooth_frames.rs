@@ -9,8 +9,8 @@
 //! The average at a node is φ = (1 − ℓ²Δ)⁻¹ (c q), with the confidence c of each node: it falls off as e^{−d/ℓ}, and only its direction
 //! counts. With mirrored faces the cosines of the DCT-I are the eigenvectors, so a component is one transform forth and back.
 
-use super::cube_turns::{cube, nearest};
-use super::phase_grid::Grid;
+use super::cube_rotations::{cube, nearest};
+use super::phase_grid::PhaseGrid;
 use super::poisson::Poisson;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, cross, determinant, dot, norm, rotation, scale, sub, transpose};
 use geometry::progress::checkpoint;
@@ -38,7 +38,7 @@ pub(super) struct Smoothing<'a> {
 
 impl Smoothing<'_> {
     /// The averages of several components of each node, the component that a node has multiplied by its weight.
-    pub fn averages<const N: usize>(&self, grid: &Grid, values: &[[f64; N]]) -> Vec<[f64; N]> {
+    pub fn averages<const N: usize>(&self, grid: &PhaseGrid, values: &[[f64; N]]) -> Vec<[f64; N]> {
         let (poisson, shift) = (Poisson::new(*grid), 1.0 / (self.length * self.length));
         let mut out = vec![[0.0; N]; values.len()];
         let mut one = Vec::with_capacity(values.len());
@@ -53,12 +53,12 @@ impl Smoothing<'_> {
     }
 
     /// The tensors v vᵀ (11, 22, 33, 23, 13, 12) of axes, averaged.
-    pub fn axes(&self, grid: &Grid, tensors: &[[f64; 6]]) -> Vec<[f64; 6]> {
+    pub fn axes(&self, grid: &PhaseGrid, tensors: &[[f64; 6]]) -> Vec<[f64; 6]> {
         self.averages(grid, tensors)
     }
 
     /// The frames at the nodes, averaged.
-    pub fn frames(&self, grid: &Grid, frame: impl Fn(usize) -> Octahedral) -> Averages {
+    pub fn frames(&self, grid: &PhaseGrid, frame: impl Fn(usize) -> Octahedral) -> Averages {
         let own: Vec<[f64; 10]> = (0..grid.len()).map(|n| frame(n).0).collect();
         let all = self.averages(grid, &own);
         let most = all.iter().fold(0.0f64, |m, q| m.max(q[9]));

@@ -2,24 +2,24 @@
 
 use rayon::prelude::*;
 
-use super::Rows;
+use super::PhaseRows;
 use super::cut_cells::CutCells;
-use super::phase_grid::Grid;
-use super::spline::{self, Spline};
+use super::phase_grid::PhaseGrid;
+use super::spline::{self, MapSpline};
 use super::winding::Winding;
 use crate::field::Block;
 use geometry::math::{Aabb, Mat3, Vec3, add};
 
 /// Three phases (turns) of position (mm), but for a constant.
 pub(super) struct Solution {
-    pub spline: Spline,
+    pub spline: MapSpline,
     pub winding: Winding,
     /// The cells in which phases have branches of their own, where lines are covered.
     pub branches: Option<CutCells>,
 }
 
 impl Solution {
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &PhaseGrid {
         self.spline.grid()
     }
 
@@ -78,7 +78,7 @@ impl Solution {
     }
 
     /// The phases along the rows of a block, moved by `shift`.
-    pub fn rows<'a>(&'a self, block: &Block<'a>, shift: Vec3) -> Box<dyn Rows + 'a> {
+    pub fn rows<'a>(&'a self, block: &Block<'a>, shift: Vec3) -> Box<dyn PhaseRows + 'a> {
         let Solution { spline, winding, branches } = self;
         Box::new(SolutionRows {
             rows: spline.rows(block),
@@ -98,7 +98,7 @@ impl Solution {
 
 /// The phases of a solved map along the rows of a block.
 struct SolutionRows<'a> {
-    rows: spline::Rows<'a>,
+    rows: spline::SplineRows<'a>,
     winding: &'a Winding,
     branches: Option<&'a CutCells>,
     block: Block<'a>,
@@ -106,7 +106,7 @@ struct SolutionRows<'a> {
     shift: Vec3,
 }
 
-impl Rows for SolutionRows<'_> {
+impl PhaseRows for SolutionRows<'_> {
     fn enter_layer(&mut self, k: usize) {
         self.layer = k;
         self.rows.enter_layer(k);

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::cut_cells::CutCells;
-use super::distortion::{self, Distortion, Frames};
+use super::distortion::{self, Distortion, FrameField};
 use super::frame;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::phase_request::PhaseRequest;
 use super::phase_target::{SolveDomain, Target, wavelengths};
 use super::solution::Solution;
@@ -70,7 +70,7 @@ impl SolutionQuality {
         let whole = |n: &&usize| cuts.is_none_or(|c| !c.is_near(**n));
         let curl: Vec<f64> = (compared.par_iter()).filter(whole).map(|&n| distortion::curl(grid, k, n)).collect();
         let longest = wavelength.iter().flatten().fold(0.0, |m: f64, w| m.max(*w));
-        let turn = Frames { grid, frames: &target.frames, cuts, inside }.turning(longest);
+        let turn = FrameField { grid, frames: &target.frames, cuts, inside }.turning(longest);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);
@@ -113,7 +113,7 @@ pub(super) fn fold_between(solution: &Solution, inside: &[bool]) -> Option<Vec3>
 
 /// Where a solution is compared with its target: nodes in the region, and points in the region, one in a cell of the grid.
 pub(super) fn compared(
-    grid: &Grid,
+    grid: &PhaseGrid,
     depth: &[f64],
     inside: &[bool],
     region: Option<&dyn Field>,
@@ -156,7 +156,7 @@ fn those_in(region: &dyn Field, points: Vec<Vec3>) -> Vec<Vec3> {
 }
 
 /// Points throughout a region that is small or thin for a grid; of one that hardly any point hits, those of its surface.
-fn scattered(grid: &Grid, region: &dyn Field) -> Vec<Vec3> {
+fn scattered(grid: &PhaseGrid, region: &dyn Field) -> Vec<Vec3> {
     let size = |a: usize| grid.step[a] * (grid.shape[a] - 1) as f64;
     let at = |i: usize| core::array::from_fn(|a| grid.origin[a] + low_discrepancy(i + 1)[a] * size(a));
     let tried: Vec<Vec3> = (0..BETWEEN).map(at).collect();
@@ -178,7 +178,7 @@ fn scattered(grid: &Grid, region: &dyn Field) -> Vec<Vec3> {
 pub(super) fn targets(
     wanted: &PhaseRequest,
     range: f64,
-    grid: &Grid,
+    grid: &PhaseGrid,
     frames: &[Mat3],
     lengths: Option<&[Vec3]>,
     cuts: Option<&CutCells>,

@@ -6,9 +6,9 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use crate::field::Block;
-use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
+use geometry::cubic_spline::{EndCondition, coefficients, slopes, weights};
 use geometry::math::{Aabb, Mat3, Vec3, spectral_norm};
 
 /// Fewest nodes along an axis.
@@ -18,8 +18,8 @@ pub(super) const LEAST: usize = 6;
 const BLOCK: usize = 4;
 
 /// A map u(x) through values at the nodes of a grid.
-pub(super) struct Spline {
-    grid: Grid,
+pub(super) struct MapSpline {
+    grid: PhaseGrid,
     /// Coefficients along each axis: two more than nodes.
     shape: [usize; 3],
     /// The coefficients of the three functions, x fastest; entry m belongs to node m − 1.
@@ -39,17 +39,17 @@ struct SplineStencil {
     slope: [f64; 4],
 }
 
-impl Spline {
-    pub fn through(grid: Grid, values: [Vec<f64>; 3]) -> Spline {
+impl MapSpline {
+    pub fn through(grid: PhaseGrid, values: [Vec<f64>; 3]) -> MapSpline {
         let shape = grid.shape.map(|n| n + 2);
         let coefficients = {
             let [a, b, c] = values;
             let made: Vec<Vec<f64>> =
-                [a, b, c].into_par_iter().map(|v| coefficients(v, grid.shape, Boundary::NotAKnot)).collect();
+                [a, b, c].into_par_iter().map(|v| coefficients(v, grid.shape, EndCondition::NotAKnot)).collect();
             let mut made = made.into_iter();
             core::array::from_fn(|_| made.next().unwrap_or_default())
         };
-        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
+        let mut spline = MapSpline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
         let [nx, ny, nz] = spline.blocks();
         (spline.lipschitz, spline.middles) =
             (0..nx * ny * nz).into_par_iter().map(|i| spline.lipschitz_of([i % nx, i / nx % ny, i / nx / ny])).unzip();
@@ -58,7 +58,11 @@ impl Spline {
 
     /// From coefficients at the nodes; beyond the grid they go on in straight lines. Some cells, by their first nodes, are evaluated with
     /// others, x fastest: bounds hold for these.
-    pub fn of<'a>(grid: Grid, at_nodes: &[Vec3], other: impl Fn(usize) -> Option<&'a [Vec3; 64]> + Sync) -> Spline {
+    pub fn of<'a>(
+        grid: PhaseGrid,
+        at_nodes: &[Vec3],
+        other: impl Fn(usize) -> Option<&'a [Vec3; 64]> + Sync,
+    ) -> MapSpline {
         let shape = grid.shape.map(|n| n + 2);
         let at = |m: usize, i: usize| {
             let index = [m % shape[0], m / shape[0] % shape[1], m / shape[0] / shape[1]];
@@ -81,7 +85,7 @@ impl Spline {
         };
         let all: usize = shape.iter().product();
         let coefficients = core::array::from_fn(|i| (0..all).into_par_iter().map(|m| at(m, i)).collect());
-        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
+        let mut spline = MapSpline { grid, shape, coefficients, lipschitz: Vec::new(), middles: Vec::new() };
         let [nx, ny, nz] = spline.blocks();
         let of_block = |i: usize| {
             let at = [i % nx, i / nx % ny, i / nx / ny];
@@ -120,7 +124,7 @@ impl Spline {
         core::array::from_fn(|i| u.iter().map(|u| u[i]).collect())
     }
 
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &PhaseGrid {
         &self.grid
     }
 
@@ -277,7 +281,7 @@ impl Spline {
     }
 
     /// The map on the rows of a block.
-    pub fn rows<'a>(&'a self, block: &Block<'a>) -> Rows<'a> {
+    pub fn rows<'a>(&'a self, block: &Block<'a>) -> SplineRows<'a> {
         let [x, y, z] = [0, 1, 2].map(|a| {
             let stencils = block.axes[a].iter().map(|&x| self.stencil(x, a));
             stencils.collect::<Vec<SplineStencil>>()
@@ -307,16 +311,16 @@ impl Spline {
             };
             (beyond, stencil.first - along_x.0, t)
         });
-        let mut segments: Vec<Segment> = Vec::new();
+        let mut segments: Vec<RowSegment> = Vec::new();
         let mut t = Vec::with_capacity(x.len());
         for (n, (beyond, first, at)) in runs.enumerate() {
             t.push(at);
             match segments.last_mut() {
                 Some(p) if p.first == first && p.beyond == beyond => p.to = n + 1,
-                _ => segments.push(Segment { beyond, first, from: n, to: n + 1 }),
+                _ => segments.push(RowSegment { beyond, first, from: n, to: n + 1 }),
             }
         }
-        Rows {
+        SplineRows {
             spline: self,
             along_x,
             along_y,
@@ -332,7 +336,7 @@ impl Spline {
 
 /// Nodes of a row in one interval.
 #[derive(Clone, Copy, Debug)]
-struct Segment {
+struct RowSegment {
     /// Before the box, in it, after it.
     beyond: u8,
     first: usize,
@@ -342,20 +346,20 @@ struct Segment {
 
 /// The map on the rows of a block: coefficients are summed along z once for a layer, along y once for a row, and what is
 /// left is a cubic for each interval along x.
-pub(in super::super) struct Rows<'a> {
-    spline: &'a Spline,
+pub(in super::super) struct SplineRows<'a> {
+    spline: &'a MapSpline,
     /// First coefficient and number of them.
     along_x: (usize, usize),
     along_y: (usize, usize),
     y: Vec<SplineStencil>,
     z: Vec<SplineStencil>,
     t: Vec<f64>,
-    segments: Vec<Segment>,
+    segments: Vec<RowSegment>,
     layer: [Vec<f64>; 3],
     line: Vec<f64>,
 }
 
-impl Rows<'_> {
+impl SplineRows<'_> {
     /// Makes ready for the rows of layer k.
     pub fn enter_layer(&mut self, k: usize) {
         let [_, sy, sz] = self.spline.strides();
@@ -393,7 +397,7 @@ fn blend(rows: [&[f64]; 4], w: &[f64; 4], out: &mut [f64]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn cubics(line: &[f64], segments: &[Segment], t: &[f64], out: &mut [f64]) {
+fn cubics(line: &[f64], segments: &[RowSegment], t: &[f64], out: &mut [f64]) {
     for p in segments {
         let c = &line[p.first..][..4];
         // The powers of t in the value.
@@ -420,7 +424,7 @@ fn along(row: &[f64; 4], w: &[f64; 4]) -> f64 {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
+fn values(spline: &MapSpline, points: &[Vec3], out: &mut [Vec3]) {
     for (o, p) in out.iter_mut().zip(points) {
         let [x, y, z] = [spline.stencil(p[0], 0), spline.stencil(p[1], 1), spline.stencil(p[2], 2)];
         let sums = spline.sums([x.first, y.first, z.first], [[&y.value], [&z.value]], [(0, 0)]);
@@ -429,7 +433,7 @@ fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn jacobians(spline: &Spline, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
+fn jacobians(spline: &MapSpline, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
     for ((u, m), p) in u.iter_mut().zip(m).zip(points) {
         let [x, y, z] = [spline.stencil(p[0], 0), spline.stencil(p[1], 1), spline.stencil(p[2], 2)];
         let weights = [[&y.value, &y.slope], [&z.value, &z.slope]];
@@ -470,9 +474,9 @@ mod tests {
     use super::*;
     use geometry::math::{norm, spectral_norm, sub};
 
-    fn grid() -> Grid {
+    fn grid() -> PhaseGrid {
         let b = Aabb { min: [-1.0, 0.5, 2.0], max: [2.0, 2.5, 4.4] };
-        Grid::over(&b, [9, 7, 6])
+        PhaseGrid::over(&b, [9, 7, 6])
     }
 
     fn bent(p: Vec3) -> Vec3 {
@@ -480,10 +484,10 @@ mod tests {
         [x + 0.3 * (y + 0.4 * z).sin(), 1.4 * y - 0.2 * (x * 0.8).cos() * z, 0.7 * z + 0.1 * x * y]
     }
 
-    fn spline(f: impl Fn(Vec3) -> Vec3) -> Spline {
+    fn spline(f: impl Fn(Vec3) -> Vec3) -> MapSpline {
         let g = grid();
         let at = |i: usize| (0..g.len()).map(|n| f(g.node(n))[i]).collect();
-        Spline::through(g, [at(0), at(1), at(2)])
+        MapSpline::through(g, [at(0), at(1), at(2)])
     }
 
     fn positions() -> Vec<Vec3> {

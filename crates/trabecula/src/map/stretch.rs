@@ -16,7 +16,7 @@ use super::edge_squares::gradient;
 use super::grid_cells::GridCells;
 use super::integral::Problem;
 use super::solution::Solution;
-use super::spline::Spline;
+use super::spline::MapSpline;
 use geometry::fault::{Fault, number, position};
 use geometry::math::{
     Mat3, Vec3, add, apply, cross, determinant, dot, eigen, inverse, norm, product, scale, sub, transpose,
@@ -188,5 +188,5 @@ pub(super) fn bounded(
             values.par_iter_mut().zip(&change).for_each(|(v, d)| *v += d);
         }
     }
-    Solution { spline: Spline::through(grid, values), winding: solution.winding.clone(), branches: None }
+    Solution { spline: MapSpline::through(grid, values), winding: solution.winding.clone(), branches: None }
 }

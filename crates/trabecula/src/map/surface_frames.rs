@@ -49,7 +49,7 @@ impl Aligned {
 }
 
 /// The surface of a region as the nodes of a grid see it.
-pub(super) struct Surface {
+pub(super) struct SurfaceDistances {
     within: Aligned,
     /// Signed distances from it, mm.
     distance: Vec<f64>,
@@ -57,12 +57,12 @@ pub(super) struct Surface {
     normals: Vec<Vec3>,
 }
 
-impl Surface {
-    pub fn of(region: &dyn Field, nodes: &[Vec3], within: Aligned) -> Surface {
+impl SurfaceDistances {
+    pub fn of(region: &dyn Field, nodes: &[Vec3], within: Aligned) -> SurfaceDistances {
         let (mut distance, mut normals) = (vec![0.0; nodes.len()], vec![[0.0; 3]; nodes.len()]);
         let chunks = distance.par_chunks_mut(4096).zip(normals.par_chunks_mut(4096)).zip(nodes.par_chunks(4096));
         chunks.for_each(|((d, n), p)| region.gradients(p, d, n));
-        Surface { within, distance, normals }
+        SurfaceDistances { within, distance, normals }
     }
 
     /// The frame asked for at a node, and the normal where the node is near to the surface.

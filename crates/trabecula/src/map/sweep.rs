@@ -21,7 +21,7 @@ use crate::field::Field;
 use feet::{LANES, Starts};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Mat3, Vec3, add, dot, norm, scale, sub};
-use line::{Line, Place};
+use line::{CurveParameter, FramedCurve};
 
 /// A line along which a lattice is swept, and the cells requested.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub struct Path {
 /// A lattice swept along a line. Phases are (a/λ₁, b/λ₂, s/λ₃).
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    line: Line,
+    line: FramedCurve,
     /// Where searches for feet start, in the region and about it.
     starts: Starts,
     wavelength: Vec3,
@@ -54,7 +54,7 @@ pub struct Sweep {
 }
 
 /// Coordinates of a position relative to the line.
-struct Local {
+struct CurveCoordinates {
     s: f64,
     /// Coordinates along N₁ and N₂.
     across: [f64; 2],
@@ -82,7 +82,7 @@ impl Sweep {
             let message = format!("{} mm; a wavelength is a positive, finite length", number(*w));
             return Err(Fault::new("wavelength", message));
         }
-        let line = Line::new(points, *closed, path.normal)?;
+        let line = FramedCurve::new(points, *closed, path.normal)?;
         let mut wavelength = path.wavelength;
         if *closed {
             wavelength[2] = line.length / (line.length / wavelength[2]).round().max(1.0);
@@ -107,19 +107,19 @@ impl Sweep {
     }
 
     #[inline(always)]
-    fn local(&self, p: Vec3) -> Local {
+    fn local(&self, p: Vec3) -> CurveCoordinates {
         self.local_at(p, self.line.foot(p, self.starts.at(&self.line, p)))
     }
 
     /// Coordinates relative to the line of a position whose foot is known.
     #[inline(always)]
-    fn local_at(&self, p: Vec3, (span, x): Place) -> Local {
+    fn local_at(&self, p: Vec3, (span, x): CurveParameter) -> CurveCoordinates {
         let (c, first, second) = self.line.spans[span].at(x);
         let d = sub(p, c);
         let [a0, a1, a2, b0, b1, b2, s, _] = self.line.row((span, x));
         let normals = [[a0, a1, a2], [b0, b1, b2]];
         let squared = dot(first, first);
-        Local {
+        CurveCoordinates {
             s,
             across: normals.map(|n| dot(d, n)),
             tangent: scale(first, 1.0 / squared.sqrt()),
@@ -130,7 +130,7 @@ impl Sweep {
 
     /// Hands the coordinates of each point over, with its index.
     #[inline(always)]
-    fn each(&self, points: &[Vec3], mut take: impl FnMut(usize, Local)) {
+    fn each(&self, points: &[Vec3], mut take: impl FnMut(usize, CurveCoordinates)) {
         let whole = points.chunks_exact(LANES);
         let rest = points.len() - whole.remainder().len();
         for (n, chunk) in whole.enumerate() {
@@ -163,14 +163,14 @@ impl Sweep {
 
     /// The phase (turns) at a point (mm).
     #[inline(always)]
-    fn phase(&self, l: &Local) -> Vec3 {
+    fn phase(&self, l: &CurveCoordinates) -> Vec3 {
         let w = self.per_mm;
         [l.across[0] * w[0], l.across[1] * w[1], l.s * w[2]]
     }
 
     /// du/dx.
     #[inline(always)]
-    fn slopes(&self, l: &Local) -> Mat3 {
+    fn slopes(&self, l: &CurveCoordinates) -> Mat3 {
         let along = scale(l.tangent, 1.0 / l.stretch.max(1e-6));
         let ([a, b], w, twist) = (l.across, self.per_mm, self.line.twist);
         [

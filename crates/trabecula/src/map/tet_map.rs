@@ -17,7 +17,7 @@ const BOXES: f64 = 32.0;
 const MOST: f64 = 4e6;
 
 /// A tetrahedral mesh with point location.
-pub struct Tets {
+pub struct CarrierMesh {
     nodes: Vec<Vec3>,
     /// Nodes ascending, so that tetrahedra with a common face have its corners in the same order.
     tets: Vec<[u32; 4]>,
@@ -65,13 +65,13 @@ impl Boxes {
     }
 }
 
-impl Tets {
+impl CarrierMesh {
     /// A conforming mesh of positively oriented tetrahedra. With an `overlap` (below 1/4) tetrahedra are also found
     /// slightly outside, where all coordinates are above −overlap.
     ///
     /// # Errors
     /// No tetrahedron, an inverted or flat one, a face of more than two tetrahedra.
-    pub fn new(mesh: &TetMesh, overlap: f64) -> Result<Tets, Fault> {
+    pub fn new(mesh: &TetMesh, overlap: f64) -> Result<CarrierMesh, Fault> {
         if mesh.tets.is_empty() {
             return Err(Fault::new("tets", "the mesh has no tetrahedron"));
         }
@@ -105,7 +105,7 @@ impl Tets {
             bounds = corners.iter().fold(bounds, |b, p| b.with(*p));
         }
         let across = across(&tets)?;
-        let mut out = Tets {
+        let mut out = CarrierMesh {
             nodes: mesh.nodes.clone(),
             zones: mesh.zones.clone(),
             across,
@@ -129,7 +129,7 @@ impl Tets {
     }
 
     /// Its boundary bent.
-    pub(super) fn with(mut self, curves: Curves) -> Tets {
+    pub(super) fn with(mut self, curves: Curves) -> CarrierMesh {
         self.curves = Some(curves);
         self.index();
         self

@@ -38,7 +38,7 @@ pub struct MadeTetsKind {
     pub layers: Option<Box<LayersSpec>>,
     /// How cells are joined.
     #[kind(flatten)]
-    pub joined: Joined,
+    pub joined: CellJoin,
 }
 
 /// Layers of prisms along a part's surface.
@@ -84,12 +84,12 @@ pub struct TetFileKind {
     pub split: bool,
     /// How cells are joined.
     #[kind(flatten)]
-    pub joined: Joined,
+    pub joined: CellJoin,
 }
 
 /// How the cells of tetrahedra are joined.
 #[derive(Clone, Debug, Default, PartialEq, Kind)]
-pub struct Joined {
+pub struct CellJoin {
     /// Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach beyond
     /// themselves and are mixed with their neighbours, from 0 (creases) to 0.2.
     #[kind(default = 0.0, min = 0.0, max = 0.2)]
@@ -99,15 +99,15 @@ pub struct Joined {
     pub method: Method,
     /// How the lattice ends at the part's surface.
     #[kind(default)]
-    pub surface: Ends,
+    pub surface: SurfaceEnds,
     /// The net of surface = "net".
     pub net: Option<Box<NetSpec>>,
 }
 
 /// How a lattice over tetrahedra ends at the part's surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "end at the surface")]
-pub enum Ends {
+#[kind(name = "Ends", noun = "end at the surface")]
+pub enum SurfaceEnds {
     /// Closed where the surface cuts it, by caps that lie on the surface.
     #[default]
     #[kind(hints("flat", "closed"))]
@@ -122,7 +122,7 @@ pub enum Ends {
     Rounded,
 }
 
-impl Ends {
+impl SurfaceEnds {
     /// Its word.
     pub fn word(self) -> &'static str {
         ["capped", "open", "net", "rounded"][self as usize]

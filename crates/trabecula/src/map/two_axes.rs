@@ -8,10 +8,10 @@
 use rayon::prelude::*;
 
 use super::axis::Axis;
-use super::columns::columns;
 use super::comb::{comb, first_in};
-use super::cube_turns::{cube, nearest};
-use super::phase_grid::Grid;
+use super::cube_rotations::{cube, nearest};
+use super::grade_values::grade_values;
+use super::phase_grid::PhaseGrid;
 use super::smooth_frames::Octahedral;
 use crate::grade::Grade;
 use geometry::fault::{Fault, position};
@@ -57,13 +57,18 @@ impl TwoAxes {
     /// The frames at points without signs and order.
     pub(super) fn polynomials(&self, points: &[Vec3]) -> Result<Vec<Octahedral>, Fault> {
         match &self.unordered {
-            Some(of) => Ok(columns(of, points, "frame")?.into_iter().map(Octahedral::sure).collect()),
+            Some(of) => Ok(grade_values(of, points, "frame")?.into_iter().map(Octahedral::sure).collect()),
             None => Ok(self.given(points)?.iter().map(|f| Octahedral::of(f, &[1.0; 3])).collect()),
         }
     }
 
     /// The frames at the nodes of a grid, combed where those that are given do not agree as well.
-    pub(super) fn at_nodes(&self, grid: &Grid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<Vec<Mat3>, Fault> {
+    pub(super) fn at_nodes(
+        &self,
+        grid: &PhaseGrid,
+        nodes: &[Vec3],
+        outside: Option<&[f64]>,
+    ) -> Result<Vec<Mat3>, Fault> {
         let (sure, turns) = (first_in(outside, |_| 1.0), cube());
         if self.unordered.is_some() {
             let all = self.polynomials(nodes)?;
@@ -142,7 +147,7 @@ fn squared(x: Vec<Vec3>, z: Vec<Vec3>, points: &[Vec3]) -> Result<Vec<Mat3>, Fau
 }
 
 /// The number of pairs of neighbouring nodes of which one has another frame, of those that are alike, nearer to the other's.
-fn breaks(grid: &Grid, frames: &[Mat3], turns: &[Mat3]) -> usize {
+fn breaks(grid: &PhaseGrid, frames: &[Mat3], turns: &[Mat3]) -> usize {
     let (strides, shape) = (grid.strides(), grid.shape);
     let of = |n: usize| {
         let at = grid.index(n);

@@ -21,7 +21,7 @@ const BLOCK: i32 = 4;
 
 /// Tetrahedra with nodes of integer coordinates.
 #[derive(Clone)]
-pub(super) struct Grid {
+pub(super) struct BccGrid {
     /// Node coordinates, in units.
     pub keys: Vec<[i32; 3]>,
     /// Tetrahedra, positively oriented; in those that are not bisected nodes 0, 1 belong to one lattice and 2, 3 to the
@@ -31,16 +31,16 @@ pub(super) struct Grid {
     unit: Vec3,
 }
 
-impl Grid {
+impl BccGrid {
     /// The tetrahedra of the lattice with cubes of edges `cube` (mm) that may intersect the region.
     ///
     /// **Errors**: more than `most` tetrahedra.
-    pub fn new(region: &dyn Field, bounds: &Aabb, cube: Vec3, most: usize) -> Result<Grid, Fault> {
+    pub fn new(region: &dyn Field, bounds: &Aabb, cube: Vec3, most: usize) -> Result<BccGrid, Fault> {
         let size = bounds.size();
         // The lattice is centred on the region, with planes on both sides of its bounds where they fit.
         let steps: Vec3 = core::array::from_fn(|a| (2.0 * size[a] / cube[a]).round());
         let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube[a] / 2.0) / 2.0);
-        let mut grid = Grid { keys: Vec::new(), tets: Vec::new(), origin, unit: cube.map(|c| c / f64::from(UNIT)) };
+        let mut grid = BccGrid { keys: Vec::new(), tets: Vec::new(), origin, unit: cube.map(|c| c / f64::from(UNIT)) };
         let many = || too_many(most);
         if (0..3).any(|a| size[a] / cube[a] > 1e5) {
             return Err(many());

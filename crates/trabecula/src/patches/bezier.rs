@@ -5,7 +5,7 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 /// The control points of a cubic curve.
 pub type Curve = [Vec3; 4];
 /// The control points of a bicubic patch, `[i][j]` at u = i/3, v = j/3.
-pub type Patch = [[Vec3; 4]; 4];
+pub type BicubicPatch = [[Vec3; 4]; 4];
 
 /// Nodes and weights of the Gauss rule with five points on [0, 1]: exact for polynomials of degree 9.
 pub const GAUSS: [(f64, f64); 5] = [
@@ -40,14 +40,14 @@ pub fn reversed(c: &Curve) -> Curve {
 }
 
 /// Position and both derivatives of a patch.
-pub fn frame(p: &Patch, u: f64, v: f64) -> [Vec3; 3] {
+pub fn frame(p: &BicubicPatch, u: f64, v: f64) -> [Vec3; 3] {
     let (b, db) = (basis(v), slopes(v));
     let (across, along) = (p.map(|row| sum(&row, b)), p.map(|row| sum(&row, db)));
     [sum(&across, basis(u)), sum(&across, slopes(u)), sum(&along, basis(u))]
 }
 
 /// Unit normal of a patch.
-pub fn normal(p: &Patch, u: f64, v: f64) -> Vec3 {
+pub fn normal(p: &BicubicPatch, u: f64, v: f64) -> Vec3 {
     let [_, du, dv] = frame(p, u, v);
     let n = cross(du, dv);
     scale(n, 1.0 / norm(n).max(f64::MIN_POSITIVE))
@@ -59,7 +59,7 @@ pub fn on_side(side: usize, t: f64) -> [f64; 2] {
 }
 
 /// The curves along the four sides, in order, of the patch that interpolates them bilinearly (Coons).
-pub fn coons(sides: &[Curve; 4]) -> Patch {
+pub fn coons(sides: &[Curve; 4]) -> BicubicPatch {
     let [bottom, right, top, left] = [sides[0], sides[1], reversed(&sides[2]), reversed(&sides[3])];
     let at = |i: usize, j: usize| {
         let (u, v) = (i as f64 / 3.0, j as f64 / 3.0);
@@ -71,7 +71,7 @@ pub fn coons(sides: &[Curve; 4]) -> Patch {
         );
         sub(ruled, corners)
     };
-    let mut patch: Patch = core::array::from_fn(|i| core::array::from_fn(|j| at(i, j)));
+    let mut patch: BicubicPatch = core::array::from_fn(|i| core::array::from_fn(|j| at(i, j)));
     for k in 0..4 {
         (patch[k][0], patch[k][3]) = (bottom[k], top[k]);
     }
@@ -82,7 +82,7 @@ pub fn coons(sides: &[Curve; 4]) -> Patch {
 }
 
 /// The volume (mm³) of the cone from a point over a patch: a third of the integral of (S − from) · (Su × Sv), exact.
-pub fn cone_volume(p: &Patch, from: Vec3) -> f64 {
+pub fn cone_volume(p: &BicubicPatch, from: Vec3) -> f64 {
     let mut total = 0.0;
     for (u, a) in GAUSS {
         for (v, b) in GAUSS {

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use geometry::math::{Aabb, Vec3, add, scale, sub};
 
-use super::bezier::{Curve, Patch, basis, reversed, sector_area, sum};
-use super::quad_net::{Net, Side, VertexConstraint};
+use super::bezier::{BicubicPatch, Curve, basis, reversed, sector_area, sum};
+use super::quad_net::{DirectedEdge, QuadNet, VertexConstraint};
 
 /// An edge of the boundary.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,7 @@ pub struct BoundaryEdge {
 #[derive(Clone, Debug)]
 pub enum Carrier {
     /// A patch; the loop runs around its parameters from (0, 0) by way of (1, 0).
-    Patch(Box<Patch>),
+    Patch(Box<BicubicPatch>),
     /// A plane of the box: 2 · axis + side.
     Plane(u8),
 }
@@ -31,7 +31,7 @@ pub struct BoundaryFace {
     /// What it lies on, with its normal out of the solid.
     pub carrier: Carrier,
     /// Its loops, counter-clockwise seen from outside: the outer one first, then those around holes.
-    pub loops: Vec<Vec<Side>>,
+    pub loops: Vec<Vec<DirectedEdge>>,
 }
 
 /// The boundary of a solid in a box.
@@ -62,7 +62,13 @@ pub fn corner(bounds: &Aabb, c: usize) -> Vec3 {
 impl Boundary {
     /// The boundary of the part of a box in which all surfaces are negative, from a net with its curves and patches. `corners`
     /// says for each surface in which corners of the box it is negative.
-    pub fn new(bounds: Aabb, net: &Net, curves: &[Curve], patches: Vec<Patch>, corners: &[[bool; 8]]) -> Boundary {
+    pub fn new(
+        bounds: Aabb,
+        net: &QuadNet,
+        curves: &[Curve],
+        patches: Vec<BicubicPatch>,
+        corners: &[[bool; 8]],
+    ) -> Boundary {
         let with =
             |(edge, curve): (&super::quad_net::Edge, &Curve)| BoundaryEdge { ends: edge.ends, curve: Some(*curve) };
         let mut made = Boundary {
@@ -72,7 +78,7 @@ impl Boundary {
             faces: Vec::with_capacity(net.faces.len() + 6),
         };
         // For each plane the sides of its faces, by the vertex where they begin.
-        let mut sides: [HashMap<u32, Side>; 6] = Default::default();
+        let mut sides: [HashMap<u32, DirectedEdge>; 6] = Default::default();
         for face in &net.faces {
             for (k, (edge, forward)) in face.sides.into_iter().enumerate() {
                 if let Some(plane) = net.edges[edge as usize].plane {
@@ -92,14 +98,14 @@ impl Boundary {
     }
 
     /// The parts of the box's edges that are in the solid, as lines between its corners and where surfaces cross the edges.
-    fn add_lines(&mut self, net: &Net, corners: &[[bool; 8]], sides: &mut [HashMap<u32, Side>; 6]) {
+    fn add_lines(&mut self, net: &QuadNet, corners: &[[bool; 8]], sides: &mut [HashMap<u32, DirectedEdge>; 6]) {
         let mut at_corner = [None; 8];
         for axis in 0..3 {
             let others = [(axis + 1) % 3, (axis + 2) % 3];
             for first in (0..8).filter(|c| c >> axis & 1 == 0) {
                 let last = first | 1 << axis;
                 let here = corner(&self.bounds, first);
-                let on = |v: &super::quad_net::Vertex| {
+                let on = |v: &super::quad_net::NetVertex| {
                     v.constraint == VertexConstraint::Edge(axis as u8) && others.iter().all(|o| v.at[*o] == here[*o])
                 };
                 let mut stops: Vec<u32> =
@@ -132,7 +138,7 @@ impl Boundary {
     }
 
     /// A line along an edge of the box, as a side of the faces in both planes.
-    fn add_line(&mut self, from: u32, to: u32, axis: usize, first: usize, sides: &mut [HashMap<u32, Side>; 6]) {
+    fn add_line(&mut self, from: u32, to: u32, axis: usize, first: usize, sides: &mut [HashMap<u32, DirectedEdge>; 6]) {
         let edge = self.edges.len() as u32;
         self.edges.push(BoundaryEdge { ends: [from, to], curve: None });
         for (a, inwards) in [((axis + 1) % 3, (axis + 2) % 3), ((axis + 2) % 3, (axis + 1) % 3)] {
@@ -145,7 +151,7 @@ impl Boundary {
     }
 
     /// The faces in a plane, from their sides by the vertices where these begin.
-    fn add_planar_faces(&mut self, plane: u8, mut sides: HashMap<u32, Side>) {
+    fn add_planar_faces(&mut self, plane: u8, mut sides: HashMap<u32, DirectedEdge>) {
         let mut starts: Vec<u32> = sides.keys().copied().collect();
         starts.sort_unstable();
         let mut outer = Vec::new();
@@ -163,7 +169,7 @@ impl Boundary {
             let area = self.area(&walked, plane);
             if area > 0.0 { outer.push((walked, area)) } else { holes.push(walked) }
         }
-        let mut faces: Vec<Vec<Vec<Side>>> = outer.iter().map(|o| vec![o.0.clone()]).collect();
+        let mut faces: Vec<Vec<Vec<DirectedEdge>>> = outer.iter().map(|o| vec![o.0.clone()]).collect();
         let outlines: Vec<Vec<[f64; 2]>> = outer.iter().map(|o| self.outline(&o.0, plane)).collect();
         for hole in holes {
             let at = flat(self.vertices[self.start(hole[0]) as usize], plane);
@@ -178,12 +184,12 @@ impl Boundary {
     }
 
     /// The vertex at which a side begins.
-    pub fn start(&self, (edge, forward): Side) -> u32 {
+    pub fn start(&self, (edge, forward): DirectedEdge) -> u32 {
         self.edges[edge as usize].ends[usize::from(!forward)]
     }
 
     /// The curve of a side, in its direction; lines as cubic curves.
-    pub fn curve(&self, (edge, forward): Side) -> Curve {
+    pub fn curve(&self, (edge, forward): DirectedEdge) -> Curve {
         let edge = &self.edges[edge as usize];
         let [a, b] = edge.ends.map(|v| self.vertices[v as usize]);
         let curve = edge.curve.unwrap_or_else(|| core::array::from_fn(|k| add(a, scale(sub(b, a), k as f64 / 3.0))));
@@ -191,13 +197,13 @@ impl Boundary {
     }
 
     /// The area (mm²) within a loop in a plane; negative around a hole.
-    pub fn area(&self, walked: &[Side], plane: u8) -> f64 {
+    pub fn area(&self, walked: &[DirectedEdge], plane: u8) -> f64 {
         let from = self.vertices[self.start(walked[0]) as usize];
         walked.iter().map(|s| sector_area(&self.curve(*s), from, outward(plane))).sum()
     }
 
     /// A polygon of a loop, in the two coordinates of a plane.
-    pub fn outline(&self, walked: &[Side], plane: u8) -> Vec<[f64; 2]> {
+    pub fn outline(&self, walked: &[DirectedEdge], plane: u8) -> Vec<[f64; 2]> {
         const PARTS: usize = 12;
         let mut points = Vec::with_capacity(walked.len() * PARTS);
         for side in walked {

@@ -10,12 +10,12 @@ use geometry::math::Vec3;
 use rayon::prelude::*;
 
 /// The node planes of a grid along each axis (mm), ascending; the outermost are the planes of a box.
-pub struct Grid {
+pub struct GridPlanes {
     /// Coordinates.
     pub axes: [Vec<f64>; 3],
 }
 
-impl Grid {
+impl GridPlanes {
     /// Number of nodes along each axis.
     pub fn shape(&self) -> [usize; 3] {
         [0, 1, 2].map(|a| self.axes[a].len())
@@ -68,13 +68,13 @@ impl Grid {
 }
 
 /// A polygon: the crossed grid edges in order, counter-clockwise seen from the positive side.
-pub struct Polygon {
+pub struct ContourPolygon {
     /// For each corner its grid edge and the segment that leads from it to the next, by their numbers.
     pub corners: Vec<[u32; 2]>,
 }
 
 /// What two adjacent cells, or a cell and the box, have in common: a line across a cell face.
-pub struct Segment {
+pub struct FaceSegment {
     /// The crossed grid edges that it joins.
     pub ends: [u32; 2],
     /// The polygons on its two sides; one on the box.
@@ -85,13 +85,13 @@ pub struct Segment {
 
 /// The polygons of a surface.
 #[derive(Default)]
-pub struct Polygons {
+pub struct ContourPolygons {
     /// The crossed grid edges: 3 · node + axis.
     pub edges: Vec<u64>,
     /// The polygons.
-    pub polygons: Vec<Polygon>,
+    pub polygons: Vec<ContourPolygon>,
     /// The segments.
-    pub segments: Vec<Segment>,
+    pub segments: Vec<FaceSegment>,
     edge_numbers: HashMap<u64, u32>,
     segment_numbers: HashMap<(u64, u32), u32>,
 }
@@ -100,11 +100,11 @@ pub struct Polygons {
 /// order −x, +x, −y, +y, −z, +z.
 const FACES: [[usize; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-impl Polygons {
+impl ContourPolygons {
     /// The polygons of the surface where a function is zero, from its values at the nodes of a grid. A value of zero counts as
     /// positive.
-    pub fn new(grid: &Grid, values: &[f64]) -> Polygons {
-        let mut made = Polygons::default();
+    pub fn new(grid: &GridPlanes, values: &[f64]) -> ContourPolygons {
+        let mut made = ContourPolygons::default();
         let [nx, ny, nz] = grid.shape();
         let step = [1, nx, nx * ny];
         for k in 0..nz - 1 {
@@ -123,7 +123,7 @@ impl Polygons {
         made
     }
 
-    fn cell(&mut self, grid: &Grid, values: &[f64], at: [usize; 3], nodes: &[usize; 8]) {
+    fn cell(&mut self, grid: &GridPlanes, values: &[f64], at: [usize; 3], nodes: &[usize; 8]) {
         // From each crossed edge the next one, and the segment between them.
         let mut next: Vec<(u32, u32, u32)> = Vec::with_capacity(12);
         for (f, corners) in FACES.iter().enumerate() {
@@ -153,7 +153,7 @@ impl Polygons {
                 here = next.iter().position(|n| n.0 == to).unwrap_or(first);
             }
             if !corners.is_empty() {
-                self.polygons.push(Polygon { corners });
+                self.polygons.push(ContourPolygon { corners });
             }
         }
     }
@@ -167,7 +167,7 @@ impl Polygons {
 
     fn segment(&mut self, face: u64, ends: [u32; 2], plane: Option<u8>) -> u32 {
         *self.segment_numbers.entry((face, ends[0].min(ends[1]))).or_insert_with(|| {
-            self.segments.push(Segment { ends, polygons: Vec::with_capacity(2), plane });
+            self.segments.push(FaceSegment { ends, polygons: Vec::with_capacity(2), plane });
             self.segments.len() as u32 - 1
         })
     }
@@ -179,7 +179,7 @@ impl Polygons {
 }
 
 /// How many grid edges a surface crosses: the number of faces of its net.
-pub fn crossings(grid: &Grid, values: &[f64]) -> usize {
+pub fn crossings(grid: &GridPlanes, values: &[f64]) -> usize {
     let [nx, ny, _] = grid.shape();
     let step = [1, nx, nx * ny];
     let of = |node: usize| {
@@ -192,8 +192,8 @@ pub fn crossings(grid: &Grid, values: &[f64]) -> usize {
 }
 
 /// The Euler characteristic of the surface where a function is zero, from its values at the nodes of a grid: that of its
-/// `Polygons`, without making them.
-pub fn euler(grid: &Grid, values: &[f64]) -> i64 {
+/// `ContourPolygons`, without making them.
+pub fn euler(grid: &GridPlanes, values: &[f64]) -> i64 {
     let [nx, ny, nz] = grid.shape();
     let step = [1, nx, nx * ny];
     let layer = |k: usize| {
@@ -274,9 +274,9 @@ fn pairs(v: &[f64; 4]) -> impl Iterator<Item = (usize, usize)> {
 mod tests {
     use super::*;
 
-    fn grid(n: usize) -> Grid {
+    fn grid(n: usize) -> GridPlanes {
         let axis: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
-        Grid { axes: [axis.clone(), axis.clone(), axis] }
+        GridPlanes { axes: [axis.clone(), axis.clone(), axis] }
     }
 
     #[test]
@@ -285,7 +285,7 @@ mod tests {
         let mut seed = 5;
         for _ in 0..20 {
             let values: Vec<f64> = (0..g.len()).map(|_| geometry::random::random(&mut seed)).collect();
-            let made = Polygons::new(&g, &values);
+            let made = ContourPolygons::new(&g, &values);
             assert_eq!(euler(&g, &values), made.euler());
             for s in &made.segments {
                 assert_eq!(s.polygons.len(), if s.plane.is_some() { 1 } else { 2 });
@@ -304,7 +304,7 @@ mod tests {
         let g = grid(16);
         let at = |f: &dyn Fn(Vec3) -> f64| {
             let values: Vec<f64> = (0..g.len()).map(|n| f(g.position(n).map(|x| x - 0.5))).collect();
-            let found = Polygons::new(&g, &values).euler();
+            let found = ContourPolygons::new(&g, &values).euler();
             assert_eq!(euler(&g, &values), found);
             found
         };

@@ -9,7 +9,7 @@
 use geometry::dense::{factorise, substitute};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
-use super::bezier::{Curve, Patch, basis, coons, on_side, slopes, sum};
+use super::bezier::{BicubicPatch, Curve, basis, coons, on_side, slopes, sum};
 use crate::field::Field;
 
 /// Parameters at which curves are fitted.
@@ -126,7 +126,7 @@ const INNER: [[usize; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
 /// A patch on a surface with these sides, in order. `normals` are the surface's along each side, at `ON_SIDE`; a side in a
 /// plane of the box has none.
-pub fn patch(field: &dyn Field, sides: &[Curve; 4], normals: &[Option<[Vec3; 4]>; 4]) -> Patch {
+pub fn patch(field: &dyn Field, sides: &[Curve; 4], normals: &[Option<[Vec3; 4]>; 4]) -> BicubicPatch {
     let mut p = coons(sides);
     let size = sides.iter().map(|c| norm(sub(c[3], c[0]))).sum::<f64>() / 4.0;
     let inside: [[f64; 2]; 16] = core::array::from_fn(|k| [IN_PATCH[k % 4], IN_PATCH[k / 4]]);

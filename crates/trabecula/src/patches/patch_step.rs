@@ -6,9 +6,9 @@ use geometry::formats::part21::{Id, Part21, Product, Title, list, spline_curve};
 use geometry::math::{Vec3, norm, scale, sub};
 use geometry::progress::{Progress, Stopped};
 
-use super::bezier::Patch;
+use super::bezier::BicubicPatch;
 use super::boundary::{Boundary, Carrier, corner, outward};
-use super::quad_net::Side;
+use super::quad_net::DirectedEdge;
 use super::shells::Shells;
 
 /// Decimals of coordinates (mm): a hundredth of the accuracy that the file states.
@@ -133,7 +133,7 @@ impl Writer<'_> {
     }
 
     /// The control points of a side, in its direction.
-    fn controls(&mut self, (edge, forward): Side) -> io::Result<[Id; 4]> {
+    fn controls(&mut self, (edge, forward): DirectedEdge) -> io::Result<[Id; 4]> {
         let [from, to] = self.of.edges[edge as usize].ends;
         let [first, last] = [self.point(from)?, self.point(to)?];
         let [a, b] = match self.inner[edge as usize] {
@@ -154,7 +154,7 @@ impl Writer<'_> {
         let face = &of.faces[f as usize];
         let id = match &face.carrier {
             Carrier::Patch(patch) => {
-                let sides: [Side; 4] = core::array::from_fn(|k| face.loops[0][k]);
+                let sides: [DirectedEdge; 4] = core::array::from_fn(|k| face.loops[0][k]);
                 let id = self.patch(patch, sides)?;
                 for (k, (edge, forward)) in sides.into_iter().enumerate() {
                     let curve =
@@ -176,7 +176,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    fn patch(&mut self, patch: &Patch, sides: [Side; 4]) -> io::Result<Id> {
+    fn patch(&mut self, patch: &BicubicPatch, sides: [DirectedEdge; 4]) -> io::Result<Id> {
         let [bottom, right, mut top, mut left] =
             [self.controls(sides[0])?, self.controls(sides[1])?, self.controls(sides[2])?, self.controls(sides[3])?];
         top.reverse();

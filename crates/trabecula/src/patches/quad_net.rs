@@ -12,7 +12,7 @@ use std::collections::hash_map::Entry;
 use geometry::math::{Vec3, add, scale};
 use geometry::union_find::{labels, singles, unite};
 
-use super::contour_polygons::{Grid, Polygons};
+use super::contour_polygons::{ContourPolygons, GridPlanes};
 
 /// Where a vertex may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub enum VertexConstraint {
 
 /// A vertex of the net.
 #[derive(Clone, Copy, Debug)]
-pub struct Vertex {
+pub struct NetVertex {
     /// Position (mm).
     pub at: Vec3,
     /// Where it may move.
@@ -50,13 +50,13 @@ pub struct Edge {
 }
 
 /// A side of a face: an edge, and whether it is walked forwards.
-pub type Side = (u32, bool);
+pub type DirectedEdge = (u32, bool);
 
 /// A four-sided face, counter-clockwise seen from the positive side of its surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Face {
+pub struct QuadFace {
     /// Its sides in order; the first begins at the first corner.
-    pub sides: [Side; 4],
+    pub sides: [DirectedEdge; 4],
     /// Its corners.
     pub corners: [u32; 4],
     /// The number of its surface.
@@ -65,30 +65,31 @@ pub struct Face {
 
 /// A net of faces.
 #[derive(Clone, Debug, Default)]
-pub struct Net {
+pub struct QuadNet {
     /// Vertices.
-    pub vertices: Vec<Vertex>,
+    pub vertices: Vec<NetVertex>,
     /// Edges.
     pub edges: Vec<Edge>,
     /// Faces.
-    pub faces: Vec<Face>,
+    pub faces: Vec<QuadFace>,
 }
 
-impl Net {
+impl QuadNet {
     /// Adds the faces of a surface. `crossing` gives the position (mm) where a grid edge crosses it.
     ///
     /// # Errors
     /// Polygons that do not fit together.
     pub fn add(
         &mut self,
-        grid: &Grid,
-        of: &Polygons,
+        grid: &GridPlanes,
+        of: &ContourPolygons,
         surface: u8,
         crossing: &dyn Fn(u64) -> Vec3,
     ) -> Result<(), TooCoarse> {
         let points: Vec<Vec3> = of.edges.iter().map(|e| crossing(*e)).collect();
         let first = self.edges.len();
-        let mut own = Dual { net: self, surface, polygons: Vec::new(), segments: vec![(0, None); of.segments.len()] };
+        let mut own =
+            DualNet { net: self, surface, polygons: Vec::new(), segments: vec![(0, None); of.segments.len()] };
         for polygon in &of.polygons {
             let corners = polygon.corners.iter().map(|c| points[c[0] as usize]);
             let at = scale(corners.fold([0.0; 3], add), 1.0 / polygon.corners.len() as f64);
@@ -165,7 +166,7 @@ impl Net {
             let edge = self.edges[e];
             let constraint = edge.plane.map_or(VertexConstraint::Surface, VertexConstraint::Plane);
             let middle = self.vertices.len() as u32;
-            self.vertices.push(Vertex { at: edge.middle, constraint, surface: edge.surface });
+            self.vertices.push(NetVertex { at: edge.middle, constraint, surface: edge.surface });
             let [a, b] = edge.ends;
             self.edges[e] = self.straight([a, middle], edge.plane, edge.surface);
             halves[e] = Some((middle, self.edges.len() as u32));
@@ -183,7 +184,7 @@ impl Net {
     }
 
     /// Adds the parts of a face whose sides are divided at these vertices, each with the number of its second half.
-    fn divide_face(&mut self, face: &Face, halves: &[Option<(u32, u32)>]) {
+    fn divide_face(&mut self, face: &QuadFace, halves: &[Option<(u32, u32)>]) {
         let surface = face.surface;
         let middle = face.sides.map(|(e, _)| halves[e as usize]);
         // The halves of a side in its direction.
@@ -191,7 +192,7 @@ impl Net {
             ((first, forward), Some((_, second))) => (if forward == last { second } else { first }, forward),
             (side, None) => side,
         };
-        let joined = |net: &mut Net, ends: [u32; 2]| {
+        let joined = |net: &mut QuadNet, ends: [u32; 2]| {
             let edge = net.straight(ends, None, surface);
             net.edges.push(edge);
             net.edges.len() as u32 - 1
@@ -204,12 +205,12 @@ impl Net {
                 let across = joined(self, [m0, m2]);
                 let c = |i: usize| face.corners[(k + i) % 4];
                 let h = |i: usize, last: bool| half((k + i) % 4, last);
-                self.faces.push(Face {
+                self.faces.push(QuadFace {
                     sides: [h(0, false), (across, true), h(2, true), face.sides[(k + 3) % 4]],
                     corners: [c(0), m0, m2, c(3)],
                     surface,
                 });
-                self.faces.push(Face {
+                self.faces.push(QuadFace {
                     sides: [h(0, true), face.sides[(k + 1) % 4], h(2, false), (across, false)],
                     corners: [m0, c(1), c(2), m2],
                     surface,
@@ -219,12 +220,12 @@ impl Net {
                 let corners = [c0, c1, c2, c3].map(|c| self.vertices[c as usize].at);
                 let at = scale(corners.into_iter().fold([0.0; 3], add), 0.25);
                 let center = self.vertices.len() as u32;
-                self.vertices.push(Vertex { at, constraint: VertexConstraint::Surface, surface });
+                self.vertices.push(NetVertex { at, constraint: VertexConstraint::Surface, surface });
                 let m = [m0, m1, m2, m3];
                 let spokes = m.map(|m| joined(self, [m, center]));
                 for k in 0..4 {
                     let before = (k + 3) % 4;
-                    self.faces.push(Face {
+                    self.faces.push(QuadFace {
                         sides: [half(k, false), (spokes[k], true), (spokes[before], false), half(before, true)],
                         corners: [face.corners[k], m[k], center, m[before]],
                         surface,
@@ -243,7 +244,7 @@ pub struct TooCoarse;
 
 /// Sorts the polygons around a grid edge counter-clockwise, seen from the positive side: across the segment that leads to it
 /// each has the next one. The first of an open fan is the one whose leaving segment lies in a plane of the box.
-fn ordered(of: &Polygons, found: &mut [[u32; 3]]) {
+fn ordered(of: &ContourPolygons, found: &mut [[u32; 3]]) {
     if let Some(first) = found.iter().position(|f| of.segments[f[2] as usize].plane.is_some()) {
         found.swap(0, first);
     }
@@ -256,8 +257,8 @@ fn ordered(of: &Polygons, found: &mut [[u32; 3]]) {
 }
 
 /// The part of a net that belongs to one surface, while it is made.
-struct Dual<'a> {
-    net: &'a mut Net,
+struct DualNet<'a> {
+    net: &'a mut QuadNet,
     surface: u8,
     /// The vertex of each polygon.
     polygons: Vec<u32>,
@@ -265,9 +266,9 @@ struct Dual<'a> {
     segments: Vec<(u32, Option<u32>)>,
 }
 
-impl Dual<'_> {
+impl DualNet<'_> {
     fn vertex(&mut self, at: Vec3, constraint: VertexConstraint) -> u32 {
-        self.net.vertices.push(Vertex { at, constraint, surface: self.surface });
+        self.net.vertices.push(NetVertex { at, constraint, surface: self.surface });
         self.net.vertices.len() as u32 - 1
     }
 
@@ -284,7 +285,7 @@ impl Dual<'_> {
     /// The face of a crossed grid edge: `found` as `ordered` leaves it, `crossing` the place and the axis of the edge.
     fn face(
         &mut self,
-        of: &Polygons,
+        of: &ContourPolygons,
         found: &[[u32; 3]],
         planes: &[u8],
         crossing: (Vec3, u8),
@@ -317,11 +318,11 @@ impl Dual<'_> {
         let (Ok(corners), Ok(edges)) = (<[u32; 4]>::try_from(corners), <[u32; 4]>::try_from(edges)) else {
             return Err(TooCoarse);
         };
-        let sides: [Side; 4] = core::array::from_fn(|i| {
+        let sides: [DirectedEdge; 4] = core::array::from_fn(|i| {
             let edge = edges[i];
             (edge, self.net.edges[edge as usize].ends[0] == corners[i])
         });
-        self.net.faces.push(Face { sides, corners, surface: self.surface });
+        self.net.faces.push(QuadFace { sides, corners, surface: self.surface });
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::quad_net::{Face, Net, Vertex, VertexConstraint};
+use super::quad_net::{NetVertex, QuadFace, QuadNet, VertexConstraint};
 use crate::field::Field;
 use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 
@@ -27,7 +27,7 @@ pub fn gradients(field: &dyn Field, points: &[Vec3]) -> (Vec<f64>, Vec<Vec3>) {
 
 /// Where Newton's step to the zero of a function leads in the directions in which a vertex may move, no longer than `most` (mm)
 /// and within the box.
-fn step(vertex: &Vertex, value: f64, gradient: Vec3, most: f64, bounds: &Aabb) -> Vec3 {
+fn step(vertex: &NetVertex, value: f64, gradient: Vec3, most: f64, bounds: &Aabb) -> Vec3 {
     let mut along = scale(gradient, -value.signum());
     match vertex.constraint {
         VertexConstraint::Surface => {
@@ -55,7 +55,7 @@ fn within(mut n: Vec3, plane: u8) -> Vec3 {
     scale(n, 1.0 / norm(n).max(f64::MIN_POSITIVE))
 }
 
-impl Net {
+impl QuadNet {
     /// The vertices of a surface.
     fn of_surface(&self, surface: u8) -> Vec<usize> {
         (0..self.vertices.len()).filter(|v| self.vertices[*v].surface == surface).collect()
@@ -155,7 +155,7 @@ impl Net {
     /// Of each face the least sine of the angles at its corners, seen against the surface's normal; corners on edges of the box do
     /// not move and do not count.
     fn shapes(&self, normals: &[Vec3]) -> Vec<f64> {
-        let of = |face: &Face| {
+        let of = |face: &QuadFace| {
             let sine = |k: usize| {
                 let at = [(k + 3) % 4, k, (k + 1) % 4].map(|k| face.corners[k] as usize);
                 if matches!(self.vertices[at[1]].constraint, VertexConstraint::Edge(_)) {

@@ -100,7 +100,7 @@ impl Boundary {
 }
 
 /// How far along x a ray meets a patch, by triangles.
-fn hit(patch: &super::bezier::Patch, from: Vec3) -> Option<f64> {
+fn hit(patch: &super::bezier::BicubicPatch, from: Vec3) -> Option<f64> {
     const PARTS: usize = 6;
     let at = |i: usize, j: usize| {
         let [u, v] = [i, j].map(|k| k as f64 / PARTS as f64);

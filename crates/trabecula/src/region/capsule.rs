@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -78,7 +78,7 @@ impl Capsule {
     }
 }
 
-impl Shape for Capsule {
+impl SignedDistance for Capsule {
     fn bounds(&self) -> Aabb {
         Aabb::EMPTY.with(self.start).with(self.end).grown(self.radius)
     }

@@ -6,7 +6,9 @@ use super::alike_bodies::{self, Body};
 use super::halfspace::polyhedron_bounds;
 use super::meshes::List;
 use super::narrowed::{self, MANY};
-use super::{BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, Shape, bodies};
+use super::{
+    BuildRegion, CadMesh, Context, HalfSpace, MeshRegion, OpenSurface, Region, RegionKind, SignedDistance, bodies,
+};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -177,7 +179,7 @@ impl Join for Difference {
 }
 
 /// What `Join` has by itself.
-trait Joined: Join {
+trait JoinExt: Join {
     /// The bound of operand `i`, by its complement if it enters so and negated if the greatest counts: the least decides.
     fn rank(&self, i: usize, b: &Aabb) -> Interval {
         let (r, negated) = &self.operands()[i];
@@ -222,7 +224,7 @@ trait Joined: Join {
         });
     }
 }
-impl<J: Join> Joined for J {}
+impl<J: Join> JoinExt for J {}
 
 /// Adds the complements of surfaces that `add` adds, and returns how they are combined.
 fn complement(out: &mut Vec<Surface>, add: impl FnOnce(&mut Vec<Surface>) -> CsgTree) -> CsgTree {
@@ -265,7 +267,7 @@ macro_rules! joined {
             }
         }
 
-        impl Shape for $shape {
+        impl SignedDistance for $shape {
             fn bounds(&self) -> Aabb {
                 self.extent()
             }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::halfspace::flat;
 use super::moved::{Moved, lost};
 use super::primitive::{field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape};
+use super::{BuildRegion, Context, HalfSpace, Region, SignedDistance};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -120,7 +120,7 @@ impl Cuboid {
     }
 }
 
-impl Shape for Cuboid {
+impl SignedDistance for Cuboid {
     fn bounds(&self) -> Aabb {
         Aabb { min: self.min, max: self.max }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::halfspace::flat;
 use super::primitive::{along, apart, coordinate_axis, direction, field, fill_rows, joined, joined_gradient, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -134,7 +134,7 @@ impl Cylinder {
     }
 }
 
-impl Shape for Cylinder {
+impl SignedDistance for Cylinder {
     fn bounds(&self) -> Aabb {
         let top = add(self.base, scale(self.axis, self.height));
         let mut b = Aabb::EMPTY.with(self.base).with(top);

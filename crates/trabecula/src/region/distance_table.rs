@@ -140,7 +140,7 @@ impl DistanceTable {
 impl Field for DistanceTable {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         let (mut rest, mut at) = (Vec::new(), Vec::new());
-        let mut line = Line::NONE;
+        let mut line = CellLine::NONE;
         for (n, (p, o)) in points.iter().zip(out.iter_mut()).enumerate() {
             let x = self.along(0, p[0]) - line.cell;
             if p[1..] == line.yz && (0.0..1.0).contains(&x) && p[0] <= self.bounds.max[0] {
@@ -149,7 +149,7 @@ impl Field for DistanceTable {
             }
             match self.cell(*p) {
                 Some(cell) => {
-                    line = Line { yz: [p[1], p[2]], cell: cell.number, ends: cell.line() };
+                    line = CellLine { yz: [p[1], p[2]], cell: cell.number, ends: cell.line() };
                     *o = line.value(cell.at[0]);
                 }
                 None => {
@@ -265,15 +265,15 @@ impl InCell<'_> {
 }
 
 /// A line along x through a cell: points that follow each other on it share all but the last step.
-struct Line {
+struct CellLine {
     yz: [f64; 2],
     /// Number of the cell along x; not a number for none.
     cell: f64,
     ends: [[f64; 4]; 2],
 }
 
-impl Line {
-    const NONE: Line = Line { yz: [0.0; 2], cell: f64::NAN, ends: [[0.0; 4]; 2] };
+impl CellLine {
+    const NONE: CellLine = CellLine { yz: [0.0; 2], cell: f64::NAN, ends: [[0.0; 4]; 2] };
 
     /// The value at a share of the cell.
     #[inline]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, Context, Region, Shape, cad, halving, one_surface};
+use super::{BuildRegion, Context, Region, SignedDistance, cad, halving, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -117,7 +117,7 @@ impl Field for NearFaces {
     }
 }
 
-impl Shape for NearFaces {
+impl SignedDistance for NearFaces {
     fn bounds(&self) -> Aabb {
         self.set.bounds.grown(self.within)
     }

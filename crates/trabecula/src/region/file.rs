@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, CAD, CadMesh, Context, MeshRegion, Region, Shape, Tessellation};
+use super::{BuildRegion, CAD, CadMesh, Context, MeshRegion, Region, SignedDistance, Tessellation};
 use crate::kind::{Kind, Unit};
 use geometry::fault::Fault;
 use geometry::formats;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::primitive::{along, coordinate_axis, direction, field, fill_rows};
-use super::{BuildRegion, Context, FARTHEST, Region, Shape, one_surface};
+use super::{BuildRegion, Context, FARTHEST, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
-use crate::implicit::{Plane, Surface};
+use crate::implicit::{AxisPlane, Surface};
 use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
@@ -62,7 +62,7 @@ impl HalfSpace {
     }
 
     /// The half-space that a plane normal to a coordinate axis bounds.
-    pub(super) fn of_plane(plane: Plane) -> HalfSpace {
+    pub(super) fn of_plane(plane: AxisPlane) -> HalfSpace {
         let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
         (point[plane.axis], normal[plane.axis]) = (plane.at, if plane.below { 1.0 } else { -1.0 });
         HalfSpace { point, normal }
@@ -135,7 +135,7 @@ pub(super) fn polyhedron_bounds(sides: &[HalfSpace]) -> Aabb {
     Aabb { min: bounds.min.map(ended), max: bounds.max.map(ended) }
 }
 
-impl Shape for HalfSpace {
+impl SignedDistance for HalfSpace {
     fn bounds(&self) -> Aabb {
         let mut b = Aabb::ALL;
         if let Some(a) = coordinate_axis(self.normal) {
@@ -179,7 +179,7 @@ field!(HalfSpace);
 
 /// The solid below (or above) a coordinate of an axis.
 pub(super) fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Surface>) -> CsgTree {
-    let plane = Plane { axis, at, below };
+    let plane = AxisPlane { axis, at, below };
     let mut face = Surface::distance(Arc::new(HalfSpace::of_plane(plane)));
     face.plane = Some(plane);
     out.push(face);

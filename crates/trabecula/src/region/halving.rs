@@ -3,7 +3,7 @@
 use crate::field::Block;
 use geometry::math::{Aabb, Interval, norm};
 
-/// Fills `out` (x fastest) with values less `level` (mm) at a block's nodes, as [`super::Shape::fill_level`] says: the block is halved
+/// Fills `out` (x fastest) with values less `level` (mm) at a block's nodes, as [`super::SignedDistance::fill_level`] says: the block is halved
 /// until a part lies on one side of the level by its bound, or is eight nodes.
 pub(super) fn fill(
     block: &Block,

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{CadMesh, Offset, OpenSurface, Region, Shape, one_surface};
+use super::{CadMesh, Offset, OpenSurface, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -123,7 +123,7 @@ impl Field for MeshRegion {
     }
 }
 
-impl Shape for MeshRegion {
+impl SignedDistance for MeshRegion {
     fn bounds(&self) -> Aabb {
         self.bounds
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{coordinate_axis, direction};
-use super::{BuildRegion, Context, HalfSpace, Region, RegionKind, Shape};
+use super::{BuildRegion, Context, HalfSpace, Region, RegionKind, SignedDistance};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -190,7 +190,7 @@ impl Field for Moved {
     }
 }
 
-impl Shape for Moved {
+impl SignedDistance for Moved {
     fn bounds(&self) -> Aabb {
         self.field.by.bounds(&self.of.bounds())
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BuildRegion, CadMesh, Context, Region, RegionKind, Shape, joint};
+use super::{BuildRegion, CadMesh, Context, Region, RegionKind, SignedDistance, joint};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -91,7 +91,7 @@ impl Field for Offset {
     }
 }
 
-impl Shape for Offset {
+impl SignedDistance for Offset {
     fn bounds(&self) -> Aabb {
         self.of.bounds().grown(self.by)
     }

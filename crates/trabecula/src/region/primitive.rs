@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Offset, Shape, one_surface};
+use super::{Offset, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::Block;
 use crate::implicit::Surface;
@@ -74,7 +74,7 @@ pub(super) fn fill_rows(block: &Block, out: &mut [f32], f: impl Fn(Vec3) -> f64)
 }
 
 /// A convex shape grown by `by`: its edges become round, so it has one face.
-pub(super) fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
+pub(super) fn rounded(of: Arc<dyn SignedDistance>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
     match Offset::new(of, by) {
         Ok(grown) => one_surface(Arc::new(grown), out),
         Err(_) => CsgTree::FULL,
@@ -123,7 +123,7 @@ mod tests {
     use geometry::random::random;
     use std::sync::Arc;
 
-    fn shapes() -> Vec<(&'static str, Arc<dyn Shape>)> {
+    fn shapes() -> Vec<(&'static str, Arc<dyn SignedDistance>)> {
         vec![
             ("box", Arc::new(Cuboid::new([-1.0, -2.0, 0.1], [1.3, 0.7, 2.0]).unwrap())),
             ("z cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [0.0, 0.0, 3.0], 0.8, 1.7).unwrap())),
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn distances_at_known_points() {
-        let at = |s: &dyn Shape, p| s.value(p);
+        let at = |s: &dyn SignedDistance, p| s.value(p);
         let b = Cuboid::new([0.0; 3], [2.0, 4.0, 6.0]).unwrap();
         assert_eq!(at(&b, [1.0, 2.0, 3.0]), -1.0);
         assert_eq!(at(&b, [5.0, 8.0, 3.0]), 5.0);

@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{apart, field, fill_rows};
-use super::{BuildRegion, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -54,7 +54,7 @@ impl Sphere {
     }
 }
 
-impl Shape for Sphere {
+impl SignedDistance for Sphere {
     fn bounds(&self) -> Aabb {
         Aabb { min: self.center, max: self.center }.grown(self.radius)
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, field, rounded};
-use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, SignedDistance, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -124,7 +124,7 @@ impl Tetrahedron {
     }
 }
 
-impl Shape for Tetrahedron {
+impl SignedDistance for Tetrahedron {
     fn bounds(&self) -> Aabb {
         self.corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
     }

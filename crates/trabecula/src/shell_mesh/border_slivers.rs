@@ -25,7 +25,7 @@ pub(super) fn merge(mesh: &mut Mesh, bounds: &Aabb, edge: f64) {
     outer.iter().flatten().for_each(|v| on_border[*v as usize] = true);
     let on: Vec<u8> =
         (0..on_border.len()).map(|v| if on_border[v] { planes(mesh.vertices[v], bounds) } else { 0 }).collect();
-    let mut work = Work { mesh, about, outer, on_border, on };
+    let mut work = BorderMesh { mesh, about, outer, on_border, on };
     let all = 0..work.mesh.triangles.len() as u32;
     for t in all {
         // Until the triangle has no edge to merge, or is merged away itself.
@@ -43,7 +43,7 @@ fn ends(t: [u32; 3], k: usize) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-struct Work<'a> {
+struct BorderMesh<'a> {
     mesh: &'a mut Mesh,
     /// The triangles about each vertex.
     about: Vec<BTreeSet<u32>>,
@@ -53,7 +53,7 @@ struct Work<'a> {
     on: Vec<u8>,
 }
 
-impl Work<'_> {
+impl BorderMesh<'_> {
     fn at(&self, v: u32) -> Vec3 {
         self.mesh.vertices[v as usize]
     }

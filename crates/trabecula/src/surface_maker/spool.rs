@@ -10,7 +10,7 @@ use geometry::formats::{ByteSpool, Indexed, Metadata, write_indexed};
 use geometry::math::Vec3;
 use geometry::progress::{Progress, Stage, Stopped};
 
-use super::{Options, Pieces, Resolved, Store, Summary, SurfaceMaker, compact};
+use super::{Resolved, Store, Summary, SurfaceMaker, SurfaceOptions, SurfaceSink, compact};
 
 /// Bytes of a vertex and of a triangle.
 const VERTEX: u64 = 24;
@@ -21,7 +21,7 @@ const CHUNK: u64 = 1 << 16;
 const WRITING: f64 = 0.2;
 
 /// Three empty files, of which nothing is left afterwards: for vertices, triangles and what a writer puts aside.
-pub type Scratch<'a> = [&'a mut dyn Store; 3];
+pub type ScratchStores<'a> = [&'a mut dyn Store; 3];
 
 /// The surface, streamed in the format of `suffix`, one with numbered vertices, without holding the mesh: the same bytes as
 /// `geometry::formats::write_mesh` gives for that of `SurfaceMaker::mesh`. In memory stay the tiles in flight and a bit for each
@@ -31,9 +31,9 @@ pub type Scratch<'a> = [&'a mut dyn Store; 3];
 /// As `SurfaceMaker::mesh` and `geometry::formats::write_indexed`; failures of the files.
 pub fn stream_mesh(
     maker: &dyn SurfaceMaker,
-    options: &Options,
+    options: &SurfaceOptions,
     (suffix, meta): (&str, &Metadata),
-    [vertices, triangles, aside]: Scratch,
+    [vertices, triangles, aside]: ScratchStores,
     out: &mut dyn Write,
     progress: &dyn Progress,
 ) -> Result<Summary, Stopped> {
@@ -81,7 +81,7 @@ struct Spool<'a> {
     counts: [u64; 2],
 }
 
-impl Pieces for Spool<'_> {
+impl SurfaceSink for Spool<'_> {
     fn add(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]], _: &[bool]) -> io::Result<()> {
         self.counts[0] += vertices.len() as u64;
         self.counts[1] += triangles.len() as u64;
@@ -107,7 +107,7 @@ fn corners(bytes: &[u8]) -> impl Iterator<Item = [u32; 3]> {
 
 impl Spool<'_> {
     /// Takes dropped components out of both files; gives the numbers of the vertices that are left.
-    fn drop_components(&mut self, found: &Resolved) -> io::Result<Numbers> {
+    fn drop_components(&mut self, found: &Resolved) -> io::Result<VertexRanks> {
         let kept = compact::ranges(&found.parts);
         let mut used = vec![0u64; self.counts[0].div_ceil(64) as usize];
         for range in &kept {
@@ -119,7 +119,7 @@ impl Spool<'_> {
             }
         }
         compact::compact(self.triangles, 0, TRIANGLE, &kept, |_| true)?;
-        let numbers = Numbers::new(used);
+        let numbers = VertexRanks::new(used);
         compact::compact(self.vertices, 0, VERTEX, &numbers.ranges(), |_| true)?;
         self.counts = [numbers.count, kept.iter().map(|r| r.end - r.start).sum()];
         Ok(numbers)
@@ -127,21 +127,21 @@ impl Spool<'_> {
 }
 
 /// The numbers of the vertices of a set among themselves: a bit for each vertex, and how many are before each word.
-struct Numbers {
+struct VertexRanks {
     used: Vec<u64>,
     before: Vec<u32>,
     count: u64,
 }
 
-impl Numbers {
-    fn new(used: Vec<u64>) -> Numbers {
+impl VertexRanks {
+    fn new(used: Vec<u64>) -> VertexRanks {
         let mut count = 0u64;
         let before = used.iter().map(|word| {
             count += u64::from(word.count_ones());
             (count - u64::from(word.count_ones())) as u32
         });
         let before = before.collect();
-        Numbers { used, before, count }
+        VertexRanks { used, before, count }
     }
 
     /// The set as ranges.
@@ -174,7 +174,7 @@ impl Numbers {
 struct Spooled<'a> {
     counts: [usize; 2],
     files: Mutex<Spool<'a>>,
-    numbers: Option<Numbers>,
+    numbers: Option<VertexRanks>,
     /// Records that were read, of how many.
     reported: Mutex<(u64, u64)>,
     progress: Stage<'a>,
@@ -241,7 +241,7 @@ mod tests {
         let of = |v: u32| v.is_multiple_of(3) || (60..70).contains(&v);
         let mut used = vec![0u64; 4];
         (0..256).filter(|v| of(*v)).for_each(|v| used[v as usize / 64] |= 1 << (v % 64));
-        let numbers = Numbers::new(used);
+        let numbers = VertexRanks::new(used);
         let kept: Vec<u32> = (0..256).filter(|v| of(*v)).collect();
         assert_eq!(numbers.count, kept.len() as u64);
         assert!((0..).zip(kept).all(|(n, v)| numbers.of(v) == n));

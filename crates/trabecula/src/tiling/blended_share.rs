@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Level, Tiling};
+use super::{NodalLevel, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::FractionTable;
 use geometry::random::{low_discrepancy, random};
@@ -25,7 +25,7 @@ impl Tiling {
     /// tetrahedra overlapping; without an overlap, itself. Levels that vary are moved by one number then, until the fraction
     /// of the whole is the mean asked for.
     #[must_use]
-    pub fn meeting(mut self, fractions: Option<&[f64]>) -> Tiling {
+    pub fn with_fraction(mut self, fractions: Option<&[f64]>) -> Tiling {
         if self.map.overlap() <= 0.0 {
             return self;
         }
@@ -34,13 +34,13 @@ impl Tiling {
             if let Some(asked) = fractions {
                 let levels: Vec<f64> = asked.iter().map(|v| table.iso(self.part, *v)).collect();
                 self.level = match levels[..] {
-                    [one] => Level::Same(one),
-                    _ => Level::Nodes(Arc::new(levels)),
+                    [one] => NodalLevel::Same(one),
+                    _ => NodalLevel::Nodes(Arc::new(levels)),
                 };
             }
             self.blended = Some(Arc::new(table));
         }
-        if let (Some(asked), Level::Nodes(levels)) = (fractions, &self.level) {
+        if let (Some(asked), NodalLevel::Nodes(levels)) = (fractions, &self.level) {
             let at = |n: u32| asked[(n as usize).min(asked.len() - 1)];
             let mean = |t: usize| self.map.tet(t).map(at).iter().sum::<f64>() / 4.0;
             let all = (0..self.map.len()).map(|t| (self.map.volume(t), mean(t)));
@@ -50,7 +50,7 @@ impl Tiling {
             let by = if self.part == Part::Upper { -by } else { by };
             // The half-level of a sheet stays one.
             let least = if self.part == Part::Sheet { 1e-6 } else { f64::NEG_INFINITY };
-            self.level = Level::Nodes(Arc::new(levels.iter().map(|v| (v + by).max(least)).collect()));
+            self.level = NodalLevel::Nodes(Arc::new(levels.iter().map(|v| (v + by).max(least)).collect()));
         }
         self
     }

@@ -15,7 +15,7 @@ const SAMPLED: usize = 256;
 
 /// The angles (degrees) between the two sides of the surface at the faces between tetrahedra.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Creases {
+pub struct CreaseAngles {
     /// The mean along all traces.
     pub mean: f64,
     /// The greatest.
@@ -26,7 +26,7 @@ pub struct Creases {
 
 impl Tiling {
     /// The creases without overlap, and what is left of them with it, at the mean level where it varies. `None` for transitions, and where no face is met.
-    pub fn creases(&self) -> Option<Creases> {
+    pub fn creases(&self) -> Option<CreaseAngles> {
         let [cell] = &self.cells[..] else { return None };
         let levels = self.levels();
         let t = 0.5 * (levels.lo + levels.hi) * cell.scale;
@@ -66,7 +66,7 @@ impl Tiling {
                 }
             }
         }
-        (count > 0.0).then(|| Creases { mean: sum / count, max, smoothed: self.smoothed() })
+        (count > 0.0).then(|| CreaseAngles { mean: sum / count, max, smoothed: self.smoothed() })
     }
 
     /// The greatest angle between gradients on both sides of faces, at three points of each of some hundred, 1e-7 of the

@@ -3,7 +3,7 @@
 //! A strut crosses the faces of a tetrahedron in its ports, and is as thin as the least face makes it: in flat tetrahedra, such as those of
 //! layers of prisms, that is far smaller than the face on the surface.
 
-use super::{Level, Ports, Tiling};
+use super::{NodalLevel, Ports, Tiling};
 use geometry::math::{cross, norm, sub};
 use geometry::tetmesh::FACES;
 
@@ -39,7 +39,7 @@ impl Tiling {
     /// For each node of the mesh, the area of a port in faces: `mean` at the mean level, where cells are mixed everywhere.
     pub(super) fn port_areas(&self, mean: f64) -> Vec<f64> {
         let count = self.map.nodes().len();
-        let (Level::Nodes(of), [cell]) = (&self.level, &self.cells[..]) else { return vec![mean; count] };
+        let (NodalLevel::Nodes(of), [cell]) = (&self.level, &self.cells[..]) else { return vec![mean; count] };
         let levels = self.levels();
         let width = levels.hi - levels.lo;
         let share = |t: f64| cell.cell.face_fraction(self.part, t * cell.scale);
@@ -92,8 +92,8 @@ impl Tiling {
     fn walls_at_nodes(&self, mean: f64) -> Vec<f64> {
         // Walls are as thick as the level says, in units of the size.
         let level = |n: usize| match &self.level {
-            Level::Same(t) => *t,
-            Level::Nodes(of) => of[n],
+            NodalLevel::Same(t) => *t,
+            NodalLevel::Nodes(of) => of[n],
         };
         let faces = self.least_faces();
         let own: Vec<f64> = faces.iter().enumerate().map(|(n, area)| level(n) * area.sqrt()).collect();

@@ -6,10 +6,10 @@
 use geometry::progress::checkpoint;
 use rayon::prelude::*;
 
-use super::{Level, Share, Tiling};
+use super::{NodalLevel, Share, Tiling};
 use crate::cell::Part;
-use crate::cell::tet::{Nodes, Subdivision, share_below};
-use crate::map::Tets;
+use crate::cell::tet::{Subdivision, SubdivisionNodes, share_below};
+use crate::map::CarrierMesh;
 
 /// Steps along the edge of the tetrahedron, coarse and fine.
 const STEPS: [usize; 2] = [16, 32];
@@ -43,7 +43,7 @@ impl Size {
         let mut tets = Vec::with_capacity(n.pow(3));
         grid.each_tet(|at, _| tets.push(at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32)));
         let values = |c: &Share| {
-            let values = Nodes::new(&c.cell, grid).values;
+            let values = SubdivisionNodes::new(&c.cell, grid).values;
             values.into_iter().map(|v| v / c.scale).collect()
         };
         Size {
@@ -113,7 +113,7 @@ impl Mixture {
 }
 
 /// The weights of all cells at the corners of a tetrahedron.
-pub(super) fn weights(map: &Tets, cells: &[Share], t: usize) -> Vec<[f64; 4]> {
+pub(super) fn weights(map: &CarrierMesh, cells: &[Share], t: usize) -> Vec<[f64; 4]> {
     let at = |c: &Share| match &c.weights {
         Some(w) => map.tet(t).map(|n| w[n as usize]),
         None => [1.0; 4],
@@ -126,12 +126,12 @@ pub(super) fn only(weights: &[[f64; 4]]) -> Option<usize> {
     weights.iter().position(|w| *w == [1.0; 4])
 }
 
-impl Level {
+impl NodalLevel {
     /// The levels at which several cells have the target fractions at the nodes, one or one for each. A node of one
     /// cell has that cell's level. Where cells meet, levels of nodes are moved until the tetrahedra about each, taken
     /// together, meet the target: the mean of the cells' levels alone would lose some of it, since a sum of two
     /// functions has other values than either.
-    pub fn mixed(map: &Tets, cells: &[Share], part: Part, target: &[f64]) -> Level {
+    pub fn mixed(map: &CarrierMesh, cells: &[Share], part: Part, target: &[f64]) -> NodalLevel {
         let target = |n: u32| target[(n as usize).min(target.len() - 1)];
         let weight = |c: &Share, n: u32| c.weights.as_ref().map_or(1.0, |w| w[n as usize]);
         let start = |n: u32| {
@@ -185,7 +185,7 @@ impl Level {
                 break;
             }
         }
-        Level::Nodes(levels.into())
+        NodalLevel::Nodes(levels.into())
     }
 }
 
@@ -193,7 +193,7 @@ impl Tiling {
     /// The solid share of each tetrahedron: exact where there is one cell at one level, and from the cell's table where levels
     /// are alike; else by small tetrahedra. Where tetrahedra overlap, those of the blended function in the whole mesh.
     pub fn shares(&self) -> Vec<f64> {
-        if let (Level::Same(t), [_]) = (&self.level, &self.cells[..]) {
+        if let (NodalLevel::Same(t), [_]) = (&self.level, &self.cells[..]) {
             return vec![self.fraction(*t); self.map.len()];
         }
         if self.map.overlap() > 0.0 {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::Level;
+use super::NodalLevel;
 use crate::cell::Part;
-use crate::cell::tet::{Bary, Nodes, Subdivision, TetCell};
-use crate::map::Tets;
+use crate::cell::tet::{Bary, Subdivision, SubdivisionNodes, TetCell};
+use crate::map::CarrierMesh;
 use geometry::math::{Vec3, add, cross, norm, scale};
 
 /// Steps along the edge on which the mid-surface is sampled.
@@ -25,7 +25,7 @@ pub enum Amount {
 }
 
 /// A piece of the mid-surface f = 0, about a point.
-pub(super) struct Piece {
+pub(super) struct MidSurfacePiece {
     pub at: Bary,
     /// ∂f/∂λ there.
     pub slope: Bary,
@@ -36,9 +36,10 @@ pub(super) struct Piece {
 
 /// The mid-surface of a cell in small pieces. Their area falls short of the true one by the square of a step, which twice the steps
 /// show: all weights make up for it.
-pub(super) fn middle(cell: &TetCell) -> Vec<Piece> {
-    let area =
-        |pieces: &[Piece]| pieces.iter().map(|p| p.weight * norm([p.slope[0], p.slope[1], p.slope[2]])).sum::<f64>();
+pub(super) fn middle(cell: &TetCell) -> Vec<MidSurfacePiece> {
+    let area = |pieces: &[MidSurfacePiece]| {
+        pieces.iter().map(|p| p.weight * norm([p.slope[0], p.slope[1], p.slope[2]])).sum::<f64>()
+    };
     let (mut pieces, fine) = (middle_in(cell, STEPS), area(&middle_in(cell, 2 * STEPS)));
     let coarse = area(&pieces);
     if coarse > 0.0 {
@@ -48,8 +49,8 @@ pub(super) fn middle(cell: &TetCell) -> Vec<Piece> {
     pieces
 }
 
-fn middle_in(cell: &TetCell, n: usize) -> Vec<Piece> {
-    let nodes = Nodes::new(cell, Subdivision { n });
+fn middle_in(cell: &TetCell, n: usize) -> Vec<MidSurfacePiece> {
+    let nodes = SubdivisionNodes::new(cell, Subdivision { n });
     let mut triangles: Vec<[Bary; 3]> = Vec::new();
     nodes.grid.each_tet(|at, _| {
         let i = at.map(|[i, j, k]| Subdivision::index(i, j, k));
@@ -77,23 +78,23 @@ fn middle_in(cell: &TetCell, n: usize) -> Vec<Piece> {
         let side = |k: usize| -> Vec3 { core::array::from_fn(|i| t[k][i] - t[0][i]) };
         let area = 0.5 * norm(cross(side(1), side(2)));
         let steep = norm([slope[0], slope[1], slope[2]]);
-        (area > 0.0 && steep > 0.0).then(|| Piece { at, slope, weight: area / steep })
+        (area > 0.0 && steep > 0.0).then(|| MidSurfacePiece { at, slope, weight: area / steep })
     };
     triangles.iter().zip(at).zip(g).filter_map(piece).collect()
 }
 
 /// |∇f| (per mm) in a tetrahedron where ∂f/∂λ is `g`.
-pub(super) fn steepness(map: &Tets, t: usize, g: &Bary) -> f64 {
+pub(super) fn steepness(map: &CarrierMesh, t: usize, g: &Bary) -> f64 {
     let m = map.slopes(t);
     let slope: Vec3 = (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], g[i])));
     norm(slope)
 }
 
-impl Level {
+impl NodalLevel {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in the tetrahedra about a
     /// node, and all are scaled so that the mean of that over the whole mid-surface is as asked.
-    pub fn of(map: &Tets, cell: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
+    pub fn of(map: &CarrierMesh, cell: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> NodalLevel {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
             Amount::Iso => v,
@@ -101,19 +102,19 @@ impl Level {
             Amount::Thickness => 0.5 * v,
         };
         if one && amount != Amount::Thickness {
-            return Level::Same(level(values[0]));
+            return NodalLevel::Same(level(values[0]));
         }
         let mut values = if one { vec![values[0]; map.nodes().len()] } else { values };
         values.par_iter_mut().for_each(|v| *v = level(*v));
         if amount == Amount::Thickness {
             values = of_thickness(map, &middle(cell), &values);
         }
-        Level::Nodes(Arc::new(values))
+        NodalLevel::Nodes(Arc::new(values))
     }
 }
 
 /// The level at each node that gives half-walls of these thicknesses (mm).
-fn of_thickness(map: &Tets, pieces: &[Piece], half: &[f64]) -> Vec<f64> {
+fn of_thickness(map: &CarrierMesh, pieces: &[MidSurfacePiece], half: &[f64]) -> Vec<f64> {
     // The mean of |∇f| over a mid-surface weighs pieces by what makes 2t/|∇f|, weighted by area, its inverse.
     let weight: f64 = pieces.iter().map(|p| p.weight).sum();
     let area = |t: usize| {
@@ -133,7 +134,7 @@ fn of_thickness(map: &Tets, pieces: &[Piece], half: &[f64]) -> Vec<f64> {
     // Half the walls asked for and found, integrated over the mid-surface; both are linear in what nodes have.
     let sums = |t: usize| {
         let at = |of: &[f64], l: &Bary| (0..4).map(|i| l[i] * of[map.tet(t)[i] as usize]).sum::<f64>();
-        let one = |p: &Piece| {
+        let one = |p: &MidSurfacePiece| {
             [at(half, &p.at) * p.weight * steepness(map, t, &p.slope), at(&levels, &p.at) * p.weight]
                 .map(|v| map.volume(t) * v)
         };

@@ -3,7 +3,7 @@
 //! The trace is the same on all faces of a tetrahedron and symmetric in its three coordinates, so a port and the one across an edge of
 //! the face are mirror images, and a line from a port to the edge goes on to the other's.
 
-use super::{FaceGrid, Level, Tiling};
+use super::{FaceGrid, NodalLevel, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
 use geometry::math::{cross, norm, sub};
@@ -142,12 +142,14 @@ impl Tiling {
 
     /// The tiling with its surface moved: solid where its field was at most `by`. The half-level of a sheet stays positive.
     #[must_use]
-    pub fn moved(mut self, by: f64) -> Tiling {
+    pub fn with_level_shift(mut self, by: f64) -> Tiling {
         let by = if self.part == Part::Upper { -by } else { by };
         let least = if self.part == Part::Sheet { 1e-6 } else { f64::NEG_INFINITY };
         self.level = match &self.level {
-            Level::Same(t) => Level::Same((t + by).max(least)),
-            Level::Nodes(of) => Level::Nodes(of.iter().map(|t| (t + by).max(least)).collect::<Vec<f64>>().into()),
+            NodalLevel::Same(t) => NodalLevel::Same((t + by).max(least)),
+            NodalLevel::Nodes(of) => {
+                NodalLevel::Nodes(of.iter().map(|t| (t + by).max(least)).collect::<Vec<f64>>().into())
+            }
         };
         self
     }

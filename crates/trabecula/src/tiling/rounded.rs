@@ -13,11 +13,11 @@
 
 use std::sync::Arc;
 
-use super::{Level, Share, Tiling};
+use super::{NodalLevel, Share, Tiling};
 use crate::cell::Part;
 use crate::field::{Block, Field, fill_points};
 use crate::implicit::Implicit;
-use crate::map::Tets;
+use crate::map::CarrierMesh;
 use crate::map::bent_tets::within;
 use crate::region::Region;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale};
@@ -97,8 +97,8 @@ impl Steepness {
     /// The steepness and the level at a node.
     fn of_node(&self, n: usize) -> [f64; 2] {
         let level = match &self.tiling.level {
-            Level::Same(t) => *t,
-            Level::Nodes(of) => of[n],
+            NodalLevel::Same(t) => *t,
+            NodalLevel::Nodes(of) => of[n],
         };
         [self.at_nodes[n], level]
     }
@@ -109,9 +109,9 @@ impl Steepness {
         let nodes = vec![[0.0; 3], [0.0, half, half], [half, 0.0, half], [half, half, 0.0]];
         let regular = TetMesh { nodes, tets: vec![[0, 1, 2, 3]], zones: Vec::new() };
         // It is a mesh.
-        let Ok(map) = Tets::new(&regular, 0.0) else { return 1.0 };
+        let Ok(map) = CarrierMesh::new(&regular, 0.0) else { return 1.0 };
         let cell = Share { weights: None, ..self.tiling.cells[0].clone() };
-        let level = Level::Same(self.tiling.mean_level());
+        let level = NodalLevel::Same(self.tiling.mean_level());
         Steepness::new(&Arc::new(Tiling::of(Arc::new(map), vec![cell], self.tiling.part, level))).at_nodes[0]
     }
 

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::{Level, Tiling};
+use super::{NodalLevel, Tiling};
 use crate::cell::Cut;
 use crate::cell::tet::{Bary, TetCell};
 use crate::field::Field;
@@ -25,7 +25,7 @@ pub struct SpaceFilling {
 }
 
 /// Where a position is: coordinates in its tetrahedron, the axes by the size of the offset along them, and the signs of the two greater ones.
-struct Place {
+struct TetPosition {
     bary: Bary,
     axes: [usize; 3],
     signs: [f64; 2],
@@ -34,7 +34,7 @@ struct Place {
 impl SpaceFilling {
     /// That of a tiling of cubes of this edge (mm); `None` if its level varies, tetrahedra overlap or have several cells.
     pub fn of(tiling: &Tiling, edge: f64) -> Option<SpaceFilling> {
-        let ([share], Level::Same(level)) = (&tiling.cells[..], &tiling.level) else { return None };
+        let ([share], NodalLevel::Same(level)) = (&tiling.cells[..], &tiling.level) else { return None };
         (tiling.map.overlap() <= 0.0 && share.scale == 1.0 && share.weights.is_none()).then(|| SpaceFilling {
             cell: share.cell.clone(),
             cut: tiling.cut,
@@ -44,7 +44,7 @@ impl SpaceFilling {
         })
     }
 
-    fn place(&self, p: Vec3) -> Place {
+    fn place(&self, p: Vec3) -> TetPosition {
         let q = p.map(|x| {
             let u = x / self.edge;
             u - u.floor() - 0.5
@@ -53,7 +53,7 @@ impl SpaceFilling {
         axes.sort_by(|a, b| q[*b].abs().total_cmp(&q[*a].abs()));
         let [a, b, c] = axes.map(|axis| q[axis]);
         let (alpha, beta) = (a.abs(), b.abs());
-        Place {
+        TetPosition {
             bary: [1.0 - alpha - beta, alpha - beta, beta + c, beta - c],
             axes,
             signs: [1f64.copysign(a), 1f64.copysign(b)],
@@ -70,11 +70,11 @@ impl Field for SpaceFilling {
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let places: Vec<Place> = points.iter().map(|p| self.place(*p)).collect();
+        let places: Vec<TetPosition> = points.iter().map(|p| self.place(*p)).collect();
         let barys: Vec<Bary> = places.iter().map(|p| p.bary).collect();
         let mut slopes = vec![[0.0; 4]; points.len()];
         self.cell.gradients(&barys, values, &mut slopes);
-        for (i, Place { axes, signs, .. }) in places.iter().enumerate() {
+        for (i, TetPosition { axes, signs, .. }) in places.iter().enumerate() {
             let [s0, s1, s2, s3] = slopes[i];
             let mut slope = [0.0; 3];
             slope[axes[0]] = signs[0] * (s1 - s0) / self.edge;

@@ -28,12 +28,12 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::{Level, Tiling};
-use crate::cell::tet::{NamedTetCell, Nodes, Subdivision};
-use crate::map::Tets;
+use super::{NodalLevel, Tiling};
+use crate::cell::tet::{NamedTetCell, Subdivision, SubdivisionNodes};
+use crate::map::CarrierMesh;
 use crate::map::tet_map::NONE;
 use crate::surface_maker::{
-    self, Estimate, Options, Pieces, Resolved, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty,
+    self, Estimate, Resolved, StlStream, Store, Summary, SurfaceMaker, SurfaceOptions, SurfaceSink, Totals, not_empty,
 };
 pub use bending::Bending;
 use bent_nodes::{BentNodes, Places};
@@ -47,7 +47,7 @@ use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh;
 use shared_vertices::SharedVertices;
 use small_simplices::Template;
-use tet_surface::{Core, Levels, MARGIN, Scratch, TetSurface};
+use tet_surface::{Core, CornerLevels, MARGIN, TetBuffers, TetSurface};
 use volume_shift::Stencil;
 
 /// Tetrahedra that a thread takes at once.
@@ -56,13 +56,13 @@ const CHUNK: usize = 128;
 const STEPS: [usize; 2] = [4, 64];
 
 /// Data common to all tetrahedra.
-struct Work<'a> {
+struct MeshingContext<'a> {
     tiling: &'a Tiling,
     /// The levels of the surface: of one cell those that make up for the volume that chords cost.
-    level: Level,
+    level: NodalLevel,
     template: Template,
     /// For each cell, its values at nodes, divided by its scale, and its slopes along edges.
-    cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)>,
+    cells: Vec<(SubdivisionNodes, Vec<f64>, Vec<[f64; 2]>)>,
     /// The surface for each set of capped faces, where all tetrahedra have the same.
     same: [OnceLock<TetSurface>; 16],
     /// Where the mesh is bent onto a region.
@@ -97,7 +97,7 @@ struct Chunk<'a> {
 }
 
 /// The number of steps along the edge of a tetrahedron for a spacing of `edge` (mm).
-fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
+fn steps(tets: &CarrierMesh, edge: f64) -> Result<usize, Fault> {
     let mean = tets.mean_edge();
     let n = (mean / edge).round();
     if !(edge > 0.0 && n <= STEPS[1] as f64) {
@@ -131,18 +131,18 @@ fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
     Ok(n)
 }
 
-impl<'a> Work<'a> {
-    fn new(tiling: &'a Tiling, edge: f64) -> Result<Work<'a>, Fault> {
-        Work::in_steps(tiling, steps(&tiling.map, edge)?)
+impl<'a> MeshingContext<'a> {
+    fn new(tiling: &'a Tiling, edge: f64) -> Result<MeshingContext<'a>, Fault> {
+        MeshingContext::in_steps(tiling, steps(&tiling.map, edge)?)
     }
 
     /// With `n` steps along the edge of a tetrahedron.
-    fn in_steps(tiling: &'a Tiling, n: usize) -> Result<Work<'a>, Fault> {
+    fn in_steps(tiling: &'a Tiling, n: usize) -> Result<MeshingContext<'a>, Fault> {
         let grid = Subdivision { n };
         component_links::manifold(&tiling.map)?;
         let template = Template::new(grid);
         let cells = tiling.cells.iter().map(|c| {
-            let mut nodes = Nodes::new(&c.cell, grid);
+            let mut nodes = SubdivisionNodes::new(&c.cell, grid);
             let slopes = template.edges.iter().map(|[a, b]| {
                 let (a, b) = (*a as usize, *b as usize);
                 [nodes.slope(a, b) / c.scale, -nodes.slope(b, a) / c.scale]
@@ -152,14 +152,14 @@ impl<'a> Work<'a> {
             nodes.values = Vec::new();
             (nodes, values, slopes)
         });
-        let cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)> = cells.collect();
+        let cells: Vec<(SubdivisionNodes, Vec<f64>, Vec<[f64; 2]>)> = cells.collect();
         let level = match &cells[..] {
             [(nodes, values, slopes)] if tiling.map.overlap() <= 0.0 => {
                 Stencil { nodes, template: &template, values, slopes }.shifted(tiling)
             }
             _ => tiling.level.clone(),
         };
-        Ok(Work {
+        Ok(MeshingContext {
             tiling,
             level,
             cells,
@@ -192,20 +192,20 @@ impl<'a> Work<'a> {
         self.bent.get_or_init(|| BentNodes::new(&self.tiling.map, nodes, &self.template)).as_ref()
     }
 
-    fn tet_surface(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
+    fn tet_surface(&self, t: usize, scratch: &mut TetBuffers) -> TetSurfaceRef<'_> {
         let mask = self.mask(t);
         if self.tiling.map.overlap() > 0.0 {
             return TetSurfaceRef::Own(Box::new(self.blended(t, mask, scratch)));
         }
         let (nodes, values, slopes) = &self.cells[0];
-        let cut = |core: &Core, scratch: &mut Scratch| {
+        let cut = |core: &Core, scratch: &mut TetBuffers| {
             TetSurface::new(nodes, &self.template, core, self.tiling.part, mask, scratch)
         };
-        if let (Level::Same(level), true) = (&self.level, self.alike()) {
-            let levels = Levels::Same(*level);
+        if let (NodalLevel::Same(level), true) = (&self.level, self.alike()) {
+            let levels = CornerLevels::Same(*level);
             return TetSurfaceRef::Shared(self.same[mask as usize].get_or_init(|| {
                 let core = Core { values, slopes, levels };
-                cut(&core, &mut Scratch::default())
+                cut(&core, &mut TetBuffers::default())
             }));
         }
         // What is linear in the tetrahedron, summed in the order of the mesh's nodes: a zero added changes no bit, so on a
@@ -218,10 +218,10 @@ impl<'a> Work<'a> {
             nodes.whole.iter().map(at).collect()
         };
         let levels = match &self.level {
-            Level::Same(v) => vec![*v; nodes.whole.len()],
-            Level::Nodes(of) => linear(of),
+            NodalLevel::Same(v) => vec![*v; nodes.whole.len()],
+            NodalLevel::Nodes(of) => linear(of),
         };
-        let levels = Levels::Each(&levels);
+        let levels = CornerLevels::Each(&levels);
         let mixed = self.tiling.cells.iter().any(|c| c.weights.is_some());
         if !mixed {
             let core = Core { values, slopes, levels };
@@ -250,7 +250,7 @@ impl<'a> Work<'a> {
 
     /// The surface of the blended function in a tetrahedron. Nodes are placed and evaluated by position alone: on a common face
     /// both tetrahedra find the same in all bits, since a corner that does not count adds a zero.
-    fn blended(&self, t: usize, mask: u8, scratch: &mut Scratch) -> TetSurface {
+    fn blended(&self, t: usize, mask: u8, scratch: &mut TetBuffers) -> TetSurface {
         let nodes = &self.cells[0].0;
         let (corners, n) = (self.tiling.map.corners(t), nodes.grid.n as f64);
         let place = |k: &[u16; 4]| {
@@ -268,12 +268,12 @@ impl<'a> Work<'a> {
             [a, b].map(|i| dot(known[i].slope, step))
         });
         let slopes: Vec<[f64; 2]> = slopes.collect();
-        let core = Core { values: &values, slopes: &slopes, levels: Levels::Each(&levels) };
+        let core = Core { values: &values, slopes: &slopes, levels: CornerLevels::Each(&levels) };
         TetSurface::new(nodes, &self.template, &core, self.tiling.part, mask, scratch)
     }
 
     /// Cuts a range of tetrahedra and sums up the totals of their surface components.
-    fn chunk(&self, range: Range<usize>, scratch: &mut Scratch, stl: bool) -> Chunk<'_> {
+    fn chunk(&self, range: Range<usize>, scratch: &mut TetBuffers, stl: bool) -> Chunk<'_> {
         let mut out = Chunk {
             surfaces: Vec::with_capacity(range.len()),
             totals: Vec::new(),
@@ -345,7 +345,7 @@ impl<'a> Work<'a> {
             let starts: Vec<usize> = (first..end).step_by(CHUNK).collect();
             starts
                 .par_iter()
-                .map_init(Scratch::default, |scratch, &i| self.chunk(i..end.min(i + CHUNK), scratch, stl))
+                .map_init(TetBuffers::default, |scratch, &i| self.chunk(i..end.min(i + CHUNK), scratch, stl))
                 .collect()
         };
         let mut made = make(0);
@@ -381,8 +381,13 @@ fn turned([a, b, c]: [u32; 3], flipped: bool) -> [u32; 3] {
 pub struct TilingSurface<'a>(pub &'a Tiling);
 
 impl SurfaceMaker for TilingSurface<'_> {
-    fn make(&self, options: &Options, out: &mut dyn Pieces, progress: &dyn Progress) -> Result<Resolved, Stopped> {
-        let work = Work::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+    fn make(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn SurfaceSink,
+        progress: &dyn Progress,
+    ) -> Result<Resolved, Stopped> {
+        let work = MeshingContext::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let (mut links, mut shared) = (ComponentLinks::default(), SharedVertices::default());
         let (mut vertices, mut count) = (0, 0u64);
         work.each(progress, false, |start, chunk| {
@@ -411,8 +416,13 @@ impl SurfaceMaker for TilingSurface<'_> {
     }
 
     /// Memory is bounded by the tetrahedra in flight and a few numbers for each.
-    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
-        let work = Work::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+    fn stream_stl(
+        &self,
+        options: &SurfaceOptions,
+        out: &mut dyn Store,
+        progress: &dyn Progress,
+    ) -> Result<Summary, Stopped> {
+        let work = MeshingContext::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let mut links = ComponentLinks::default();
         let mut triangles = 0u64;
         let mut stream = StlStream::new(out, options.islands, progress)?;
@@ -436,10 +446,10 @@ impl SurfaceMaker for TilingSurface<'_> {
     /// Counted where the surface is the same in all tetrahedra, otherwise estimated from some of them.
     fn estimate(&self, edge: f64) -> Result<Estimate, Fault> {
         const SAMPLES: usize = 64;
-        let work = Work::new(self.0, edge)?;
+        let work = MeshingContext::new(self.0, edge)?;
         let total = self.0.map.len();
         let step = if work.alike() { 1 } else { total.div_ceil(SAMPLES) };
-        let mut scratch = Scratch::default();
+        let mut scratch = TetBuffers::default();
         let (mut count, mut sampled) = (0.0, 0.0);
         for t in (step / 2..total).step_by(step) {
             count += work.tet_surface(t, &mut scratch).triangles.len() as f64;
@@ -471,8 +481,8 @@ pub fn cell_surface(named: &NamedTetCell, steps: usize, progress: &dyn Progress)
         tets: vec![[0, 1, 2, 3]],
         zones: Vec::new(),
     };
-    let map = Tets::new(&mesh, 0.0).map_err(Stopped::Refused)?;
-    let level = Level::Same(cell.iso(named.part, named.fraction));
+    let map = CarrierMesh::new(&mesh, 0.0).map_err(Stopped::Refused)?;
+    let level = NodalLevel::Same(cell.iso(named.part, named.fraction));
     let tiling = Tiling::new(Arc::new(map), Arc::new(cell), named.part, level);
-    Ok(TilingSurface(&tiling).mesh(&Options::new(1.0 / steps as f64), progress)?.surface)
+    Ok(TilingSurface(&tiling).mesh(&SurfaceOptions::new(1.0 / steps as f64), progress)?.surface)
 }

@@ -8,8 +8,8 @@
 use rayon::prelude::*;
 
 use super::mixture::{Mixture, weights};
-use super::node_levels::{Piece, middle, steepness};
-use super::{Level, Tiling};
+use super::node_levels::{MidSurfacePiece, middle, steepness};
+use super::{NodalLevel, Tiling};
 use crate::cell::Part;
 use geometry::math::{Vec3, add, dot, norm, scale};
 use geometry::progress::checkpoint;
@@ -64,7 +64,7 @@ fn sums(of: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
 }
 
 /// The mean of something, weighted by area, over the pieces of the mid-surface in some tetrahedra; summed in their order.
-fn mean(tets: &[usize], pieces: &[Piece], of: impl Fn(usize, &Piece) -> [f64; 2] + Sync) -> f64 {
+fn mean(tets: &[usize], pieces: &[MidSurfacePiece], of: impl Fn(usize, &MidSurfacePiece) -> [f64; 2] + Sync) -> f64 {
     let found: Vec<[f64; 2]> = tets.par_iter().map(|t| sums(pieces.iter().map(|p| of(*t, p)))).collect();
     let [sum, area] = found.into_iter().fold([0.0; 2], |[s, a], [v, w]| [s + v, a + w]);
     sum / area
@@ -82,10 +82,10 @@ impl Tiling {
         let tet = |(i, t): (usize, usize)| {
             // Other ones in every tetrahedron.
             let every = pieces.len().div_ceil(NORMALS).max(1);
-            let some: Vec<&Piece> = pieces.iter().skip(i % every).step_by(every).collect();
+            let some: Vec<&MidSurfacePiece> = pieces.iter().skip(i % every).step_by(every).collect();
             self.along_normals(t, &some)
         };
-        let all: Vec<Vec<Wall>> = self.some().into_par_iter().enumerate().map(tet).collect();
+        let all: Vec<Vec<Wall>> = self.sample_tets().into_par_iter().enumerate().map(tet).collect();
         let mut all: Vec<Wall> = all.into_iter().flatten().collect();
         all.sort_unstable_by(|a, b| a.thickness.total_cmp(&b.thickness).then(a.area.total_cmp(&b.area)));
         let area: f64 = all.iter().map(|w| w.area).sum();
@@ -109,16 +109,16 @@ impl Tiling {
     }
 
     /// As many tetrahedra as are enough for a mean over their pieces of the mid-surface.
-    fn many(&self, pieces: &[Piece]) -> Vec<usize> {
+    fn tets_for_mean(&self, pieces: &[MidSurfacePiece]) -> Vec<usize> {
         let step = (self.map.len() * pieces.len()).div_ceil(PIECES).max(1);
         (0..self.map.len()).step_by(step).collect()
     }
 
     /// The volume of walls over the area of their mid-surface, mm: of bent tetrahedra where the mesh is bent.
-    fn mean_wall(&self, pieces: &[Piece]) -> f64 {
+    fn mean_wall(&self, pieces: &[MidSurfacePiece]) -> f64 {
         let first_order = |tets: &[usize]| mean(tets, pieces, |t, p| self.first_order(t, p));
-        let many = self.many(pieces);
-        let flat = self.realised(pieces) * first_order(&many) / first_order(&self.some());
+        let many = self.tets_for_mean(pieces);
+        let flat = self.realised(pieces) * first_order(&many) / first_order(&self.sample_tets());
         let Some(bending) = self.bending() else { return flat };
         let areas: Vec<f64> =
             many.par_iter().map(|t| pieces.iter().map(|p| self.first_order(*t, p)[1]).sum()).collect();
@@ -129,13 +129,13 @@ impl Tiling {
     /// The sheet whose walls are on average as thick as asked (mm; one number, or one for each node, of which the mean over the
     /// mid-surface counts): all its levels are scaled alike.
     #[must_use]
-    pub fn walled(mut self, asked: &[f64]) -> Tiling {
+    pub fn with_mean_thickness(mut self, asked: &[f64]) -> Tiling {
         let pieces = middle(&self.cells[0].cell);
-        let at = |t: usize, p: &Piece| {
+        let at = |t: usize, p: &MidSurfacePiece| {
             let n = self.map.tet(t).map(|n| asked[(n as usize).min(asked.len() - 1)]);
             [(0..4).map(|i| p.at[i] * n[i]).sum::<f64>(), self.first_order(t, p)[1]]
         };
-        let wanted = if let [one] = asked { *one } else { mean(&self.many(&pieces), &pieces, at) };
+        let wanted = if let [one] = asked { *one } else { mean(&self.tets_for_mean(&pieces), &pieces, at) };
         for _ in 0..ROUNDS {
             checkpoint();
             let by = wanted / self.mean_wall(&pieces);
@@ -143,8 +143,8 @@ impl Tiling {
                 break;
             }
             self.level = match &self.level {
-                Level::Same(t) => Level::Same(by * t),
-                Level::Nodes(of) => Level::Nodes(of.iter().map(|t| by * t).collect::<Vec<f64>>().into()),
+                NodalLevel::Same(t) => NodalLevel::Same(by * t),
+                NodalLevel::Nodes(of) => NodalLevel::Nodes(of.iter().map(|t| by * t).collect::<Vec<f64>>().into()),
             };
             if (by - 1.0).abs() < NEAR {
                 break;
@@ -154,7 +154,7 @@ impl Tiling {
     }
 
     /// The thickness 2t/|∇f| (mm) of a piece in a tetrahedron, and its area (mm²).
-    fn first_order(&self, t: usize, p: &Piece) -> [f64; 2] {
+    fn first_order(&self, t: usize, p: &MidSurfacePiece) -> [f64; 2] {
         let steep = steepness(&self.map, t, &p.slope);
         let thickness = 2.0 * self.level_at(t, p.at) * self.cells[0].scale / steep;
         // Six times the volume is the determinant of the map from barycentric coordinates.
@@ -162,14 +162,14 @@ impl Tiling {
     }
 
     /// Some tetrahedra, evenly spread over the mesh.
-    fn some(&self) -> Vec<usize> {
+    fn sample_tets(&self) -> Vec<usize> {
         let count = self.map.len().min(TETS);
         (0..count).map(|i| i * self.map.len() / count).collect()
     }
 
     /// The volume of walls in some tetrahedra over the area of the mid-surface there, mm.
-    fn realised(&self, pieces: &[Piece]) -> f64 {
-        let some = self.some();
+    fn realised(&self, pieces: &[MidSurfacePiece]) -> f64 {
+        let some = self.sample_tets();
         let mixture = Mixture::new(&self.cells, self.part);
         let one = |t: &usize| {
             let volume = self.map.volume(*t);
@@ -200,7 +200,7 @@ impl Tiling {
     }
 
     /// The walls of a tetrahedron along the normals of these pieces of the mid-surface.
-    fn along_normals(&self, t: usize, pieces: &[&Piece]) -> Vec<Wall> {
+    fn along_normals(&self, t: usize, pieces: &[&MidSurfacePiece]) -> Vec<Wall> {
         let mut places: Vec<Vec3> = pieces.iter().map(|p| self.map.place(t, p.at)).collect();
         // On to the mid-surface, where overlap has moved it too.
         let mut known = self.known(&places);
@@ -212,8 +212,12 @@ impl Tiling {
         }
         let on = |i: &usize| known[*i].t > 0.0 && known[*i].f.abs() < 0.01 * known[*i].t;
         let found: Vec<usize> = (0..places.len()).filter(on).collect();
-        let nothing =
-            |p: &&Piece| Wall { thickness: 0.0, area: self.first_order(t, p)[1], through: 0.0, merged: false };
+        let nothing = |p: &&MidSurfacePiece| Wall {
+            thickness: 0.0,
+            area: self.first_order(t, p)[1],
+            through: 0.0,
+            merged: false,
+        };
         let mut walls: Vec<Wall> = pieces.iter().map(nothing).collect();
         for side in [1.0, -1.0] {
             let mut open = found.clone();

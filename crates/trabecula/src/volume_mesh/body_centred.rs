@@ -18,17 +18,17 @@ const NONE: u32 = u32::MAX;
 
 /// Where the cubes are.
 #[derive(Clone, Debug)]
-pub(super) struct Cubes {
+pub(super) struct CubeGrid {
     /// Cubes along each axis.
     pub count: [usize; 3],
     /// The box that they fill; its faces that bound the region are exact.
     pub bounds: Aabb,
 }
 
-impl Cubes {
+impl CubeGrid {
     /// Cubes of about `edge` (mm) in `bounds`, which grow by a margin on sides without a bounding plane; `planes[axis]` says which
     /// of the lower and upper side has one.
-    pub fn new(bounds: &Aabb, planes: [[bool; 2]; 3], edge: f64) -> Cubes {
+    pub fn new(bounds: &Aabb, planes: [[bool; 2]; 3], edge: f64) -> CubeGrid {
         let (mut count, mut grown) = ([0; 3], *bounds);
         for a in 0..3 {
             let length = bounds.max[a] - bounds.min[a];
@@ -48,7 +48,7 @@ impl Cubes {
             }
             count[a] += planes[a].iter().filter(|p| !**p).count();
         }
-        Cubes { count, bounds: grown }
+        CubeGrid { count, bounds: grown }
     }
 
     /// Coordinate of a plane of corners along an axis; the last one exactly at the upper bound.
@@ -64,8 +64,8 @@ impl Cubes {
     }
 
     /// Cubes of which there is one more along each axis, in the same box.
-    pub fn finer(&self) -> Cubes {
-        Cubes { count: self.count.map(|n| n + 1), ..self.clone() }
+    pub fn finer(&self) -> CubeGrid {
+        CubeGrid { count: self.count.map(|n| n + 1), ..self.clone() }
     }
 
     /// Whether a node of a periodic cell may lack images: at an edge of the cell where a node of the background, or the middle between two,
@@ -156,7 +156,7 @@ impl Cubes {
 
 /// Makes the tetrahedra layer by layer: the numbers of two planes of corners and two layers of centres are at hand.
 struct Maker<'a> {
-    cubes: &'a Cubes,
+    cubes: &'a CubeGrid,
     corners: [Vec<u32>; 2],
     centres: [Vec<u32>; 2],
     nodes: Vec<Vec3>,
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn the_background_fills_its_box_face_to_face() {
         let bounds = Aabb { min: [0.0, -1.0, 2.0], max: [3.0, 1.5, 4.0] };
-        let cubes = Cubes::new(&bounds, [[true; 2]; 3], 0.5);
+        let cubes = CubeGrid::new(&bounds, [[true; 2]; 3], 0.5);
         assert_eq!(cubes.count, [6, 5, 4]);
         let active = cubes.active(&|_| true);
         let (nodes, tets) = cubes.tetrahedra(&active);
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn sides_without_a_plane_have_a_margin() {
         let bounds = Aabb { min: [0.0; 3], max: [1.0; 3] };
-        let cubes = Cubes::new(&bounds, [[true, false], [false, false], [true, true]], 0.3);
+        let cubes = CubeGrid::new(&bounds, [[true, false], [false, false], [true, true]], 0.3);
         assert_eq!(cubes.bounds.min[0], 0.0);
         assert!(cubes.bounds.max[0] >= 1.3 && cubes.bounds.min[1] <= -0.3 && cubes.bounds.max[1] >= 1.3);
         assert_eq!((cubes.bounds.min[2], cubes.bounds.max[2]), (0.0, 1.0));

@@ -2,7 +2,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::body_centred::Cubes;
+use super::body_centred::CubeGrid;
 use crate::conforming_tets::{SurfaceSet, evaluated, images};
 use crate::csg_tree::CsgSolid;
 use crate::implicit::Surface;
@@ -20,7 +20,7 @@ pub const PLANES: [[&str; 2]; 3] = [["X0", "X1"], ["Y0", "Y1"], ["Z0", "Z1"]];
 /// # Errors
 /// A lattice, or what fills its place, that differs between opposite planes; a region that is no box.
 pub(super) fn cycles(
-    cubes: &Cubes,
+    cubes: &CubeGrid,
     planes: &[[Option<usize>; 2]; 3],
     nodes: &[Vec3],
     lattice: &[Surface],
@@ -97,7 +97,7 @@ pub(super) fn pairs(nodes: &[Vec3], on: &[SurfaceSet], next: &[u32], upper: [Sur
 ///
 /// # Errors
 /// They are not.
-pub(super) fn matched(mesh: &FeMesh, cubes: &Cubes, faces: impl Iterator<Item = (u32, u8)>) -> Result<(), Fault> {
+pub(super) fn matched(mesh: &FeMesh, cubes: &CubeGrid, faces: impl Iterator<Item = (u32, u8)>) -> Result<(), Fault> {
     let bounds = &cubes.bounds;
     let faces: Vec<[u32; 3]> = faces.map(|f| mesh.face(f)).collect();
     let paired: FxHashSet<u32> = mesh.pairs.iter().map(|p| p.node).collect();

@@ -12,14 +12,14 @@ fn built(region: &str, cell: &str, part: &str) -> crate::design::Built {
     Design::from_toml(&text).and_then(|d| d.build(&NoFiles)).expect("a design")
 }
 
-fn made(region: &str, options: &Options) -> MeshedVolume {
+fn made(region: &str, options: &VolumeMeshOptions) -> MeshedVolume {
     built(region, "gyroid", "sheet").volume_mesh(options, &Silent).expect("a mesh")
 }
 
 const BOX: &str = "box = { min = [0, 0, 0], max = [4, 4, 4] }";
 
-fn options(edge: f64) -> Options {
-    Options { edge, of: VolumeTarget::Solid, order: 1, periodic: false, largest: false }
+fn options(edge: f64) -> VolumeMeshOptions {
+    VolumeMeshOptions { edge, of: VolumeTarget::Solid, order: 1, periodic: false, largest: false }
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn meshes_conform_and_do_not_intersect_themselves() {
 #[test]
 fn nodes_on_curved_surfaces_of_quadratic_meshes_lie_on_them() {
     let design = built(BOX, "gyroid", "sheet");
-    let made = design.volume_mesh(&Options { order: 2, ..options(0.3) }, &Silent).expect("a mesh");
+    let made = design.volume_mesh(&VolumeMeshOptions { order: 2, ..options(0.3) }, &Silent).expect("a mesh");
     let mesh = made.mesh;
     let lattice = mesh.set("LATTICE").expect("its own surface");
     let points: Vec<Vec3> = lattice.nodes.iter().map(|n| mesh.nodes[*n as usize]).collect();
@@ -55,7 +55,7 @@ fn nodes_on_curved_surfaces_of_quadratic_meshes_lie_on_them() {
 #[test]
 fn domains_fill_the_region() {
     for (cell, part, names) in [("gyroid", "sheet", 3), ("primitive", "lower", 2)] {
-        let all = Options { of: VolumeTarget::All, ..options(0.3) };
+        let all = VolumeMeshOptions { of: VolumeTarget::All, ..options(0.3) };
         let mesh = built(BOX, cell, part).volume_mesh(&all, &Silent).expect("a mesh").mesh;
         // Sums of a hundred thousand volumes.
         assert!((mesh.volume() - 64.0).abs() < 1e-10 && mesh.domains.len() == names);
@@ -96,7 +96,7 @@ fn the_largest_component_alone_is_kept_on_request() {
                 map.affine.wavelength = 4\nlevel.fraction = { linear = { along = [1, 0, 0], stops = [[-6, 0.15], [6, 0.55]] } }\n";
     let design = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design");
     let all = design.volume_mesh(&options(4.0 / 24.0), &Silent).expect("a mesh");
-    let one = design.volume_mesh(&Options { largest: true, ..options(4.0 / 24.0) }, &Silent).expect("a mesh");
+    let one = design.volume_mesh(&VolumeMeshOptions { largest: true, ..options(4.0 / 24.0) }, &Silent).expect("a mesh");
     assert!(all.pieces > 1 && one.pieces == 1, "{} {}", all.pieces, one.pieces);
     assert!(one.loose > 0.0 && all.loose == 0.0);
     // Faces apart are balanced each by itself: the chip's volume is that of its unbalanced chords.

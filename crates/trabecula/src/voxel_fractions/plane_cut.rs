@@ -4,14 +4,14 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// The linear function `value` + `slope` · ξ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct LinearFunction {
     /// Value at the centre of the cube.
     pub value: f64,
     /// Gradient.
     pub slope: Vec3,
 }
 
-impl Plane {
+impl LinearFunction {
     /// The value at a point.
     pub fn at(&self, p: Vec3) -> f64 {
         self.value + dot(self.slope, p)
@@ -28,22 +28,24 @@ impl Plane {
     }
 
     /// The function, or its negative.
-    pub fn oriented(&self, up: bool) -> Plane {
+    pub fn oriented(&self, up: bool) -> LinearFunction {
         let s = if up { 1.0 } else { -1.0 };
-        Plane { value: s * self.value, slope: scale(self.slope, s) }
+        LinearFunction { value: s * self.value, slope: scale(self.slope, s) }
     }
 
     /// Whether the two are nowhere in the cube both positive: a positive combination of them is not.
-    pub fn excludes(&self, other: &Plane) -> bool {
+    pub fn excludes(&self, other: &LinearFunction) -> bool {
         let (a, b) = (1.0 / self.steepness().max(f64::MIN_POSITIVE), 1.0 / other.steepness().max(f64::MIN_POSITIVE));
-        let sum =
-            Plane { value: a * self.value + b * other.value, slope: add(scale(self.slope, a), scale(other.slope, b)) };
+        let sum = LinearFunction {
+            value: a * self.value + b * other.value,
+            slope: add(scale(self.slope, a), scale(other.slope, b)),
+        };
         sum.value + sum.rise() <= 0.0
     }
 }
 
 /// The share of the cube in which the function is negative (Scardovelli and Zaleski, J. Comput. Phys. 164 (2000) 228).
-pub fn below(plane: &Plane) -> f64 {
+pub fn below(plane: &LinearFunction) -> f64 {
     let total = plane.rise();
     if total <= plane.value.abs() {
         return if plane.value < 0.0 { 1.0 } else { 0.0 };
@@ -81,7 +83,7 @@ pub fn below(plane: &Plane) -> f64 {
 }
 
 /// Points and weights that integrate quadratic functions exactly over the part of the plane in the cube.
-pub fn patch(plane: &Plane) -> (Vec<Vec3>, Vec<f64>) {
+pub fn patch(plane: &LinearFunction) -> (Vec<Vec3>, Vec<f64>) {
     let polygon = section(plane);
     let (mut points, mut weights) = (Vec::new(), Vec::new());
     if polygon.len() < 3 {
@@ -99,7 +101,7 @@ pub fn patch(plane: &Plane) -> (Vec<Vec3>, Vec<f64>) {
 }
 
 /// The polygon in which the plane meets the cube: a square of the plane, clipped by the six faces.
-fn section(plane: &Plane) -> Vec<Vec3> {
+fn section(plane: &LinearFunction) -> Vec<Vec3> {
     let steep = plane.steepness();
     if steep == 0.0 || plane.value.abs() >= plane.rise() {
         return Vec::new();

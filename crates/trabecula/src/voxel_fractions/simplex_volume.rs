@@ -1,10 +1,10 @@
 //! Volume of a combination of half-spaces in the cube [−1, 1]³, by tetrahedra that are cut by one plane after another.
 
-use super::plane_cut::Plane;
+use super::plane_cut::LinearFunction;
 use geometry::math::{Vec3, add, cross, dot, scale, sub};
 
 /// The share of the cube where `solid` holds of the signs of the planes (true is negative).
-pub fn volume(planes: &[Plane], solid: &dyn Fn(&[bool]) -> bool) -> f64 {
+pub fn volume(planes: &[LinearFunction], solid: &dyn Fn(&[bool]) -> bool) -> f64 {
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     let mut sum = 0.0;
     for order in ORDERS {
@@ -19,7 +19,7 @@ pub fn volume(planes: &[Plane], solid: &dyn Fn(&[bool]) -> bool) -> f64 {
 }
 
 /// The solid volume of a tetrahedron in which the signs of the first planes are known.
-fn cut(t: [Vec3; 4], planes: &[Plane], signs: &mut Vec<bool>, solid: &dyn Fn(&[bool]) -> bool) -> f64 {
+fn cut(t: [Vec3; 4], planes: &[LinearFunction], signs: &mut Vec<bool>, solid: &dyn Fn(&[bool]) -> bool) -> f64 {
     let Some(plane) = planes.get(signs.len()) else {
         let size = dot(sub(t[1], t[0]), cross(sub(t[2], t[0]), sub(t[3], t[0]))).abs() / 6.0;
         return if solid(signs) { size } else { 0.0 };

@@ -45,7 +45,8 @@ fn planes_are_exact() {
         }
         // By tetrahedra, which share no formula with the closed form.
         let size = geometry::math::norm(normal);
-        let plane = Plane { value: -geometry::math::dot(normal, point) / size, slope: normal.map(|v| 0.5 * v / size) };
+        let plane =
+            LinearFunction { value: -geometry::math::dot(normal, point) / size, slope: normal.map(|v| 0.5 * v / size) };
         let exact = volume(&[plane], &|s| s[0]);
         assert!((a.iter().sum::<f64>() / 27.0 - exact).abs() < 1e-9);
     }

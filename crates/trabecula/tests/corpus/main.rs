@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use toml::{Table, Value};
 use trabecula::cell::{Cell, Part, Series, catalogue};
 use trabecula::design::{CadMesh, Design, FaceLabel, Loader, Tessellation};
-use trabecula::surface_maker::{Islands, Options};
+use trabecula::surface_maker::{Islands, SurfaceOptions};
 
 /// Samples per smallest wavelength, where a row does not name another number.
 const PER_CELL: f64 = 32.0;
@@ -82,7 +82,7 @@ fn differences(name: &str, row: &Table) -> Result<Vec<String>, String> {
     let edge = built.solid.wavelength / row.get("per_cell").map_or(PER_CELL, number);
     let made = built
         .surface()
-        .mesh(&Options { islands: Islands::Keep, ..Options::new(edge) }, &Silent)
+        .mesh(&SurfaceOptions { islands: Islands::Keep, ..SurfaceOptions::new(edge) }, &Silent)
         .map_err(|e| format!("{e:?}"))?;
     let found = made.surface;
     let all = size(&found.mesh);

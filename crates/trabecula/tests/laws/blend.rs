@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use geometry::math::{Aabb, Interval, Vec3};
 use geometry::progress::Silent;
-use trabecula::blend::{Blend, By, Constituent, Phases, Weights};
+use trabecula::blend::{Blend, BlendRule, Constituent, Phases, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
@@ -41,7 +41,7 @@ fn step(width: f64) -> Weights {
 
 const BOUNDS: Aabb = Aabb { min: [-24.0, -14.0, -14.0], max: [24.0, 14.0, 14.0] };
 
-fn blend(of: &[Arc<Lattice>], weights: Weights, by: By) -> Blend {
+fn blend(of: &[Arc<Lattice>], weights: Weights, by: BlendRule) -> Blend {
     let of = of.iter().map(|l| Constituent::Lattice(l.clone())).collect();
     Blend::new(of, weights, by, &BOUNDS).expect("blend")
 }
@@ -113,7 +113,7 @@ fn the_fraction_is_held_through_every_transition() {
     for (what, of, phases) in pairs() {
         let cell = of.iter().map(|l| l.map.longest()).fold(0.0, f64::max);
         for wide in [2.0, 4.0] {
-            let blend = blend(&of, step(wide * cell), By::Fraction);
+            let blend = blend(&of, step(wide * cell), BlendRule::Fraction);
             assert_eq!(blend.phases(), Some(phases), "{what}");
             for i in -3..=3 {
                 // No multiple of any cell.
@@ -130,11 +130,11 @@ fn the_fraction_is_held_through_every_transition() {
 #[test]
 fn by_value_material_is_lost_half_way() {
     let of = [share("primitive", Part::Upper, 0.3, 4.0), share("gyroid", Part::Upper, 0.3, 4.0)];
-    let half = blend(&of, Weights::between(Grade::Constant(0.5)), By::Value);
+    let half = blend(&of, Weights::between(Grade::Constant(0.5)), BlendRule::Value);
     let [found, asked] = fractions(&half, &window([0.0; 3], 8.0, 40_000));
     assert!((asked - 0.3).abs() < 1e-9);
     assert!((found - 0.197).abs() < 0.002, "{found}");
-    let kept = blend(&of, Weights::between(Grade::Constant(0.5)), By::Fraction);
+    let kept = blend(&of, Weights::between(Grade::Constant(0.5)), BlendRule::Fraction);
     let [found, _] = fractions(&kept, &window([0.0; 3], 8.0, 40_000));
     assert!((found - 0.3).abs() < 0.002, "{found}");
 }
@@ -171,7 +171,7 @@ fn any_number_of_fields_takes_part() {
         Constituent::Field { field: Arc::new(Balls), wavelength: 3.0 },
     ];
     let weights = Weights::shares(vec![formula("exp(-x/8)"), formula("exp(-(y/12)^2)"), formula("exp(x/8)")]);
-    let blend = Blend::new(of, weights, By::Fraction, &BOUNDS).expect("blend");
+    let blend = Blend::new(of, weights, BlendRule::Fraction, &BOUNDS).expect("blend");
     // Balls of radius 1.4 in cubes of 3.
     let balls = 4.0 / 3.0 * std::f64::consts::PI * 1.4f64.powi(3) / 27.0;
     for i in -2..=2 {
@@ -203,7 +203,7 @@ fn lattices_pass_into_beams_with_their_fractions() {
     for (part, fraction) in [(Part::Sheet, 0.3), (Part::Sheet, 0.15), (Part::Upper, 0.3)] {
         let lattice = share("gyroid", part, fraction, 4.0);
         let of = vec![Constituent::Lattice(lattice), Constituent::Field { field: beams.clone(), wavelength: 5.0 }];
-        let blend = Blend::new(of, step(15.0), By::Fraction, &BOUNDS).expect("blend");
+        let blend = Blend::new(of, step(15.0), BlendRule::Fraction, &BOUNDS).expect("blend");
         for i in -4..=4 {
             let points = window([1.7 * f64::from(i), 0.37, -0.21], 10.0, 20_000);
             let mut w = vec![0.0; 2 * points.len()];
@@ -246,7 +246,7 @@ fn what_lies_beyond_the_region_is_not_counted() {
 fn alone_and_with_itself_a_lattice_is_itself() {
     for (what, of, _) in pairs() {
         let cell = of.iter().map(|l| l.map.longest()).fold(0.0, f64::max);
-        let blend = blend(&of, step(cell), By::Fraction);
+        let blend = blend(&of, step(cell), BlendRule::Fraction);
         for (points, own) in [([-6.0 - cell, 0.0, 0.0], &of[0]), ([6.0 + cell, 0.0, 0.0], &of[1])] {
             let points = window(points, 6.0, 500);
             let (mut a, mut b) = (vec![0.0; 500], vec![0.0; 500]);
@@ -260,7 +260,7 @@ fn alone_and_with_itself_a_lattice_is_itself() {
         let same = [of[0].clone(), of[0].clone()];
         let points = window([0.0; 3], 6.0, 4000);
         let (mut a, mut b) = (vec![0.0; 4000], vec![0.0; 4000]);
-        self::blend(&same, step(6.0), By::Value).values(&points, &mut a);
+        self::blend(&same, step(6.0), BlendRule::Value).values(&points, &mut a);
         of[0].values(&points, &mut b);
         assert!(a.iter().zip(&b).all(|(a, b)| a * b > 0.0 || (a - b).abs() < 1e-9), "{what}");
     }
@@ -269,7 +269,7 @@ fn alone_and_with_itself_a_lattice_is_itself() {
 #[test]
 fn gradients_blocks_and_bounds_agree_with_values() {
     for (what, of, _) in pairs() {
-        for by in [By::Fraction, By::Value] {
+        for by in [BlendRule::Fraction, BlendRule::Value] {
             let whole = blend(&of, step(7.0), by);
             let mut sides: Vec<Arc<dyn Implicit>> = whole.parts();
             sides.push(Arc::new(whole));
@@ -313,7 +313,7 @@ fn gradients_blocks_and_bounds_agree_with_values() {
 #[test]
 fn bounds_tell_empty_places_within_transitions() {
     for (what, of, _) in pairs() {
-        for by in [By::Fraction, By::Value] {
+        for by in [BlendRule::Fraction, BlendRule::Value] {
             let field = blend(&of, step(30.0), by);
             let (mut proven, mut clear) = (0, 0);
             for p in window([0.0; 3], 9.0, 400) {
@@ -339,7 +339,7 @@ fn surfaces_of_blends_are_whole() {
         let of = of.map(Constituent::Lattice).to_vec();
         let weight = Sigmoid::new(formula("x + 0.2*y"), 0.0, 9.0).expect("step");
         let weights = Weights::between(Grade::from(weight));
-        let blend = Blend::new(of, weights, By::Fraction, &BOUNDS).expect("blend");
+        let blend = Blend::new(of, weights, BlendRule::Fraction, &BOUNDS).expect("blend");
         let solid = Solid::new(region.clone(), Some(Arc::new(blend)), 4.0);
         let made = surface(&solid, 0.31, &Silent).expect(what);
         check(what, &made);
@@ -349,7 +349,8 @@ fn surfaces_of_blends_are_whole() {
 #[test]
 fn a_transition_finer_than_the_grid_is_refused() {
     let of = [share("primitive", Part::Upper, 0.3, 4.0), share("gyroid", Part::Upper, 0.3, 4.0)];
-    let mut solid = Solid::new(cuboid([-4.0; 3], [4.0; 3]), Some(Arc::new(blend(&of, step(0.2), By::Fraction))), 4.0);
+    let mut solid =
+        Solid::new(cuboid([-4.0; 3], [4.0; 3]), Some(Arc::new(blend(&of, step(0.2), BlendRule::Fraction))), 4.0);
     solid.transition = Some(0.2);
     let fault = surface(&solid, 0.25, &Silent).expect_err("too coarse");
     assert!(format!("{fault:?}").contains("transition"), "{fault:?}");

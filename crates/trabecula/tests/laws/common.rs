@@ -19,7 +19,7 @@ use trabecula::lattice::{Lattice, Level};
 use trabecula::map::Affine;
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
-use trabecula::surface_maker::{Components, Islands, Options, Summary, SurfaceMaker};
+use trabecula::surface_maker::{Components, Islands, Summary, SurfaceMaker, SurfaceOptions};
 
 pub fn ball(center: Vec3, radius: f64) -> Region {
     Arc::new(Sphere::new(center, radius).expect("ball"))
@@ -183,7 +183,7 @@ pub fn check_both(what: &str, solid: &Solid, edge: f64, s: &SurfaceMesh) {
 /// A solid as a streamed STL.
 pub fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Summary), Stopped> {
     let mut stl = Cursor::new(Vec::new());
-    let summary = GridSurface(solid).stream_stl(&Options { resolution: edge, islands }, &mut stl, &Silent)?;
+    let summary = GridSurface(solid).stream_stl(&SurfaceOptions { resolution: edge, islands }, &mut stl, &Silent)?;
     Ok((stl.into_inner(), summary))
 }
 
@@ -193,7 +193,7 @@ pub fn meshed(
     resolution: f64,
     islands: Islands,
 ) -> Result<(SurfaceMesh, Components), Stopped> {
-    let made = maker.mesh(&Options { resolution, islands }, &Silent)?;
+    let made = maker.mesh(&SurfaceOptions { resolution, islands }, &Silent)?;
     Ok((made.surface, made.components))
 }
 

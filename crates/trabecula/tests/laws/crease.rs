@@ -17,7 +17,7 @@ use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::implicit::Surface;
-use trabecula::region::{MeshRegion, Region, Shape, Union};
+use trabecula::region::{MeshRegion, Region, SignedDistance, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
@@ -166,7 +166,7 @@ impl Field for Rounded {
     }
 }
 
-impl Shape for Rounded {
+impl SignedDistance for Rounded {
     fn bounds(&self) -> Aabb {
         self.0.bounds()
     }

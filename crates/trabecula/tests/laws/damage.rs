@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::field::Field;
-use trabecula::region::{MeshRegion, Shape};
+use trabecula::region::{MeshRegion, SignedDistance};
 use trabecula::solid::Solid;
 
 /// A cube [−1, 1]³ of n² squares a side, in triangles.
@@ -349,7 +349,7 @@ fn judge(victim: Victim) -> Result<End, String> {
             return Err(format!("{d} at {p:?}, not {t}: {:?}", region.repaired()));
         }
     }
-    let shared: Arc<dyn Shape> = Arc::new(region);
+    let shared: Arc<dyn SignedDistance> = Arc::new(region);
     let wavelength = size / some.between(3.0, 6.0);
     let field = lattice("gyroid", Part::Sheet, 0.4, [wavelength; 3], [11.0, 22.0, 33.0]);
     for (what, field) in [("full", None), ("gyroid", Some(field))] {

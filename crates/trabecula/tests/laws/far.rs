@@ -8,7 +8,7 @@ use geometry::progress::{Silent, Stopped};
 use proptest::prelude::*;
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::GridSurface;
-use trabecula::surface_maker::{Islands, Options, SurfaceMaker};
+use trabecula::surface_maker::{Islands, SurfaceMaker, SurfaceOptions};
 
 use crate::common::cases;
 
@@ -31,7 +31,7 @@ fn flaws(part: &str, edge: f64) -> Result<[usize; 6], Stopped> {
     let design = Design::from_toml(&format!("schema = 1\n{part}{core}")).expect("design");
     let built = design.build(&NoFiles).expect("solid");
     let mut file = Cursor::new(Vec::new());
-    let options = Options { resolution: edge, islands: Islands::Keep };
+    let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
     GridSurface(&built.solid).stream_stl(&options, &mut file, &Silent)?;
     let mesh = read_mesh(&file.into_inner(), "stl").expect("file").mesh;
     assert!(mesh.triangles.len() > 1000);

@@ -13,7 +13,7 @@ use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{GridSurface, surface};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
-use trabecula::surface_maker::{CRUMB, Components, DUST, Islands, Options, SMALL, SurfaceMaker};
+use trabecula::surface_maker::{CRUMB, Components, DUST, Islands, SMALL, SurfaceMaker, SurfaceOptions};
 
 use crate::common::{ball, cases, check, lattice, meshed, solid, stl, stream};
 
@@ -242,7 +242,7 @@ fn progress_rises_to_the_end_and_stops_at_any_time() {
         for stop in [0.3, 0.97, 2.0] {
             let until = Until(stop, Default::default());
             let mut out = Cursor::new(Vec::new());
-            let done = GridSurface(&solid).stream_stl(&Options { resolution: 0.05, islands }, &mut out, &until);
+            let done = GridSurface(&solid).stream_stl(&SurfaceOptions { resolution: 0.05, islands }, &mut out, &until);
             let last = *until.1.lock().expect("no other");
             match done {
                 Ok(_) => assert!(last == 1.0 && stop > 1.0),

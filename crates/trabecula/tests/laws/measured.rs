@@ -5,7 +5,7 @@ use geometry::progress::Silent;
 use proptest::prelude::*;
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::GridSurface;
-use trabecula::surface_maker::{Figures, Islands, Options, SurfaceMaker};
+use trabecula::surface_maker::{Figures, Islands, SurfaceMaker, SurfaceOptions};
 
 use crate::common::{Random, cases, drawn, meshed, region, solid};
 use crate::islands::winding;
@@ -23,7 +23,7 @@ proptest! {
         edge in 0.02..0.15f64,
     ) {
         let solid = solid(region(kind, r, s, t), Some(lattice.lattice()));
-        let options = Options { resolution: edge, islands: Islands::DropSmall };
+        let options = SurfaceOptions { resolution: edge, islands: Islands::DropSmall };
         let Ok(made) = GridSurface(&solid).measure(&options, &Silent) else {
             prop_assert!(GridSurface(&solid).mesh(&options, &Silent).is_err());
             return Ok(());
@@ -76,7 +76,7 @@ fn the_volume_error_reported_bounds_the_realised_one() {
         let built = Design::from_toml(&text).expect("text").build(&NoFiles).expect("built");
         let edge = a.min(b).min(c) / random.between(10.0, 36.0);
         let volume = |edge: f64| {
-            let options = Options { resolution: edge, islands: Islands::Keep };
+            let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
             GridSurface(&built.solid).measure(&options, &Silent).expect("surface").figures.size.volume
         };
         let realised = (volume(edge) / volume(0.4 * edge) - 1.0).abs();
@@ -114,7 +114,7 @@ fn the_volume_error_reported_bounds_that_of_lattices_in_curved_regions() {
         let built = Design::from_toml(&text).expect("text").build(&NoFiles).expect("built");
         let edge = 1.0 / random.between(16.0, 36.0);
         let volume = |edge: f64| {
-            let options = Options { resolution: edge, islands: Islands::Keep };
+            let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
             GridSurface(&built.solid).measure(&options, &Silent).expect("surface").figures.size.volume
         };
         let realised = (volume(edge) / volume(0.4 * edge) - 1.0).abs();
@@ -155,7 +155,7 @@ fn the_volume_error_reported_of_beams_is_near_the_realised_one() {
 fn beams_volume_error(text: &str, edge: f64) -> (f64, f64) {
     let built = Design::from_toml(text).expect("text").build(&NoFiles).expect("built");
     let volume = |edge: f64| {
-        let options = Options { resolution: edge, islands: Islands::Keep };
+        let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
         GridSurface(&built.solid).measure(&options, &Silent).expect("surface").figures.size.volume
     };
     ((volume(edge) / volume(0.3 * edge) - 1.0).abs(), built.volume_error(edge).expect("beams"))

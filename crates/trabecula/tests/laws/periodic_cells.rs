@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use geometry::fe_mesh::FeMesh;
 use geometry::progress::Silent;
 use trabecula::design::{Design, NoFiles};
-use trabecula::volume_mesh::{Options, VolumeTarget};
+use trabecula::volume_mesh::{VolumeMeshOptions, VolumeTarget};
 
 use crate::common::{Random, campaign, cases};
 
@@ -30,7 +30,7 @@ impl Shifted {
         );
         let what = format!("{of:?} of order {order}, edge {edge}\n{text}");
         let design = Design::from_toml(&text).and_then(|d| d.build(&NoFiles)).unwrap_or_else(|e| panic!("{e}\n{what}"));
-        let options = Options { edge, of, order, periodic: true, largest: false };
+        let options = VolumeMeshOptions { edge, of, order, periodic: true, largest: false };
         let mesh = design.volume_mesh(&options, &Silent).unwrap_or_else(|e| panic!("{e:?}\n{what}")).mesh;
         planes_match(&mesh, &what);
     }

@@ -9,12 +9,12 @@ use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{GridSurface, JoinedRanges, RangeMade, TileRanges, WholeSurface};
 use trabecula::solid::Solid;
-use trabecula::surface_maker::{Islands, Options, Summary, SurfaceMaker};
+use trabecula::surface_maker::{Islands, Summary, SurfaceMaker, SurfaceOptions};
 
 use crate::common::{ball, cases, drawn, lattice, region, solid};
 
 /// The file of one run, and what is said of it.
-fn whole(solid: &Solid, options: &Options) -> Result<(Vec<u8>, Summary), Stopped> {
+fn whole(solid: &Solid, options: &SurfaceOptions) -> Result<(Vec<u8>, Summary), Stopped> {
     let mut file = Cursor::new(Vec::new());
     let found = GridSurface(solid).stream_stl(options, &mut file, &Silent)?;
     Ok((file.into_inner(), found))
@@ -37,7 +37,7 @@ fn ranges(solid: &Solid, edge: f64, size: usize, runs: usize) -> Vec<RangeMade> 
     made
 }
 
-fn joined(made: &[RangeMade], options: &Options) -> Result<(Vec<u8>, WholeSurface), Stopped> {
+fn joined(made: &[RangeMade], options: &SurfaceOptions) -> Result<(Vec<u8>, WholeSurface), Stopped> {
     let mut join = JoinedRanges::default();
     made.iter().for_each(|range| join.add(&range.partial).expect("a partial result"));
     let found = join.finish(options)?;
@@ -51,7 +51,7 @@ fn joined(made: &[RangeMade], options: &Options) -> Result<(Vec<u8>, WholeSurfac
 }
 
 /// Holds the ranges of a solid to its file, and gives the number of pieces dropped and of voids filled.
-fn held(solid: &Solid, options: &Options, size: usize, runs: usize) -> [u64; 2] {
+fn held(solid: &Solid, options: &SurfaceOptions, size: usize, runs: usize) -> [u64; 2] {
     let (file, said) = whole(solid, options).expect("surface");
     let (again, found) = joined(&ranges(solid, options.resolution, size, runs), options).expect("joined");
     assert_eq!(found.summary, said);
@@ -73,7 +73,7 @@ proptest! {
         islands in prop_oneof![Just(Islands::DropSmall), Just(Islands::Keep), Just(Islands::Drop), Just(Islands::Error)],
     ) {
         let solid = solid(region(kind, r, s, t), Some(drawn.lattice()));
-        let options = Options { resolution: edge, islands };
+        let options = SurfaceOptions { resolution: edge, islands };
         match whole(&solid, &options) {
             Ok(_) => drop(held(&solid, &options, size, runs)),
             Err(_) => prop_assert!(joined(&ranges(&solid, edge, size, runs), &options).is_err()),
@@ -86,7 +86,7 @@ proptest! {
 fn figures_of_ranges_join_to_those_of_one_run() {
     let shells = lattice("primitive", Part::Upper, 0.4, [1.0, 1.1, 0.9], [5.0, 15.0, 25.0]);
     let solid = solid(ball([0.0; 3], 1.7), Some(shells));
-    let options = Options::new(0.02);
+    let options = SurfaceOptions::new(0.02);
     let one = GridSurface(&solid).measure(&options, &Silent).expect("figures");
     let tiles = TileRanges::new(&solid, 0.02).expect("a grid");
     for size in [1, 4, 9, 1000] {
@@ -105,7 +105,7 @@ fn pieces_are_dropped_across_ranges() {
     let solid = solid(ball([0.0; 3], 1.7), Some(blobs));
     for size in [1, 3, 4, 7, 1000] {
         let dropped = [Islands::Keep, Islands::DropSmall, Islands::Drop]
-            .map(|islands| held(&solid, &Options { resolution: 0.015, islands }, size, 1 + size % 3)[0]);
+            .map(|islands| held(&solid, &SurfaceOptions { resolution: 0.015, islands }, size, 1 + size % 3)[0]);
         assert!(dropped[0] == 0 && dropped[2] > 10, "{dropped:?}");
     }
 }

@@ -10,7 +10,7 @@ use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::Affine;
-use trabecula::shell_mesh::{Options, shell_mesh};
+use trabecula::shell_mesh::{ShellMeshOptions, shell_mesh};
 
 use crate::common::{ball, cases, cuboid, solid};
 
@@ -41,7 +41,7 @@ proptest! {
         let sheet = sheet(name, Level::Fraction(Grade::Constant(fraction)), rotate);
         let region = if round { ball([0.1, 0.0, -0.2], 1.0) } else { cuboid([-0.7; 3], [0.8, 0.9, 1.0]) };
         let whole = solid(region, Some(sheet.clone()));
-        let make = |quadratic| shell_mesh(&whole, &[], &Options { edge: 1.0 / 16.0, quadratic }, &Silent).expect("shells");
+        let make = |quadratic| shell_mesh(&whole, &[], &ShellMeshOptions { edge: 1.0 / 16.0, quadratic }, &Silent).expect("shells");
         let (linear, made) = (make(false).mesh, make(true));
         let mesh = &made.mesh;
         prop_assert_eq!(&mesh.triangles, &linear.triangles);
@@ -85,7 +85,8 @@ fn the_thickness_integrates_to_the_volume() {
         let region = cuboid([0.0; 3], [1.0; 3]);
         let fraction = sheet.fraction(0.5 * width);
         let whole = solid(region, Some(sheet));
-        let made = shell_mesh(&whole, &[], &Options { edge: 1.0 / 40.0, quadratic: false }, &Silent).expect("shells");
+        let made =
+            shell_mesh(&whole, &[], &ShellMeshOptions { edge: 1.0 / 40.0, quadratic: false }, &Silent).expect("shells");
         let (area, volume) = made.mesh.size();
         println!(
             "{name}: area {area:.4}, thickness {:.5} of {width}, volume {volume:.5} for {fraction:.5}",

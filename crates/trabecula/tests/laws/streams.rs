@@ -7,7 +7,7 @@ use geometry::progress::{Progress, Silent, Stopped};
 use trabecula::cell::Part;
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::GridSurface;
-use trabecula::surface_maker::{Islands, Options, Scratch, Store, Summary, SurfaceMaker, stream_mesh};
+use trabecula::surface_maker::{Islands, ScratchStores, Store, Summary, SurfaceMaker, SurfaceOptions, stream_mesh};
 
 use crate::common::{ball, lattice, solid};
 use crate::islands::Until;
@@ -16,11 +16,11 @@ use crate::islands::Until;
 fn streamed(
     maker: &dyn SurfaceMaker,
     suffix: &str,
-    options: &Options,
+    options: &SurfaceOptions,
     progress: &dyn Progress,
 ) -> Result<(Vec<u8>, Summary), Stopped> {
     let mut files = [0; 3].map(|_| Cursor::new(Vec::new()));
-    let scratch: Scratch = files.each_mut().map(|f| f as &mut dyn Store);
+    let scratch: ScratchStores = files.each_mut().map(|f| f as &mut dyn Store);
     let mut out = Vec::new();
     let found = stream_mesh(maker, options, (suffix, &meta()), scratch, &mut out, progress)?;
     Ok((out, found))
@@ -31,7 +31,7 @@ fn meta() -> Metadata {
 }
 
 /// Holds the streamed files of a solid to those of its mesh, for one thread and for three; gives the number of pieces dropped.
-fn held(maker: &dyn SurfaceMaker, options: &Options) -> u64 {
+fn held(maker: &dyn SurfaceMaker, options: &SurfaceOptions) -> u64 {
     let made = maker.mesh(options, &Silent).expect("mesh");
     for suffix in ["3mf", "ply", "obj"] {
         let mut whole = Vec::new();
@@ -56,7 +56,7 @@ fn files_of_a_grid_are_those_of_its_mesh() {
     for threads in [1, 3] {
         of_threads(threads, || {
             let dropped = [Islands::Keep, Islands::DropSmall, Islands::Drop].map(|islands| {
-                let options = Options { resolution: 0.02, islands };
+                let options = SurfaceOptions { resolution: 0.02, islands };
                 held(&GridSurface(&solid), &options)
             });
             assert!(dropped[0] == 0 && dropped[2] > 10, "{dropped:?}");
@@ -76,8 +76,8 @@ fn files_of_tetrahedra_and_beams_are_those_of_their_meshes() {
     );
     let beams = built("[beams.core]\ncell = \"bcc\"\nmap.affine.wavelength = 4\nradius = 0.3\n");
     of_threads(3, || {
-        held(&*tets.surface(), &Options::new(0.3));
-        held(&*beams.surface(), &Options::new(0.2));
+        held(&*tets.surface(), &SurfaceOptions::new(0.3));
+        held(&*beams.surface(), &SurfaceOptions::new(0.2));
     });
 }
 
@@ -88,7 +88,7 @@ fn progress_rises_to_the_end_and_stops_at_any_time() {
     // Within the tiles, while the file is written, never.
     for stop in [0.3, 0.9, 2.0] {
         let until = Until(stop, Default::default());
-        let options = Options { resolution: 0.05, islands: Islands::Drop };
+        let options = SurfaceOptions { resolution: 0.05, islands: Islands::Drop };
         let done = streamed(&GridSurface(&solid), "3mf", &options, &until);
         let last = *until.1.lock().expect("no other");
         match done {
@@ -129,7 +129,7 @@ fn failures_of_any_file_are_told() {
     let solid = solid(ball([0.0; 3], 1.0), None);
     for full in 0..4 {
         let (mut files, mut bad, mut out) = ([0; 3].map(|_| Cursor::new(Vec::new())), Full, Vec::new());
-        let mut scratch: Scratch = files.each_mut().map(|f| f as &mut dyn Store);
+        let mut scratch: ScratchStores = files.each_mut().map(|f| f as &mut dyn Store);
         let mut refusing = Full;
         let out: &mut dyn std::io::Write = match full {
             3 => &mut refusing,
@@ -138,7 +138,8 @@ fn failures_of_any_file_are_told() {
                 &mut out
             }
         };
-        let done = stream_mesh(&GridSurface(&solid), &Options::new(0.1), ("3mf", &meta()), scratch, out, &Silent);
+        let done =
+            stream_mesh(&GridSurface(&solid), &SurfaceOptions::new(0.1), ("3mf", &meta()), scratch, out, &Silent);
         assert!(
             matches!(&done, Err(Stopped::Io(e)) if e.kind() == std::io::ErrorKind::StorageFull),
             "{full}: {done:?}"

@@ -16,7 +16,7 @@ use trabecula::field::Field;
 use trabecula::grade::{Grade, Linear};
 use trabecula::implicit::Surface;
 use trabecula::mesher::{ANGLES, Fit, background, fit};
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Shape, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, SignedDistance, Union};
 use trabecula::solid::Solid;
 
 /// Points inside a field's bounds where it is negative.
@@ -120,7 +120,7 @@ impl Waves {
     const HEIGHT: f64 = 0.07;
 }
 
-impl Shape for Waves {
+impl SignedDistance for Waves {
     fn bounds(&self) -> Aabb {
         Aabb { min: [-2.0; 3], max: [2.0; 3] }
     }

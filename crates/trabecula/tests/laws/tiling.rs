@@ -17,12 +17,12 @@ use trabecula::cell::{Part, Series, Term};
 use trabecula::extract::GridSurface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::map::Tets;
+use trabecula::map::CarrierMesh;
 use trabecula::mesher::background;
 use trabecula::region::MeshRegion;
 use trabecula::solid::Solid;
-use trabecula::surface_maker::{Components, Islands, Options, SurfaceMaker};
-use trabecula::tiling::{Level, Share, Tiling, TilingSurface, connectivity};
+use trabecula::surface_maker::{Components, Islands, SurfaceMaker, SurfaceOptions};
+use trabecula::tiling::{NodalLevel, Share, Tiling, TilingSurface, connectivity};
 
 /// n³ cubes of six tetrahedra each, nodes moved about and numbered at random.
 pub fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
@@ -57,8 +57,8 @@ pub fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
     out
 }
 
-pub fn map(mesh: &TetMesh) -> Arc<Tets> {
-    Arc::new(Tets::new(mesh, 0.0).expect("mesh"))
+pub fn map(mesh: &TetMesh) -> Arc<CarrierMesh> {
+    Arc::new(CarrierMesh::new(mesh, 0.0).expect("mesh"))
 }
 
 /// The surface of the whole mesh's lattice, by cutting tetrahedra or on a grid.
@@ -95,7 +95,7 @@ fn named_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
     let mesh = shaken(2, 0.15, 10.0, &mut some);
     for r in tet_catalogue() {
         let (s, part, t) = cell(r.name);
-        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Same(t));
         let (surface, reported) = made(tiling, 16.0, true);
         let found = size(&surface.mesh);
         assert!(found.closed, "{}", r.name);
@@ -118,7 +118,7 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
         (plain("227:2", [1, 1, 1], 0.125, 0.75, true), Part::Lower, -2.2, 75),
     ] {
         assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
-        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Same(t));
         let predicted = connectivity(&tiling).expect("few tetrahedra");
         assert_eq!((predicted.components, predicted.pairs.len()), (pieces, 0));
         let (maker, edge) = (TilingSurface(&tiling), 0.75);
@@ -142,7 +142,7 @@ fn surfaces_are_embedded_after_rounding_whatever_varies() {
         let (s, part, t) = cell(name);
         let spread = 0.3 * t.abs();
         let each = (0..mesh.nodes.len()).map(|_| t + some.between(-spread, spread));
-        for level in [Level::Same(t), Level::Nodes(Arc::new(each.collect()))] {
+        for level in [NodalLevel::Same(t), NodalLevel::Nodes(Arc::new(each.collect()))] {
             let tiling = Tiling::new(map(&mesh), s.clone(), part, level);
             let (surface, reported) = made(tiling, 5.0, true);
             check(name, &surface);
@@ -154,7 +154,7 @@ fn surfaces_are_embedded_after_rounding_whatever_varies() {
     // Walls a hundredth of a step thick keep both their sides.
     let mesh = shaken(1, 0.2, 7.0, &mut some);
     let (s, part, _) = cell("diamond_sheet");
-    let tiling = Tiling::new(map(&mesh), s, part, Level::Same(1e-3));
+    let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Same(1e-3));
     check("thin", &made(tiling, 6.0, true).0);
 }
 
@@ -166,7 +166,7 @@ fn surfaces_enclose_the_fraction_of_the_cell_in_any_steps() {
     let mesh = shaken(1, 0.2, 10.0, &mut some);
     for r in tet_catalogue() {
         let (s, part, t) = cell(r.name);
-        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Same(t));
         let (all, exact) = tiling.volumes();
         let errors = [12.0, 16.0, 32.0].map(|steps| (made(tiling.clone(), steps, true).0.mesh.volume() - exact) / all);
         println!("{}: {}", r.name, errors.map(|e| format!("{e:+.1e}")).join(" "));
@@ -182,7 +182,7 @@ fn surfaces_of_graded_levels_enclose_their_fraction() {
     for name in ["primitive", "diamond_sheet", "p43m", "frd"] {
         let (s, part, t) = cell(name);
         let each = mesh.nodes.iter().map(|p| t + 0.2 * t.abs() * (p[0] / 10.0 - 1.0));
-        let tiling = Tiling::new(map(&mesh), s, part, Level::Nodes(Arc::new(each.collect())));
+        let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Nodes(Arc::new(each.collect())));
         let (_, exact) = tiling.volumes();
         let [coarse, fine] = [10.0, 30.0].map(|n| made(tiling.clone(), n, true).0.mesh.volume() / exact - 1.0);
         println!("{name}: {coarse:+.1e} {fine:+.1e}");
@@ -197,7 +197,7 @@ fn both_methods_make_one_surface() {
     for name in ["diamond", "diamond_sheet"] {
         let (s, part, t) = cell(name);
         let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.9, 1.1));
-        let level = Level::Nodes(Arc::new(each.collect()));
+        let level = NodalLevel::Nodes(Arc::new(each.collect()));
         let tiling = Tiling::new(map(&mesh), s, part, level);
         // Distance of the surface's triangles from the zero set, to first order (the median: at saddles that is far off), and
         // the volume.
@@ -242,7 +242,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
     let size_mm = Grade::Constant(3.0);
     let mesh = background(&region, &region.bounds(), &size_mm, &inside, None).expect("mesh").mesh;
     let (s, part, t) = cell("diamond");
-    let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+    let tiling = Tiling::new(map(&mesh), s, part, NodalLevel::Same(t));
     let maker = TilingSurface(&tiling);
     let (surface, pieces) = meshed(&maker, 0.5, Islands::Keep).expect("surface");
     assert_eq!(fault(&surface.mesh), None);
@@ -251,7 +251,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
             let mut out = Cursor::new(Vec::new());
-            let reported = maker.stream_stl(&Options::new(0.5), &mut out, &Silent);
+            let reported = maker.stream_stl(&SurfaceOptions::new(0.5), &mut out, &Silent);
             (reported.expect("stream"), out.into_inner())
         })
     });
@@ -268,7 +268,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
 fn meshes_that_are_none_are_refused() {
     let mut some = Random(11);
     let good = shaken(1, 0.1, 5.0, &mut some);
-    let refused = |mesh: &TetMesh| Tets::new(mesh, 0.0).err().expect("refused").message;
+    let refused = |mesh: &TetMesh| CarrierMesh::new(mesh, 0.0).err().expect("refused").message;
     assert!(refused(&TetMesh::default()).contains("no tetrahedron"));
     let mut inverted = good.clone();
     inverted.tets[2].swap(0, 1);
@@ -284,8 +284,8 @@ fn meshes_that_are_none_are_refused() {
     pinched.tets[1] = *apart.expect("one on the other side");
     let (s, part, t) = cell("diamond");
     let map = map(&pinched);
-    let tiling = Tiling::new(map, s, part, Level::Same(t));
-    match TilingSurface(&tiling).mesh(&Options::new(0.5), &Silent) {
+    let tiling = Tiling::new(map, s, part, NodalLevel::Same(t));
+    match TilingSurface(&tiling).mesh(&SurfaceOptions::new(0.5), &Silent) {
         Err(Stopped::Refused(f)) => assert!(f.message.contains("an edge alone"), "{}", f.message),
         other => panic!("{:?}", other.map(|m| m.surface.mesh.triangles.len())),
     }
@@ -306,7 +306,7 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
         Share { cell: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
     };
     let cells = vec![of(0), of(1)];
-    let level = Level::mixed(&map, &cells, part, &[fraction]);
+    let level = NodalLevel::mixed(&map, &cells, part, &[fraction]);
     Tiling::of(map, cells, part, level)
 }
 
@@ -361,7 +361,7 @@ fn zones_hold_their_fraction_and_fit() {
     {
         let asked = 0.3;
         let cells = vec![of(a, 0), of(b, 1)];
-        let level = Level::mixed(&map, &cells, part, &[asked]);
+        let level = NodalLevel::mixed(&map, &cells, part, &[asked]);
         let tiling = Tiling::of(map.clone(), cells, part, level);
         let shares = tiling.shares();
         // Levels settle to 0.001 about the nodes between zones, each of which has an equal part of its tetrahedra.

@@ -10,12 +10,12 @@ use geometry::tetmesh::TetMesh;
 use trabecula::cell::Part;
 use trabecula::cell::tet::{Subdivision, TetCell, named_tet_cell};
 use trabecula::field::Field;
-use trabecula::map::Tets;
-use trabecula::tiling::{Amount, Level, Share, Tiling, connectivity};
+use trabecula::map::CarrierMesh;
+use trabecula::tiling::{Amount, NodalLevel, Share, Tiling, connectivity};
 
 /// The mesh of some tetrahedra, with an overlap.
-fn overlapping(mesh: &TetMesh, overlap: f64) -> Arc<Tets> {
-    Arc::new(Tets::new(mesh, overlap).expect("mesh"))
+fn overlapping(mesh: &TetMesh, overlap: f64) -> Arc<CarrierMesh> {
+    Arc::new(CarrierMesh::new(mesh, overlap).expect("mesh"))
 }
 
 fn ready(name: &str) -> Arc<TetCell> {
@@ -23,7 +23,7 @@ fn ready(name: &str) -> Arc<TetCell> {
 }
 
 /// A point in each of the small tetrahedra of all tetrahedra, `n` steps along an edge, with the small one's volume.
-fn spread(map: &Tets, n: usize, some: &mut Random) -> Vec<(Vec3, f64)> {
+fn spread(map: &CarrierMesh, n: usize, some: &mut Random) -> Vec<(Vec3, f64)> {
     let grid = Subdivision { n };
     let mut small = Vec::new();
     grid.each_tet(|at, _| small.push(at.map(|[i, j, k]| [n - i, i - j, j - k, k].map(|v| v as f64 / n as f64))));
@@ -57,12 +57,12 @@ fn overlap_keeps_the_fraction() {
         let map = overlapping(&mesh, overlap);
         let one = |name: &str, part, fraction: f64| {
             let cell = ready(name);
-            let level = Level::Same(cell.iso(part, fraction));
-            (name.to_string(), fraction, Tiling::new(map.clone(), cell, part, level).meeting(Some(&[fraction])))
+            let level = NodalLevel::Same(cell.iso(part, fraction));
+            (name.to_string(), fraction, Tiling::new(map.clone(), cell, part, level).with_fraction(Some(&[fraction])))
         };
         let graded: Vec<f64> = map.nodes().iter().map(|p| 0.3 + 0.2 * (p[0] / 12.0)).collect();
         let primitive = ready("primitive");
-        let level = Level::Nodes(Arc::new(graded.iter().map(|f| primitive.iso(Part::Lower, *f)).collect()));
+        let level = NodalLevel::Nodes(Arc::new(graded.iter().map(|f| primitive.iso(Part::Lower, *f)).collect()));
         let mean = |of: &[f64]| {
             let all =
                 (0..map.len()).map(|t| (map.volume(t), map.tet(t).map(|n| of[n as usize]).iter().sum::<f64>() / 4.0));
@@ -78,7 +78,7 @@ fn overlap_keeps_the_fraction() {
             let range = cell.range();
             Share { cell, scale: 0.5 * (range.hi - range.lo), weights: share(towards) }
         });
-        let mixed = Level::mixed(&map, &pair, Part::Lower, &[0.4]);
+        let mixed = NodalLevel::mixed(&map, &pair, Part::Lower, &[0.4]);
         let rows = [
             one("primitive", Part::Lower, 0.5),
             one("diamond", Part::Upper, 0.3),
@@ -88,9 +88,9 @@ fn overlap_keeps_the_fraction() {
             (
                 "graded".into(),
                 mean(&graded),
-                Tiling::new(map.clone(), primitive, Part::Lower, level).meeting(Some(&graded)),
+                Tiling::new(map.clone(), primitive, Part::Lower, level).with_fraction(Some(&graded)),
             ),
-            ("two".into(), 0.4, Tiling::of(map.clone(), pair.to_vec(), Part::Lower, mixed).meeting(Some(&[0.4]))),
+            ("two".into(), 0.4, Tiling::of(map.clone(), pair.to_vec(), Part::Lower, mixed).with_fraction(Some(&[0.4]))),
         ];
         let (points, volumes): (Vec<Vec3>, Vec<f64>) = spread(&map, 12, &mut some).into_iter().unzip();
         let all: f64 = volumes.iter().sum();
@@ -115,8 +115,8 @@ fn overlapping_tetrahedra_are_cut_without_a_grid() {
         let mesh = shaken(2, 0.15, 5.0, &mut some);
         let r = named_tet_cell(name).expect(name);
         let (cell, fraction) = (ready(name), r.fraction);
-        let level = Level::Same(cell.iso(r.part, fraction));
-        let tiling = Tiling::new(overlapping(&mesh, overlap), cell, r.part, level).meeting(Some(&[fraction]));
+        let level = NodalLevel::Same(cell.iso(r.part, fraction));
+        let tiling = Tiling::new(overlapping(&mesh, overlap), cell, r.part, level).with_fraction(Some(&[fraction]));
         let predicted = connectivity(&tiling).expect("few tetrahedra").components;
         let (whole, _) = tiling.volumes();
         let shares = [12.0, 24.0].map(|steps| {
@@ -137,7 +137,7 @@ fn overlapping_tetrahedra_are_cut_without_a_grid() {
 /// together are of fourth order.
 fn area(tiling: &Tiling) -> f64 {
     let mut thin = tiling.clone();
-    thin.level = Level::Same(1e-4);
+    thin.level = NodalLevel::Same(1e-4);
     let [coarse, fine] = [16.0, 32.0].map(|steps| {
         let (surface, _) = made(thin.clone(), steps, true);
         let of = |i: usize| {
@@ -159,9 +159,9 @@ fn walls_are_as_thick_as_asked_on_average() {
         let (mesh, overlap) = (&meshes[i % 3], if i == 3 { 0.1 } else { 0.0 });
         let map = overlapping(mesh, overlap);
         let (cell, part, _) = cell(name);
-        let asked = 0.08 * Tiling::new(map.clone(), cell.clone(), part, Level::Same(1.0)).wavelength();
-        let level = Level::of(&map, &cell, part, Amount::Thickness, vec![asked]);
-        let tiling = Tiling::new(map.clone(), cell, part, level).walled(&[asked]);
+        let asked = 0.08 * Tiling::new(map.clone(), cell.clone(), part, NodalLevel::Same(1.0)).wavelength();
+        let level = NodalLevel::of(&map, &cell, part, Amount::Thickness, vec![asked]);
+        let tiling = Tiling::new(map.clone(), cell, part, level).with_mean_thickness(&[asked]);
         let reported = tiling.thickness().expect("walls");
         let found = tiling.volumes().1 / area(&tiling);
         println!(
@@ -190,10 +190,10 @@ fn the_spread_of_walls_is_what_rays_find() {
     for (name, overlap) in [("diamond_sheet", 0.0), ("pn3m_sheet", 0.0), ("primitive_sheet", 0.1)] {
         let map = overlapping(&shaken(2, 0.2, 5.0, &mut some), overlap);
         let (cell, part, _) = cell(name);
-        let plain = Tiling::new(map.clone(), cell.clone(), part, Level::Same(1.0));
+        let plain = Tiling::new(map.clone(), cell.clone(), part, NodalLevel::Same(1.0));
         let asked = 0.08 * plain.wavelength();
-        let level = Level::of(&map, &cell, part, Amount::Thickness, vec![asked]);
-        let tiling = Tiling::new(map.clone(), cell.clone(), part, level).walled(&[asked]);
+        let level = NodalLevel::of(&map, &cell, part, Amount::Thickness, vec![asked]);
+        let tiling = Tiling::new(map.clone(), cell.clone(), part, level).with_mean_thickness(&[asked]);
         let reported = tiling.thickness().expect("walls");
         let near = 0.02 * cell.range().hi;
         let at = |p: Vec3| {
@@ -256,10 +256,10 @@ fn walls_that_run_into_each_other_are_told() {
     {
         let map = overlapping(&shaken(2, 0.1, 5.0, &mut some), 0.0);
         let (cell, part, _) = cell(name);
-        let plain = Tiling::new(map.clone(), cell.clone(), part, Level::Same(1.0));
+        let plain = Tiling::new(map.clone(), cell.clone(), part, NodalLevel::Same(1.0));
         let asked = asked * plain.wavelength();
-        let level = Level::of(&map, &cell, part, Amount::Thickness, vec![asked]);
-        let tiling = Tiling::new(map.clone(), cell.clone(), part, level).walled(&[asked]);
+        let level = NodalLevel::of(&map, &cell, part, Amount::Thickness, vec![asked]);
+        let tiling = Tiling::new(map.clone(), cell.clone(), part, level).with_mean_thickness(&[asked]);
         let told = tiling.thickness().expect("walls");
         assert_eq!(told.through > 1.1 * told.mean, merges, "{name}: {told:?}");
         assert!(told.merged > 0.1 || !merges, "{name}: {told:?}");

@@ -15,33 +15,33 @@ use trabecula::design::{Built, Design, NoFiles};
 use trabecula::extract::GridSurface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::map::Tets;
+use trabecula::map::CarrierMesh;
 use trabecula::mesher::background;
 use trabecula::region::{Cylinder, MeshRegion, Region};
 use trabecula::solid::Solid;
 use trabecula::surface_maker::Islands;
-use trabecula::tiling::{Level, Tiling, TilingSurface};
+use trabecula::tiling::{NodalLevel, Tiling, TilingSurface};
 
 fn mesh(region: &Region, size: f64) -> TetMesh {
     let inside = within(region, 5000, 4);
     background(region, &region.bounds(), &Grade::Constant(size), &inside, None).expect("mesh").mesh
 }
 
-fn bent(region: &Region, size: f64, overlap: f64) -> Arc<Tets> {
-    Arc::new(Tets::of_region(&mesh(region, size), overlap, region).expect("mesh"))
+fn bent(region: &Region, size: f64, overlap: f64) -> Arc<CarrierMesh> {
+    Arc::new(CarrierMesh::of_region(&mesh(region, size), overlap, region).expect("mesh"))
 }
 
-fn tiling(map: Arc<Tets>, name: &str, fraction: f64) -> Tiling {
+fn tiling(map: Arc<CarrierMesh>, name: &str, fraction: f64) -> Tiling {
     let named = named_tet_cell(name).expect(name);
     let cell = named.cell().expect(name);
     let t = cell.iso(named.part, fraction);
-    Tiling::new(map, Arc::new(cell), named.part, Level::Same(t))
+    Tiling::new(map, Arc::new(cell), named.part, NodalLevel::Same(t))
 }
 
 /// All of the tetrahedra solid: what is made of them is their boundary.
-fn full(map: Arc<Tets>) -> Tiling {
+fn full(map: Arc<CarrierMesh>) -> Tiling {
     let cell = named_tet_cell("diamond").expect("cell").cell().expect("cell");
-    let above = Level::Same(cell.range().hi + 1.0);
+    let above = NodalLevel::Same(cell.range().hi + 1.0);
     Tiling::new(map, Arc::new(cell), Part::Lower, above)
 }
 
@@ -225,7 +225,8 @@ fn both_methods_fill_the_region_with_the_fraction_asked_for() {
 fn what_is_flat_stays_as_it_was() {
     let region = cuboid([0.0; 3], [12.0, 8.0, 8.0]);
     let mesh = mesh(&region, 4.0);
-    let (flat, bent) = (Tets::new(&mesh, 0.0).expect("mesh"), Tets::of_region(&mesh, 0.0, &region).expect("mesh"));
+    let (flat, bent) =
+        (CarrierMesh::new(&mesh, 0.0).expect("mesh"), CarrierMesh::of_region(&mesh, 0.0, &region).expect("mesh"));
     assert!(bent.off_region().is_some_and(|o| o < 1e-9), "{:?}", bent.off_region());
     let [a, b] = [flat, bent].map(|m| explicit(&tiling(Arc::new(m), "diamond", 0.3), 6.0));
     assert_eq!(a.mesh.triangles, b.mesh.triangles);
@@ -289,7 +290,7 @@ fn bent_walls_are_as_thick_as_asked_on_average() {
         let design = built(region, sheet, size);
         let tiling = &design.tilings[0].tiling;
         let cell = tiling.cells[0].cell.clone();
-        let middle = Tiling::new(tiling.map.clone(), cell, Part::Lower, Level::Same(0.0));
+        let middle = Tiling::new(tiling.map.clone(), cell, Part::Lower, NodalLevel::Same(0.0));
         let area = |s: &SurfaceMesh| {
             let of = |i: usize| {
                 let [a, b, c] = s.mesh.corners(i);

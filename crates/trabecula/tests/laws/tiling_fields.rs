@@ -5,12 +5,12 @@ use std::sync::Arc;
 use super::common::{Random, ball, check};
 use super::tiling::{cell, made, map, shaken};
 use geometry::math::{Aabb, dot, norm, sub};
-use trabecula::cell::tet::{Nodes, Subdivision, tet_catalogue};
+use trabecula::cell::tet::{Subdivision, SubdivisionNodes, tet_catalogue};
 use trabecula::field::{Block, Field};
 use trabecula::implicit::Implicit;
-use trabecula::map::Tets;
+use trabecula::map::CarrierMesh;
 use trabecula::region::Region;
-use trabecula::tiling::{Level, Rounded, Tiling};
+use trabecula::tiling::{NodalLevel, Rounded, Tiling};
 
 #[test]
 fn fields_are_continuous_for_any_numbering() {
@@ -38,7 +38,7 @@ fn fields_are_continuous_for_any_numbering() {
             }
         }
         // The trace on a face has the face's symmetry, and all four are one: to the last bit.
-        let nodes = Nodes::new(&s, Subdivision { n: 6 });
+        let nodes = SubdivisionNodes::new(&s, Subdivision { n: 6 });
         let value = |k: [u16; 4]| {
             let i = nodes.whole.iter().position(|w| *w == k).expect("a node");
             nodes.values[i]
@@ -53,10 +53,10 @@ fn bounds_hold_and_gradients_are_those_of_the_values() {
     let mut some = Random(7);
     let mesh = shaken(2, 0.15, 4.0, &mut some);
     for (overlap, name) in [(0.0, "diamond_sheet"), (0.1, "primitive_sheet"), (0.1, "iwp")] {
-        let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
+        let map = Arc::new(CarrierMesh::new(&mesh, overlap).expect("mesh"));
         let (s, part, t) = cell(name);
         let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.8, 1.2));
-        let tiling = Tiling::new(map, s, part, Level::Nodes(Arc::new(each.collect())));
+        let tiling = Tiling::new(map, s, part, NodalLevel::Nodes(Arc::new(each.collect())));
         let mut fields: Vec<Arc<dyn Implicit>> = tiling.parts();
         fields.push(Arc::new(tiling.clone()));
         for _ in 0..600 {
@@ -96,13 +96,13 @@ fn a_block_is_evaluated_where_it_is_wanted() {
     let mut some = Random(9);
     let region: Region = ball([4.0; 3], 3.5);
     let mesh = shaken(2, 0.15, 4.0, &mut some);
-    let flat = |overlap: f64| Tets::new(&mesh, overlap).expect("mesh");
-    let bent = Tets::of_region(&mesh, 0.0, &region).expect("mesh");
+    let flat = |overlap: f64| CarrierMesh::new(&mesh, overlap).expect("mesh");
+    let bent = CarrierMesh::of_region(&mesh, 0.0, &region).expect("mesh");
     for (map, name) in [(flat(0.0), "diamond_sheet"), (flat(0.1), "iwp"), (bent, "primitive_sheet")] {
         let (s, part, t) = cell(name);
-        let tiling = Arc::new(Tiling::new(Arc::new(map), s, part, Level::Same(t)));
+        let tiling = Arc::new(Tiling::new(Arc::new(map), s, part, NodalLevel::Same(t)));
         let mut fields: Vec<Arc<dyn Implicit>> = tiling.parts();
-        fields.extend([tiling.clone() as Arc<dyn Implicit>, Arc::new(tiling.eased())]);
+        fields.extend([tiling.clone() as Arc<dyn Implicit>, Arc::new(tiling.with_limited_gradient())]);
         fields.push(Arc::new(Rounded::new(&tiling, &region)));
         for f in fields {
             let axes = [7, 64, 5].map(|n| {
@@ -133,8 +133,8 @@ fn overlap_smooths_the_creases() {
     let mesh = shaken(2, 0.1, 4.0, &mut some);
     let (s, part, t) = cell("primitive");
     let turn = |overlap: f64| {
-        let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
-        let tiling = Tiling::new(map.clone(), s.clone(), part, Level::Same(t));
+        let map = Arc::new(CarrierMesh::new(&mesh, overlap).expect("mesh"));
+        let tiling = Tiling::new(map.clone(), s.clone(), part, NodalLevel::Same(t));
         let mut worst = 0.0f64;
         for i in 0..map.len() {
             for (face, other) in map.across(i).into_iter().enumerate() {

@@ -4,7 +4,7 @@ use crate::common::{Random, cases, check, rows};
 use geometry::progress::Silent;
 use trabecula::design::{Built, Design, NoFiles};
 use trabecula::extract::region_volume;
-use trabecula::surface_maker::{Islands, Options};
+use trabecula::surface_maker::{Islands, SurfaceOptions};
 
 /// Cells that are one piece at these fractions.
 const CELLS: [(&str, &str, [f64; 2]); 4] = [
@@ -37,7 +37,7 @@ fn drilled(some: &mut Random) -> String {
 fn off(built: &Built, asked: f64, steps: f64) -> f64 {
     let volume = region_volume(&built.solid.region, 0.0, &Silent).expect("region");
     let edge = built.solid.wavelength / steps;
-    let options = Options { resolution: edge, islands: Islands::Keep };
+    let options = SurfaceOptions { resolution: edge, islands: Islands::Keep };
     let made = built.surface().mesh(&options, &Silent).expect("surface").surface;
     check("on a grid", &made);
     made.mesh.volume() / (asked * volume) - 1.0

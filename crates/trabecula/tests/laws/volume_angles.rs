@@ -5,7 +5,7 @@ use std::sync::Arc;
 use geometry::progress::Silent;
 use geometry::tetmesh::volume;
 use trabecula::design::{Built, Design, NoFiles};
-use trabecula::volume_mesh::{MeshedVolume, Options, VolumeTarget};
+use trabecula::volume_mesh::{MeshedVolume, VolumeMeshOptions, VolumeTarget};
 
 use crate::common::{Random, cases};
 
@@ -27,7 +27,7 @@ fn built(text: &str) -> Built {
 }
 
 fn made(design: &Built, edge: f64, order: u8) -> MeshedVolume {
-    let options = Options { edge, of: VolumeTarget::Solid, order, periodic: false, largest: false };
+    let options = VolumeMeshOptions { edge, of: VolumeTarget::Solid, order, periodic: false, largest: false };
     design.volume_mesh(&options, &Silent).expect("a mesh")
 }
 
@@ -140,8 +140,13 @@ fn cell(cell: &str, part: &str, fraction: f64, edges: u32, order: u8) -> MeshedV
         "schema = 1\nregion.box.size = [4, 4, 4]\n[lattice.a]\ncell = \"{cell}\"\npart = \"{part}\"\n\
          map.affine.wavelength = 4\nlevel.fraction = {fraction}\n"
     );
-    let options =
-        Options { edge: 4.0 / f64::from(edges), of: VolumeTarget::Solid, order, periodic: true, largest: false };
+    let options = VolumeMeshOptions {
+        edge: 4.0 / f64::from(edges),
+        of: VolumeTarget::Solid,
+        order,
+        periodic: true,
+        largest: false,
+    };
     built(&text).volume_mesh(&options, &Silent).expect("a mesh")
 }
 

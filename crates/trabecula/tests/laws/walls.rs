@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use geometry::math::{Aabb, Vec3};
 use geometry::progress::Silent;
-use trabecula::blend::{Blend, By, Constituent, Weights};
+use trabecula::blend::{Blend, BlendRule, Constituent, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
@@ -39,7 +39,7 @@ fn wall(of: &Arc<Lattice>) -> Constituent {
     }
 }
 
-fn blended(first: Constituent, second: &Arc<Lattice>, by: By) -> Blend {
+fn blended(first: Constituent, second: &Arc<Lattice>, by: BlendRule) -> Blend {
     let stops = vec![[-8.0, 0.0], [8.0, 1.0]];
     let weights = Weights::between(Grade::from(Linear::new([1.0, 0.2, 0.0], stops).expect("ramp")));
     let of = vec![first, Constituent::Lattice(second.clone())];
@@ -62,7 +62,7 @@ fn a_sheet_by_its_sides_is_itself() {
     let points = points();
     for fraction in ["0.25", "0.25 + 0.004*z"] {
         let (gyroid, other) = (sheet("gyroid", fraction, 4.0), sheet("primitive", "0.3", 4.3));
-        for by in [By::Value, By::Fraction] {
+        for by in [BlendRule::Value, BlendRule::Fraction] {
             let whole = blended(Constituent::Lattice(gyroid.clone()), &other, by);
             let sides = blended(wall(&gyroid), &other, by);
             let (mut a, mut b) = (vec![0.0; points.len()], vec![0.0; points.len()]);
@@ -70,8 +70,8 @@ fn a_sheet_by_its_sides_is_itself() {
             sides.values(&points, &mut b);
             let far = a.iter().zip(&b).fold(0f64, |m, (a, b)| m.max((a - b).abs()));
             match by {
-                By::Value => assert!(far < 1e-12, "{fraction}: {far:e}"),
-                By::Fraction => {
+                BlendRule::Value => assert!(far < 1e-12, "{fraction}: {far:e}"),
+                BlendRule::Fraction => {
                     let solid = |v: &[f64]| v.iter().filter(|v| **v <= 0.0).count() as f64;
                     let off = (solid(&a) - solid(&b)).abs() / points.len() as f64;
                     // A thousand places tell a fraction to some thousandths.
@@ -86,7 +86,7 @@ fn a_sheet_by_its_sides_is_itself() {
 fn gradients_blocks_and_bounds_agree_with_values() {
     for fraction in ["0.25", "0.25 + 0.004*z"] {
         let (gyroid, other) = (sheet("gyroid", fraction, 4.0), sheet("primitive", "0.3", 4.3));
-        let whole = blended(wall(&gyroid), &other, By::Fraction);
+        let whole = blended(wall(&gyroid), &other, BlendRule::Fraction);
         let mut fields = whole.parts();
         assert_eq!(fields.len(), 2);
         fields.push(Arc::new(whole));

@@ -3,7 +3,7 @@
 //! - *Layers*: a module of `trabecula` imports only from modules of lower layers. (Between crates cargo checks it.)
 //! - *Circles*: no two files of a crate import each other (`import_circles`).
 //! - *Length*: a function has at most 100 lines, a file at most 600; tables of data apart.
-//! - *Names*: no file name occurs twice in a crate, so that a name leads to one place.
+//! - *Names*: no file name and no type name occurs twice in a crate, so that a name leads to one definition.
 //! - *Words*: messages and documentation use the field's terms (docs/glossary.md), not private ones.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -167,6 +167,52 @@ fn a_file_name_occurs_once_in_a_crate() {
             by_name.entry(name).or_default().push(path);
         }
         wrong.extend(by_name.into_values().filter(|p| p.len() > 1).map(|p| format!("{p:?}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Type names of a crate that are still given twice.
+const REPEATED: &[(&str, &str)] = &[("geometry", "Quality"), ("geometry", "Report"), ("trabecula", "Spread")];
+
+/// The types, traits and aliases that a formatted source defines for its module: those of functions, traits and inner modules are indented.
+fn type_names(text: &str) -> Vec<&str> {
+    let name = |line| {
+        let visible = |w: &&str| w.starts_with("pub") || w.ends_with(')') || *w == "unsafe";
+        let mut words = str::split_whitespace(line).skip_while(visible);
+        let kind = words.next().filter(|_| !line.starts_with(' '))?;
+        let name = words.next().filter(|_| ["struct", "enum", "union", "trait", "type"].contains(&kind))?;
+        name.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+    };
+    text.lines().filter_map(name).collect()
+}
+
+#[test]
+fn types_of_functions_and_traits_are_none_of_the_module() {
+    let text = "/// struct A\npub(in crate::a) struct B<'a>(u8);\npub enum C {\n    D,\n}\ntrait E: F {\n    type G;\n}\npub type H = u8;\n\
+                pub use i::J;\nfn k() {\n    struct L;\n}\nstruct M;\n";
+    assert_eq!(type_names(text), ["B", "C", "E", "H", "M"]);
+}
+
+#[test]
+fn a_type_name_occurs_once_in_a_crate() {
+    let mut wrong = Vec::new();
+    for of in CRATES {
+        let src = root().join("crates").join(of).join("src");
+        let mut by_name: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for (path, text) in files(of).into_iter().filter(|(p, _)| !is_test(p)) {
+            let file = path.strip_prefix(&src).expect("below src").display().to_string();
+            for name in type_names(&shipped(&text)) {
+                by_name.entry(name.to_string()).or_default().push(file.clone());
+            }
+        }
+        assert!(by_name.len() > 5, "{of}: types are found");
+        for (name, files) in by_name {
+            match (files.len() > 1, REPEATED.contains(&(of, name.as_str()))) {
+                (true, false) => wrong.push(format!("{of}: {name} in {}", files.join(", "))),
+                (false, true) => wrong.push(format!("{of}: {name} is repeated no longer")),
+                _ => {}
+            }
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::PatternField;
-use crate::graph::{Beam, Graph, Hub};
+use crate::graph::{Beam, Graph, HubBall};
 use crate::pattern::Pattern;
 use crate::quador::{Fillet, Quadors};
 use geometry::fault::Fault;
@@ -67,7 +67,7 @@ impl PatternField {
         for (n, at) in near {
             cluster.add(n, at, |n, at| {
                 let (local, h) = (inverse.after(&self.pattern.at(at)), self.pattern.nodes[n as usize]);
-                Hub { center: local.point(h.center), radius: local.scale() * h.radius }
+                HubBall { center: local.point(h.center), radius: local.scale() * h.radius }
             });
         }
         let graph = cluster.graph;
@@ -94,7 +94,7 @@ impl<'a> Cluster<'a> {
         Cluster { pattern, graph: Graph::default(), indices: HashMap::new(), beams: HashSet::new() }
     }
 
-    fn index_of(&mut self, n: u32, at: [u32; 3], ball: &impl Fn(u32, [u32; 3]) -> Hub) -> u32 {
+    fn index_of(&mut self, n: u32, at: [u32; 3], ball: &impl Fn(u32, [u32; 3]) -> HubBall) -> u32 {
         *self.indices.entry((n, at)).or_insert_with(|| {
             self.graph.hubs.push(ball(n, at));
             self.graph.hubs.len() as u32 - 1
@@ -102,7 +102,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// Adds a hub with its beams.
-    fn add(&mut self, n: u32, at: [u32; 3], ball: impl Fn(u32, [u32; 3]) -> Hub) {
+    fn add(&mut self, n: u32, at: [u32; 3], ball: impl Fn(u32, [u32; 3]) -> HubBall) {
         let own = self.index_of(n, at, &ball);
         for (number, s) in self.pattern.struts.iter().enumerate() {
             for end in [0, 1] {

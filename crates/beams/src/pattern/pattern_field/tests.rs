@@ -1,5 +1,5 @@
 use super::*;
-use crate::graph::{Hub, Profile};
+use crate::graph::{HubBall, Profile};
 use geometry::math::rotation;
 
 fn samples_in_unit_cube() -> impl Iterator<Item = Vec3> {
@@ -9,7 +9,7 @@ fn samples_in_unit_cube() -> impl Iterator<Item = Vec3> {
 fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
     let strut = |offset| Strut { ends: [0, 0], offset, profile: Profile::Mid(0.2) };
     Pattern {
-        nodes: vec![Hub { center, radius: 0.25 }],
+        nodes: vec![HubBall { center, radius: 0.25 }],
         struts: vec![strut([1, 0, 0]), strut([0, 1, 0]), strut([0, 0, 1]), strut([1, -1, 0])],
         steps,
     }
@@ -99,7 +99,7 @@ fn beams_that_run_into_each_other_are_found() {
     let by = Similarity::translation;
     let crossing = |apart: f64, r: f64| {
         let strut = |ends, offset| Strut { ends, offset, profile: Profile::Mid(r) };
-        let node = |z| Hub { center: [0.0, 0.0, z], radius: r };
+        let node = |z| HubBall { center: [0.0, 0.0, z], radius: r };
         // Both diagonals of a square, one above the other.
         Pattern {
             nodes: vec![node(0.0), node(apart)],
@@ -132,7 +132,7 @@ fn repeats_that_coincide_are_refused() {
     let still = (Similarity::IDENTITY, 1);
     let ring = |step, count| {
         let strut = Strut { ends: [0, 0], offset: [1, 0, 0], profile: Profile::Mid(0.2) };
-        let nodes = vec![Hub { center: [18.0, 0.0, 0.0], radius: 0.25 }];
+        let nodes = vec![HubBall { center: [18.0, 0.0, 0.0], radius: 0.25 }];
         Pattern { nodes, struts: vec![strut], steps: [(step, count), still, still] }
     };
     let turn = |s, degrees, up| Similarity::new(s, rotation([0.0, 0.0, degrees]), [3.0, 1.0, 0.0], [0.0, 0.0, up]);

@@ -4,11 +4,11 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::hub_quadric::Quadric;
-use super::{Brep, EdgeUse, Face};
+use super::{Brep, BrepFace, EdgeUse};
 
 /// A plane in a hub's frame: normal · x + value = 0, with a unit normal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub(super) struct CutPlane {
     pub normal: Vec3,
     pub value: f64,
     /// Distance from the plane within which a point is on it in any case, mm.
@@ -18,15 +18,15 @@ pub(super) struct Plane {
 /// Distance from a plane within which a corner is on it, in lengths of the adjacent curve.
 const ON_PLANE: f64 = 1e-9;
 
-impl Plane {
+impl CutPlane {
     /// Signed distance of a point.
     pub(super) fn at(&self, x: Vec3) -> f64 {
         dot(self.normal, x) + self.value
     }
 
     /// The plane through a point.
-    pub(super) fn through(point: Vec3, normal: Vec3) -> Plane {
-        Plane { normal, value: -dot(normal, point), near: 0.0 }
+    pub(super) fn through(point: Vec3, normal: Vec3) -> CutPlane {
+        CutPlane { normal, value: -dot(normal, point), near: 0.0 }
     }
 
     /// Distance within which points of a curve are on the plane.
@@ -76,7 +76,7 @@ impl Plane {
 
 /// Where a boundary loop passes from one side of a plane to the other: at the start of a use of an edge.
 #[derive(Clone, Copy)]
-struct Crossing {
+struct LoopCrossing {
     boundary: usize,
     index: usize,
     corner: u32,
@@ -104,8 +104,8 @@ impl Brep<'_> {
     }
 
     /// Cuts a face by a plane in its frame, and gives the numbers of its parts; `None` if its loops cannot be followed.
-    pub(super) fn cut(&mut self, face: u32, plane: &Plane) -> Option<Vec<u32>> {
-        let Face { frame, quadric, .. } = self.faces[face as usize];
+    pub(super) fn cut(&mut self, face: u32, plane: &CutPlane) -> Option<Vec<u32>> {
+        let BrepFace { frame, quadric, .. } = self.faces[face as usize];
         for &(edge, _) in self.loops(&self.faces[face as usize]).iter().flatten() {
             let roots = plane.roots(&self.curve((edge, true), &frame));
             match roots {
@@ -123,12 +123,12 @@ impl Brep<'_> {
         let loops = self.loops(&self.faces[face as usize]);
         let side = |of: &EdgeUse| plane.is_face_above(&quadric, &self.curve(*of, &frame));
         let sides: Vec<Vec<bool>> = loops.iter().map(|l| l.iter().map(side).collect()).collect();
-        let mut crossings: Vec<Crossing> = Vec::new();
+        let mut crossings: Vec<LoopCrossing> = Vec::new();
         for (boundary, l) in sides.iter().enumerate() {
             for (index, above) in l.iter().enumerate() {
                 if l[(index + l.len() - 1) % l.len()] != *above {
                     let corner = self.start(loops[boundary][index]);
-                    crossings.push(Crossing { boundary, index, corner, enters: !above });
+                    crossings.push(LoopCrossing { boundary, index, corner, enters: !above });
                 }
             }
         }
@@ -183,7 +183,7 @@ impl Brep<'_> {
         let mut numbers = Vec::with_capacity(faces.len());
         let like = self.faces[face as usize].clone();
         for (k, (loops, _)) in faces.into_iter().enumerate() {
-            let part = Face { loops, ..like.clone() };
+            let part = BrepFace { loops, ..like.clone() };
             if k == 0 {
                 self.faces[face as usize] = part;
                 numbers.push(face);
@@ -200,7 +200,7 @@ impl Brep<'_> {
 /// have the positive side on their left.
 fn parts(
     loops: &[Vec<EdgeUse>],
-    crossings: &[Crossing],
+    crossings: &[LoopCrossing],
     sections: &[Option<(usize, Vec<u32>)>],
 ) -> Option<Vec<(Vec<EdgeUse>, bool)>> {
     let mut out = Vec::new();
@@ -215,10 +215,10 @@ fn parts(
             if std::mem::replace(&mut used[at], true) {
                 return None;
             }
-            let Crossing { boundary, index, .. } = crossings[at];
+            let LoopCrossing { boundary, index, .. } = crossings[at];
             let l = &loops[boundary];
             // To the next crossing of this loop.
-            let ahead = |c: &Crossing| (c.index + l.len() - index - 1) % l.len() + 1;
+            let ahead = |c: &LoopCrossing| (c.index + l.len() - index - 1) % l.len() + 1;
             let mut on_loop = crossings.iter().enumerate().filter(|(n, c)| *n != at && c.boundary == boundary);
             let (next, _) = on_loop.by_ref().min_by_key(|(_, c)| ahead(c))?;
             traced.extend((0..ahead(&crossings[next])).map(|k| l[(index + k) % l.len()]));

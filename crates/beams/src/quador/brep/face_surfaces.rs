@@ -10,8 +10,8 @@ use super::super::hub::HalfBeam;
 use super::super::integral::unresolved_face;
 use super::super::perpendicular::perpendicular;
 use super::super::stereographic::{Stereographic, opposite_poles};
-use super::cuts::Plane;
-use super::{Bezier, Brep, Face, Frame, Kind, Surface};
+use super::cuts::CutPlane;
+use super::{Bezier, Brep, BrepFace, Frame, Kind, Surface};
 
 /// Minimum ratio of the weights of a patch, and that from which no better one is searched.
 const WEIGHT_RATIO: [f64; 2] = [0.01, 0.2];
@@ -34,7 +34,7 @@ impl Brep<'_> {
     pub(super) fn set_surfaces(&mut self) -> Result<(), Fault> {
         let mut known: HashMap<[u32; 2], Surface> = HashMap::new();
         for face in 0..self.faces.len() as u32 {
-            let Face { frame: Frame { hub, .. }, class, kind, .. } = self.faces[face as usize];
+            let BrepFace { frame: Frame { hub, .. }, class, kind, .. } = self.faces[face as usize];
             if let Some(surface) = known.get(&class) {
                 self.faces[face as usize].surface = *surface;
                 continue;
@@ -74,8 +74,8 @@ impl Brep<'_> {
         // Away from the symmetry planes of symmetric hubs.
         let (sin, cos) = 0.2_f64.sin_cos();
         let [one, two] = [add(scale(side, cos), scale(other, sin)), sub(scale(other, cos), scale(side, sin))];
-        for half in self.cut(face, &Plane::through([0.0; 3], one))? {
-            for quarter in self.cut(half, &Plane::through([0.0; 3], two))? {
+        for half in self.cut(face, &CutPlane::through([0.0; 3], one))? {
+            for quarter in self.cut(half, &CutPlane::through([0.0; 3], two))? {
                 if let Kind::Ball(_) = kind {
                     self.faces[quarter as usize].surface = self.sphere(quarter, axis)?;
                 } else {
@@ -189,7 +189,7 @@ impl Brep<'_> {
         }
         let halvings = halvings.checked_sub(1)?;
         let normal = longest(unit(quadric.half_gradient(origin)), &boundary);
-        let parts = self.cut(face, &Plane::through(origin, normal))?;
+        let parts = self.cut(face, &CutPlane::through(origin, normal))?;
         parts.into_iter().try_for_each(|part| self.set_halved(part, halvings))
     }
 }

@@ -10,7 +10,7 @@ use super::super::Quadors;
 use super::super::bezier::Bezier;
 use super::super::hub::HalfBeam;
 use super::super::integral::unresolved_face;
-use super::super::slice::Plane;
+use super::super::slice::SlicePlane;
 use super::outline::Outline;
 use super::{Brep, EdgeUse, Frame, Kind};
 
@@ -25,7 +25,7 @@ pub(crate) struct HubGroup {
     /// Its hubs; the first stands for all.
     pub hubs: Vec<u32>,
     /// The planes that may cut the first.
-    planes: Vec<Plane>,
+    planes: Vec<SlicePlane>,
 }
 
 impl HubGroup {
@@ -42,7 +42,7 @@ impl Quadors {
     }
 
     /// The kinds of hubs with their half-beams that are behind all of some planes, or cut by them.
-    pub(crate) fn hub_groups(&self, planes: &[Plane]) -> Vec<HubGroup> {
+    pub(crate) fn hub_groups(&self, planes: &[SlicePlane]) -> Vec<HubGroup> {
         let classes = self.classes();
         let mut known: HashMap<(u32, Vec<(usize, i64)>), usize> = HashMap::new();
         let mut out: Vec<HubGroup> = Vec::new();
@@ -84,7 +84,7 @@ impl Quadors {
         brep.close(hub).ok_or_else(|| unresolved_face(hub as usize))?;
         let (near, center) = (COINCIDENT * self.scale, self.center(hub as usize));
         let half_beams = self.hub(hub as usize).half_beams;
-        let moved: Vec<Plane> = (group.planes.iter())
+        let moved: Vec<SlicePlane> = (group.planes.iter())
             .map(|plane| {
                 let coincides = half_beams.iter().any(|s| {
                     let along = dot(s.axis, plane.normal);
@@ -144,7 +144,7 @@ impl Brep<'_> {
         let (half_beams, frame) = (self.quadors.hub(hub as usize).half_beams, Frame { hub, other: hub, by: [0.0; 3] });
         let center = self.center(hub);
         for s in half_beams {
-            let plane = Plane::new(add(center, scale(s.axis, s.split)), s.axis).ok()?;
+            let plane = SlicePlane::new(add(center, scale(s.axis, s.split)), s.axis).ok()?;
             let near = COINCIDENT * self.quadors.scale;
             let in_plane = |edge: &u32| {
                 let curve = self.curve((*edge, true), &frame);

@@ -10,13 +10,13 @@ use geometry::union_find::{find, unite};
 use rayon::prelude::*;
 
 use super::super::bezier::Bezier;
-use super::super::complex::{Complex, Face as HubFace};
+use super::super::complex::{Complex, QuadricFace};
 use super::super::hub::Hub;
 use super::super::hub_quadric::Quadric;
 use super::super::integral::unresolved_face;
 use super::super::perpendicular::perpendicular;
-use super::cuts::Plane;
-use super::{Brep, EdgeUse, Face, Frame, Kind, NONE, Surface};
+use super::cuts::CutPlane;
+use super::{Brep, BrepFace, EdgeUse, Frame, Kind, NONE, Surface};
 
 /// Number of planes along a beam from which the one to cut it is chosen.
 const PLANES: usize = 16;
@@ -130,7 +130,7 @@ impl Outline {
 }
 
 /// What a face of a hub is part of.
-fn kind(hub: &Hub, complex: &Complex, face: &HubFace) -> Kind {
+fn kind(hub: &Hub, complex: &Complex, face: &QuadricFace) -> Kind {
     if let Some(half_beam) = face.end_circle {
         return Kind::Beam(half_beam);
     }
@@ -153,8 +153,8 @@ impl Brep<'_> {
             .map(|&i| Ok(Outline::new(&quadors.hub(i), &quadors.complex(i)?)))
             .collect::<Result<Vec<Outline>, Fault>>()?;
         // The face of a beam, once the first of its hubs is known, with its class and half-beam.
-        let mut first: Vec<Option<(Face, [u32; 2])>> = vec![None; quadors.beams()];
-        let mut planes: HashMap<[u32; 4], (Plane, Vec3)> = HashMap::new();
+        let mut first: Vec<Option<(BrepFace, [u32; 2])>> = vec![None; quadors.beams()];
+        let mut planes: HashMap<[u32; 4], (CutPlane, Vec3)> = HashMap::new();
         for hub in 0..quadors.len() as u32 {
             checkpoint();
             let class = classes.of[hub as usize];
@@ -185,7 +185,7 @@ impl Brep<'_> {
     }
 
     /// Adds the corners and edges of a hub, and gives its faces: their surfaces are chosen once all are known.
-    pub(super) fn place(&mut self, hub: u32, class: u32, outline: &Outline) -> Vec<Face> {
+    pub(super) fn place(&mut self, hub: u32, class: u32, outline: &Outline) -> Vec<BrepFace> {
         let (corner, edge) = (self.corners.len() as u32, self.edges.len() as u32);
         outline.corners.iter().for_each(|at| {
             self.push_corner(hub, *at);
@@ -194,7 +194,7 @@ impl Brep<'_> {
             self.push_edge(hub, ends.map(|v| v + corner), *curve);
         });
         let numbered = |l: &Vec<EdgeUse>| l.iter().map(|(e, forward)| (e + edge, *forward)).collect();
-        let face = |(index, (quadric, kind, loops)): (usize, &(Quadric, Kind, Vec<Vec<EdgeUse>>))| Face {
+        let face = |(index, (quadric, kind, loops)): (usize, &(Quadric, Kind, Vec<Vec<EdgeUse>>))| BrepFace {
             frame: Frame { hub, other: hub, by: [0.0; 3] },
             quadric: *quadric,
             loops: loops.iter().map(numbered).collect(),
@@ -206,7 +206,7 @@ impl Brep<'_> {
     }
 
     /// The plane along the axis of a beam that meets its boundary loops at corners, where one does, or else far from them.
-    pub(super) fn plane_along(&self, axis: Vec3, halves: &[&Face]) -> Plane {
+    pub(super) fn plane_along(&self, axis: Vec3, halves: &[&BrepFace]) -> CutPlane {
         let side = perpendicular(axis);
         let other = cross(axis, side);
         let turned = |k: usize| {
@@ -224,7 +224,7 @@ impl Brep<'_> {
         let through = curves.iter().map(|(_, c)| unit(cross(axis, c.points[0])));
         let mut best = (side, f64::NEG_INFINITY);
         for normal in through.chain((0..PLANES).map(turned)) {
-            let plane = Plane::through([0.0; 3], normal);
+            let plane = CutPlane::through([0.0; 3], normal);
             let (mut clearance, mut crossings, mut at_corners) = (1.0f64, [0; 2], 0);
             for (half, curve) in &curves {
                 let [p, ..] = curve.points;
@@ -244,6 +244,6 @@ impl Brep<'_> {
                 best = (normal, score);
             }
         }
-        Plane::through([0.0; 3], best.0)
+        CutPlane::through([0.0; 3], best.0)
     }
 }

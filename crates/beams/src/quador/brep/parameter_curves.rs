@@ -12,7 +12,7 @@ use geometry::dense::solve;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 use super::super::bezier::Bezier;
-use super::{Brep, Face, Surface};
+use super::{Brep, BrepFace, Surface};
 
 /// A Bézier curve in a parameter plane, over [0, 1]. Rational patches have parameters in [0, 1].
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ pub(crate) type CurveKey = [u64; 27];
 
 impl Brep<'_> {
     /// What the curve of an edge in the parameter plane of a face depends on: equal hubs have the same to the last bit.
-    pub(crate) fn curve_key(&self, face: &Face, edge: u32) -> CurveKey {
+    pub(crate) fn curve_key(&self, face: &BrepFace, edge: u32) -> CurveKey {
         let Bezier { points, weight } = self.curve((edge, true), &face.frame);
         let mut key = [0.0; 27];
         let mut put = key.iter_mut();
@@ -66,12 +66,12 @@ impl Brep<'_> {
     }
 
     /// The curve of an edge in the parameter plane of a face.
-    pub(crate) fn parameter_curve(&self, face: &Face, edge: u32) -> ParameterCurve {
+    pub(crate) fn parameter_curve(&self, face: &BrepFace, edge: u32) -> ParameterCurve {
         self.fitted(face, edge).0
     }
 
     /// The same, and its deviation from the edge relative to the distance from the hub's centre.
-    fn fitted(&self, face: &Face, edge: u32) -> (ParameterCurve, f64) {
+    fn fitted(&self, face: &BrepFace, edge: u32) -> (ParameterCurve, f64) {
         let curve = self.curve((edge, true), &face.frame);
         if let Surface::Rational { chart, range } = face.surface {
             let projected = curve.points.map(|p| chart.project(p));

@@ -12,9 +12,9 @@ use geometry::progress::checkpoint;
 
 use super::super::hub_quadric::Quadric;
 use super::super::perpendicular::perpendicular;
-use super::super::slice::{DISPLACEMENTS, Plane};
-use super::cuts::Plane as Cut;
-use super::{Brep, Corner, Edge, EdgeUse, Face, Frame, Kind, NONE, Surface};
+use super::super::slice::{DISPLACEMENTS, SlicePlane};
+use super::cuts::CutPlane;
+use super::{Brep, BrepFace, Corner, Edge, EdgeUse, Frame, Kind, NONE, Surface};
 
 /// Distance from a plane within which corners are on it, in typical radii: above the perturbation of seams and the length of
 /// arcs that are collapsed, and far below what files resolve.
@@ -25,14 +25,14 @@ const IN_CAP: f64 = 1e-6;
 const CHORD: f64 = 1e-2;
 
 /// Corners, edges and faces.
-type State = (Vec<Corner>, Vec<Edge>, Vec<Face>);
+type State = (Vec<Corner>, Vec<Edge>, Vec<BrepFace>);
 
 impl Brep<'_> {
     /// Keeps what is behind all of some planes.
     ///
     /// # Errors
     /// Planes that touch the boundary and cut nothing there, displaced ones too.
-    pub(super) fn trim(&mut self, planes: &[Plane]) -> Result<(), Fault> {
+    pub(super) fn trim(&mut self, planes: &[SlicePlane]) -> Result<(), Fault> {
         let whole = self.state();
         let mut failed = None;
         // What one plane touches another may take away: each is the first in turn.
@@ -54,7 +54,7 @@ impl Brep<'_> {
     }
 
     /// Keeps what is behind a plane, or one that is displaced a little; false if they all touch the boundary.
-    fn is_trimmed(&mut self, plane: &Plane) -> bool {
+    fn is_trimmed(&mut self, plane: &SlicePlane) -> bool {
         let before = self.state();
         DISPLACEMENTS.iter().any(|by| {
             let done = self.trim_by(&plane.moved(by * self.quadors.scale)).is_some();
@@ -74,13 +74,13 @@ impl Brep<'_> {
     }
 
     /// Keeps what is behind a plane; `None` if it touches the boundary without cutting it.
-    fn trim_by(&mut self, plane: &Plane) -> Option<()> {
+    fn trim_by(&mut self, plane: &SlicePlane) -> Option<()> {
         let mut kept = Vec::with_capacity(self.faces.len());
         for face in 0..self.faces.len() as u32 {
             checkpoint();
             let Frame { hub, .. } = self.faces[face as usize].frame;
             let point = sub(plane.origin, self.center(hub));
-            let local = Cut { near: ON * self.quadors.scale, ..Cut::through(point, plane.normal) };
+            let local = CutPlane { near: ON * self.quadors.scale, ..CutPlane::through(point, plane.normal) };
             for part in self.cut_through(face, &local)? {
                 if !self.is_in_front(part, &local)? {
                     kept.push(part);
@@ -93,7 +93,7 @@ impl Brep<'_> {
     }
 
     /// Whether a face that a plane does not cross is in front of it; `None` if its edges disagree.
-    fn is_in_front(&self, face: u32, plane: &Cut) -> Option<bool> {
+    fn is_in_front(&self, face: u32, plane: &CutPlane) -> Option<bool> {
         let of = &self.faces[face as usize];
         let mut sides = self.loops(of).into_iter().flatten().map(|u| {
             let curve = self.curve(u, &of.frame);
@@ -104,7 +104,7 @@ impl Brep<'_> {
     }
 
     /// Cuts a face by a plane as `cut` does, also where the section closes within the face.
-    fn cut_through(&mut self, face: u32, plane: &Cut) -> Option<Vec<u32>> {
+    fn cut_through(&mut self, face: u32, plane: &CutPlane) -> Option<Vec<u32>> {
         let parts = self.cut(face, plane)?;
         if parts.len() > 1 {
             return Some(parts);
@@ -118,7 +118,7 @@ impl Brep<'_> {
             let two = cross(plane.normal, one);
             for normal in [one, two, scale(add(one, two), 0.5f64.sqrt()), scale(sub(one, two), 0.5f64.sqrt())] {
                 let (count, before) = (self.faces.len(), self.faces[face as usize].clone());
-                let cut = self.halved(face, &Cut::through(x, normal), plane);
+                let cut = self.halved(face, &CutPlane::through(x, normal), plane);
                 if cut.as_ref().is_some_and(|parts| parts.len() > 2) {
                     return cut;
                 }
@@ -130,7 +130,7 @@ impl Brep<'_> {
     }
 
     /// Cuts a face by one plane, and its parts by another.
-    fn halved(&mut self, face: u32, first: &Cut, then: &Cut) -> Option<Vec<u32>> {
+    fn halved(&mut self, face: u32, first: &CutPlane, then: &CutPlane) -> Option<Vec<u32>> {
         let halves = self.cut(face, first)?;
         let mut parts = Vec::new();
         for half in halves {
@@ -161,7 +161,7 @@ impl Brep<'_> {
     }
 
     /// The planar faces in a plane that open edges bound; `None` if these do not lie in the plane, or touch in a corner.
-    pub(super) fn caps(&self, plane: &Plane, open: &BTreeMap<u32, bool>) -> Option<Vec<Face>> {
+    pub(super) fn caps(&self, plane: &SlicePlane, open: &BTreeMap<u32, bool>) -> Option<Vec<BrepFace>> {
         let Some(first) = open.keys().next() else {
             return Some(Vec::new());
         };
@@ -197,7 +197,7 @@ impl Brep<'_> {
         }
         let b = scale(plane.normal, 0.5);
         let quadric = Quadric { m: [[0.0; 3]; 3], b, c: -dot(origin, plane.normal) };
-        let face = |loops| Face { frame, quadric, loops, surface, kind: Kind::Cap, class: [NONE; 2] };
+        let face = |loops| BrepFace { frame, quadric, loops, surface, kind: Kind::Cap, class: [NONE; 2] };
         Some(self.nested(loops, &frame, &surface)?.into_iter().map(face).collect())
     }
 

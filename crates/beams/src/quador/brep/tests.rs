@@ -3,7 +3,7 @@ use std::collections::{HashMap, HashSet};
 use super::super::tests::{Random, random_star, six, star};
 use super::parameter_curves::ParameterCurve;
 use super::*;
-use crate::graph::{Beam, Graph, Hub, Profile, catalogue, named};
+use crate::graph::{Beam, Graph, HubBall, Profile, catalogue, named};
 use crate::quador::{Fillet, Pencil};
 use geometry::math::{cross, dot, norm, scale, unit};
 
@@ -27,7 +27,7 @@ fn block(name: &str, n: i32, radius: impl Fn(usize) -> f64, profile: impl Fn(usi
                 *known.entry((node, cell)).or_insert_with(|| {
                     let p = periodic.nodes[node];
                     let center = [0, 1, 2].map(|a| 10.0 * (p[a] + f64::from(cell[a])));
-                    graph.hubs.push(Hub { center, radius: radius(graph.hubs.len()) });
+                    graph.hubs.push(HubBall { center, radius: radius(graph.hubs.len()) });
                     graph.hubs.len() as u32 - 1
                 })
             });
@@ -96,7 +96,7 @@ fn check_brep(brep: &Brep) -> (Checked, i64) {
 }
 
 /// An edge begins and ends in its corners, and lies on the face, in space and by its curve in the parameter plane.
-fn check_edge(brep: &Brep, face: &Face, of: EdgeUse, curve: &Bezier<3>, counts: &mut [usize; 2]) {
+fn check_edge(brep: &Brep, face: &BrepFace, of: EdgeUse, curve: &Bezier<3>, counts: &mut [usize; 2]) {
     let radius = brep.quadors.hub(face.frame.hub as usize).radius;
     for (end, corner) in [(0, of), (2, (of.0, !of.1))] {
         let at = brep.corner(brep.start(corner), &face.frame);
@@ -119,7 +119,7 @@ fn check_edge(brep: &Brep, face: &Face, of: EdgeUse, curve: &Bezier<3>, counts: 
 }
 
 /// Twice the area that the use of an edge sweeps about the origin of the parameter plane, by chords.
-fn swept(brep: &Brep, face: &Face, (edge, forward): EdgeUse) -> f64 {
+fn swept(brep: &Brep, face: &BrepFace, (edge, forward): EdgeUse) -> f64 {
     let flat = brep.parameter_curve(face, edge);
     let points: Vec<[f64; 2]> = (0..=16).map(|k| flat.at(f64::from(k) / 16.0)).collect();
     let turn: f64 = points.windows(2).map(|w| w[0][0] * w[1][1] - w[0][1] * w[1][0]).sum();
@@ -127,7 +127,7 @@ fn swept(brep: &Brep, face: &Face, (edge, forward): EdgeUse) -> f64 {
 }
 
 /// The normal of the surface, by central differences, points out of the solid.
-fn check_normal(face: &Face, curve: &Bezier<3>) {
+fn check_normal(face: &BrepFace, curve: &Bezier<3>) {
     let x = curve.at(0.5);
     let [u, v] = face.surface.parameters(x);
     let h = 1e-5;
@@ -138,7 +138,7 @@ fn check_normal(face: &Face, curve: &Bezier<3>) {
 
 impl ParameterCurve {
     /// As `at`, in the units of the face's surface.
-    fn in_units(&self, face: &Face, t: f64) -> [f64; 2] {
+    fn in_units(&self, face: &BrepFace, t: f64) -> [f64; 2] {
         let at = self.at(t);
         match face.surface {
             Surface::Rational { range, .. } => [0, 1].map(|a| range[a][0] + at[a] * (range[a][1] - range[a][0])),
@@ -192,8 +192,9 @@ fn equal_hubs_have_equal_curves() {
         let q = Quadors::new(&graph, Fillet::Auto).expect("a block");
         check(&q);
         let brep = q.brep(&[]).expect("a boundary");
-        let used =
-            |face: &Face| brep.loops(face).concat().into_iter().map(|u| brep.curve_key(face, u.0)).collect::<Vec<_>>();
+        let used = |face: &BrepFace| {
+            brep.loops(face).concat().into_iter().map(|u| brep.curve_key(face, u.0)).collect::<Vec<_>>()
+        };
         brep.faces.iter().flat_map(used).collect::<HashSet<CurveKey>>().len()
     };
     // From three cells on, hubs of every kind are there: inner ones, and those of faces, edges and corners of the block.
@@ -240,7 +241,7 @@ fn random_hubs_have_closed_boundaries() {
 
 #[test]
 fn components_are_shells_and_collisions_are_refused() {
-    let hub = |x: f64, y: f64, z: f64| Hub { center: [x, y, z], radius: 1.0 };
+    let hub = |x: f64, y: f64, z: f64| HubBall { center: [x, y, z], radius: 1.0 };
     let crossed = |z: f64| Graph {
         hubs: vec![hub(0.0, 0.0, 0.0), hub(10.0, 0.0, 0.0), hub(5.0, -5.0, z), hub(5.0, 5.0, z), hub(30.0, 0.0, 0.0)],
         beams: vec![
@@ -257,7 +258,7 @@ fn components_are_shells_and_collisions_are_refused() {
 
 /// What is behind a plane and what is in front of it are closed, and together the whole.
 fn check_halves(q: &Quadors, point: Vec3, normal: Vec3, name: &str) {
-    let of = |normal: Vec3| Plane::new(point, normal).expect("a plane");
+    let of = |normal: Vec3| SlicePlane::new(point, normal).expect("a plane");
     let [behind, front] = [of(normal), of(scale(normal, -1.0))].map(|plane| {
         let brep = q.brep(&[plane]).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
         check_brep(&brep);
@@ -285,7 +286,7 @@ fn halves_of_cells_are_closed_and_make_the_whole() {
 }
 
 /// The hubs of a lattice, each closed, have together the volume of the whole, also of what is behind some planes.
-fn check_groups(q: &Quadors, planes: &[Plane], name: &str) {
+fn check_groups(q: &Quadors, planes: &[SlicePlane], name: &str) {
     let mut sum = 0.0;
     for group in q.hub_groups(planes) {
         let brep = q.group_brep(&group).unwrap_or_else(|fault| panic!("{name}: {}", fault.message));
@@ -300,7 +301,7 @@ fn check_groups(q: &Quadors, planes: &[Plane], name: &str) {
 
 #[test]
 fn groups_are_closed_and_make_the_whole() {
-    let plane = |point, normal| Plane::new(point, normal).expect("a plane");
+    let plane = |point, normal| SlicePlane::new(point, normal).expect("a plane");
     for cell in catalogue() {
         for fillet in [Fillet::Auto, Fillet::None] {
             let graph = block(cell.name, 1, |_| 0.4, |_| Profile::Cylinder);
@@ -351,7 +352,7 @@ fn beams_that_are_nearly_straight_are_cylinders_and_cones() {
         ([0.5, 0.3], Profile::Lambda(cone * (1.0 + 1e-15))),
         ([0.5, 0.3], Profile::Lambda(cone * (1.0 - 1e-13))),
     ] {
-        let hub = |x: f64, radius: f64| Hub { center: [x, 0.0, 0.0], radius };
+        let hub = |x: f64, radius: f64| HubBall { center: [x, 0.0, 0.0], radius };
         let hubs = vec![hub(0.0, radii[0]), hub(10.0, radii[1])];
         let q =
             Quadors::new(&Graph { hubs, beams: vec![Beam { ends: [0, 1], profile }] }, Fillet::None).expect("a rod");

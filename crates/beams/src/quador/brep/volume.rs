@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::super::bezier::Bezier;
 use super::super::boundary_form::BoundaryForm;
 use super::super::gauss::gauss;
-use super::{Brep, Face, Kind, Surface};
+use super::{Brep, BrepFace, Kind, Surface};
 
 /// Numbers of nodes of the rules that are compared.
 const NODES: [usize; 2] = [12, 18];
@@ -26,7 +26,7 @@ impl Brep<'_> {
     }
 
     /// ∫ (x − about)·n dA over a face.
-    fn flux(&self, face: &Face, about: Vec3) -> Option<f64> {
+    fn flux(&self, face: &BrepFace, about: Vec3) -> Option<f64> {
         let curves: Vec<Bezier<3>> =
             self.loops(face).into_iter().flatten().map(|u| self.curve(u, &face.frame)).collect();
         let by = sub(self.center(face.frame.hub), about);

@@ -13,7 +13,7 @@ use super::super::affine_function::AffineFunction;
 use super::super::conic::Conic;
 use super::super::hub::{HalfBeam, Hub};
 use super::super::hub_quadric::{Quadric, QuadricPiece, piece};
-use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
+use super::{COLLAPSE_LENGTH, Complex, Key, NONE, QuadricFace, SeamArc, Vertex};
 
 /// Size of the perturbation, in hub radii.
 const PERTURBATION: f64 = 2e-12;
@@ -33,7 +33,7 @@ pub(super) struct SeamTracer<'a> {
     /// Perturbed G of the half-beams.
     g: Vec<AffineFunction>,
     vertices: Vec<Vertex>,
-    arcs: Vec<Arc>,
+    arcs: Vec<SeamArc>,
     /// Arcs incident to each vertex.
     at: Vec<[u32; 4]>,
     pieces: Vec<(u64, Rc<QuadricPiece>)>,
@@ -203,7 +203,7 @@ impl<'a> SeamTracer<'a> {
         let left = dot(plane.a, cross(outward, conic.e[0]));
         let labels = if left > 0.0 { [labels[1], labels[0]] } else { labels };
         let id = self.arcs.len() as u32;
-        self.arcs.push(Arc { ends, labels, conic, plane });
+        self.arcs.push(SeamArc { ends, labels, conic, plane });
         let distinct = if ends[0] == ends[1] { &ends[..1] } else { &ends };
         for &v in distinct {
             if let Some(slot) = self.at.get_mut(v as usize).and_then(|s| s.iter_mut().find(|s| **s == NONE)) {
@@ -327,7 +327,7 @@ impl<'a> SeamTracer<'a> {
     pub(super) fn assemble(mut self) -> Option<Complex> {
         // The next arc of a face at a vertex is the other incident arc that bounds the face.
         let mut used = vec![[false; 2]; self.arcs.len()];
-        let mut faces: Vec<Face> = Vec::new();
+        let mut faces: Vec<QuadricFace> = Vec::new();
         for first in 0..self.arcs.len() {
             for side in 0..2 {
                 if used[first][side] {
@@ -361,19 +361,19 @@ impl<'a> SeamTracer<'a> {
                 }
                 let closed = loops.len() == 1 && self.arcs[first].ends[0] == self.arcs[first].ends[1];
                 // Closed arcs with the same label bound one annular face.
-                let ring = |f: &&mut Face| f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1));
+                let ring = |f: &&mut QuadricFace| f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1));
                 if let Some(f) = faces.iter_mut().find(ring) {
                     f.loops.push(loops);
                     continue;
                 }
                 let end_circle = (label.count_ones() == 1).then(|| label.trailing_zeros());
                 let quadric = self.quadric(label);
-                faces.push(Face { label, quadric, loops: vec![loops], end_circle });
+                faces.push(QuadricFace { label, quadric, loops: vec![loops], end_circle });
             }
         }
         if self.hub.half_beams.is_empty() {
             let quadric = self.quadric(0);
-            faces.push(Face { label: 0, quadric, loops: Vec::new(), end_circle: None });
+            faces.push(QuadricFace { label: 0, quadric, loops: Vec::new(), end_circle: None });
         }
         // Each half-beam has exactly one face of its own.
         for i in 0..self.hub.half_beams.len() {

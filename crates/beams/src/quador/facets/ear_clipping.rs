@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::super::complex::Face;
+use super::super::complex::QuadricFace;
 use super::refinement::alignment;
 use super::{Facets, loop_vertices, orientation};
 
@@ -14,7 +14,7 @@ const COLLINEAR: f64 = 1e-9;
 
 impl Facets<'_> {
     /// Triangulates a face bounded by seams alone.
-    pub(super) fn bounded(&mut self, polylines: &[Vec<u32>], face: &Face) -> Option<Vec<[u32; 3]>> {
+    pub(super) fn bounded(&mut self, polylines: &[Vec<u32>], face: &QuadricFace) -> Option<Vec<[u32; 3]>> {
         if face.loops.is_empty() {
             return Some(self.ball());
         }
@@ -38,7 +38,7 @@ impl Facets<'_> {
     }
 
     /// Triangulates a face between several loops.
-    pub(super) fn connected(&self, mut loops: Vec<Vec<u32>>, face: &Face) -> Option<Vec<[u32; 3]>> {
+    pub(super) fn connected(&self, mut loops: Vec<Vec<u32>>, face: &QuadricFace) -> Option<Vec<[u32; 3]>> {
         let mut outline = loops.pop().unwrap_or_default();
         while !loops.is_empty() {
             // Loops are connected along the shortest bridge.
@@ -78,7 +78,7 @@ impl Facets<'_> {
     }
 
     /// Triangulates a polygon by ear clipping, the best ear first.
-    fn ears(&self, mut outline: Vec<u32>, face: &Face) -> Option<Vec<[u32; 3]>> {
+    fn ears(&self, mut outline: Vec<u32>, face: &QuadricFace) -> Option<Vec<[u32; 3]>> {
         let place = |i: u32| self.points[i as usize];
         let worth = |[a, b, c]: [u32; 3]| {
             let [p, q, r] = self.corners([a, b, c]);

@@ -8,7 +8,7 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::checkpoint;
 use geometry::roots::{Bracket, Tolerance};
 
-use super::super::complex::Face;
+use super::super::complex::QuadricFace;
 use super::{EdgeCurve, Facets, edge_key, orientation};
 
 /// A flip must reduce the distance to this fraction at most, so that flipping terminates.
@@ -291,7 +291,7 @@ impl Facets<'_> {
 }
 
 /// The cosine of the angle between a triangle and its face.
-pub(super) fn alignment(face: &Face, [a, b, c]: [Vec3; 3]) -> f64 {
+pub(super) fn alignment(face: &QuadricFace, [a, b, c]: [Vec3; 3]) -> f64 {
     let up = face.quadric.half_gradient(scale(add(a, add(b, c)), 1.0 / 3.0));
     let flat = cross(sub(b, a), sub(c, a));
     dot(flat, up) / (norm(flat) * norm(up)).max(f64::MIN_POSITIVE)

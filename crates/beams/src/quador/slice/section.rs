@@ -13,7 +13,7 @@ use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::complex::perturbation;
 use super::super::hub::{HalfBeam, Hub};
 use super::super::hub_quadric::{Quadric, QuadricPiece, piece};
-use super::{Arc, Plane};
+use super::{ConicArc, SlicePlane};
 
 /// Intersection of the plane with the disc in the split plane of a half-beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub(super) struct SectionArc {
 
 impl SectionArc {
     /// The arc in the coordinates of the plane.
-    pub(super) fn in_plane(self, hub: u32, about: [f64; 2], plane: &Plane) -> Arc {
+    pub(super) fn in_plane(self, hub: u32, about: [f64; 2], plane: &SlicePlane) -> ConicArc {
         let (q, [u, v]) = (&self.quadric, plane.axes);
         let o = scale(plane.normal, self.height);
         let slope = q.half_gradient(o);
@@ -45,7 +45,7 @@ impl SectionArc {
             let [u, v] = plane.project(p);
             [about[0] + u, about[1] + v]
         };
-        Arc {
+        ConicArc {
             hub,
             half_beams: self.label,
             conic: [q.form(u, u), q.form(u, v), q.form(v, v), dot(slope, u), dot(slope, v), q.at(o)],
@@ -84,7 +84,7 @@ struct Region {
 
 /// A point where a seam of the hub crosses the plane.
 #[derive(Clone, Copy, Debug)]
-struct Crossing {
+struct SeamCrossing {
     from: u64,
     to: u64,
     at: Vec3,
@@ -99,11 +99,11 @@ pub(super) struct Section<'a> {
     /// Perturbed G of the half-beams.
     g: Vec<AffineFunction>,
     disc_sections: &'a [DiscSection],
-    plane: &'a Plane,
+    plane: &'a SlicePlane,
     height: f64,
     reach: f64,
     regions: Vec<Region>,
-    crossings: Vec<Crossing>,
+    crossings: Vec<SeamCrossing>,
 }
 
 impl<'a> Section<'a> {
@@ -111,7 +111,7 @@ impl<'a> Section<'a> {
     /// part. Lengths in mm.
     pub(super) fn new(
         hub: &'a Hub,
-        plane: &'a Plane,
+        plane: &'a SlicePlane,
         height: f64,
         reach: f64,
         disc_sections: &'a [DiscSection],
@@ -219,7 +219,7 @@ impl<'a> Section<'a> {
     }
 
     /// The labels across the edges of a region, and where the surface leaves it.
-    fn edges(&self, region: &Region) -> (Vec<u64>, Vec<Crossing>) {
+    fn edges(&self, region: &Region) -> (Vec<u64>, Vec<SeamCrossing>) {
         let ([u, v], n) = (self.plane.axes, self.plane.normal);
         let (o, q, r) = (self.nearest_to_center(), &region.quadric, self.reach);
         let point = |p: [f64; 2]| add(o, add(scale(u, p[0]), scale(v, p[1])));
@@ -240,7 +240,7 @@ impl<'a> Section<'a> {
             for t in [w / two, none / w] {
                 let at = add(a, scale(direction, t));
                 if (0.0..=1.0).contains(&t) && dot(guard.a, section_tangent(q, n, at)) > 0.0 && self.belongs(at) {
-                    crossings.push(Crossing { from: region.label, to, at, used: false });
+                    crossings.push(SeamCrossing { from: region.label, to, at, used: false });
                 }
             }
         }
@@ -279,7 +279,7 @@ impl<'a> Section<'a> {
                 Event::To(next) => {
                     arcs.push(arc);
                     let key = [label, next];
-                    let on = |c: &&mut Crossing| [c.from, c.to] == key;
+                    let on = |c: &&mut SeamCrossing| [c.from, c.to] == key;
                     if let Some(c) = self.crossings.iter_mut().find(on) {
                         if Some(key) == until {
                             return Some((arcs, None));

@@ -10,7 +10,7 @@ use core::f64::consts::PI;
 fn integrated(q: &Quadors, normal: Vec3, [a, b]: [f64; 2], slack: f64, depth: u32) -> f64 {
     let (m, h) = ((a + b) / 2.0, (b - a) / 2.0);
     let at = |s: f64| {
-        let plane = Plane::new(scale(normal, m + s * h), normal).expect("a plane");
+        let plane = SlicePlane::new(scale(normal, m + s * h), normal).expect("a plane");
         q.slice(&plane).expect("a slice").area
     };
     let ends = at(-1.0) + at(1.0);
@@ -69,7 +69,7 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
         let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
         for _ in 0..60 {
             let p = [0; 3].map(|_| 20.0 * random.next());
-            let plane = Plane::new(p, random.direction()).expect("a plane");
+            let plane = SlicePlane::new(p, random.direction()).expect("a plane");
             let s = q.slice(&plane).expect("a slice");
             assert_eq!(s.moved, 0.0);
             assert!(s.hubs <= q.len());
@@ -119,7 +119,7 @@ fn areas_are_what_points_say() {
     for fillet in [Fillet::None, Fillet::Auto] {
         let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
         for _ in 0..4 {
-            let plane = Plane::new([0; 3].map(|_| 20.0 * random.next()), random.direction()).expect("a plane");
+            let plane = SlicePlane::new([0; 3].map(|_| 20.0 * random.next()), random.direction()).expect("a plane");
             let s = q.slice(&plane).expect("a slice");
             let polygons = s.polygons(1e-3);
             let (mut low, mut high, mut length) = ([f64::MAX; 2], [f64::MIN; 2], 0.0);
@@ -157,7 +157,7 @@ fn planes_of_symmetry_are_sliced() {
     // Cylinders of radius 1 along the edges of cubes of 10.
     let q = Quadors::new(&cubic(2, 0.0), Fillet::None).expect("a lattice");
     let at = |normal: Vec3, h: f64| {
-        let plane = Plane::new(scale(normal, h), normal).expect("a plane");
+        let plane = SlicePlane::new(scale(normal, h), normal).expect("a plane");
         q.slice(&plane).expect("a slice")
     };
     for normal in [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]] {
@@ -187,7 +187,7 @@ fn planes_of_symmetry_are_sliced() {
         for normal in [[0.0, 0.0, 1.0], unit([1.0, 1.0, 0.0]), unit([1.0, -1.0, 0.0]), unit([1.0, 1.0, 1.0])] {
             for h in [0.0, 0.5, 1.0, 1.2, 1.5, 5.0] {
                 let area = |h: f64| {
-                    let plane = Plane::new(scale(normal, h), normal).expect("a plane");
+                    let plane = SlicePlane::new(scale(normal, h), normal).expect("a plane");
                     q.slice(&plane).expect("a slice").area
                 };
                 // Areas are continuous in height (up to a square root, where the plane touches a cylinder along its
@@ -209,8 +209,8 @@ fn a_slice_far_from_the_origin_keeps_its_digits() {
     }
     let far = Quadors::new(&graph, Fillet::Auto).expect("a lattice");
     for (p, n) in [([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), ([5.0, 5.0, 0.3], [0.6, 0.0, 0.8])] {
-        let a = near.slice(&Plane::new(p, n).expect("a plane")).expect("a slice");
-        let b = far.slice(&Plane::new(add(p, by), n).expect("a plane")).expect("a slice");
+        let a = near.slice(&SlicePlane::new(p, n).expect("a plane")).expect("a slice");
+        let b = far.slice(&SlicePlane::new(add(p, by), n).expect("a plane")).expect("a slice");
         // Positions are accurate to 1e-12 there.
         assert!((a.area - b.area).abs() < 1e-9 * a.area, "{} {}", a.area, b.area);
     }
@@ -218,13 +218,13 @@ fn a_slice_far_from_the_origin_keeps_its_digits() {
 
 #[test]
 fn faults_of_planes_say_what_is_wrong() {
-    let says = |r: Result<Plane, Fault>, at: &str| assert_eq!(r.expect_err("refused").at, at);
-    says(Plane::new([0.0; 3], [0.0; 3]), "normal");
-    says(Plane::new([0.0; 3], [f64::NAN, 0.0, 1.0]), "normal");
-    says(Plane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]), "point");
+    let says = |r: Result<SlicePlane, Fault>, at: &str| assert_eq!(r.expect_err("refused").at, at);
+    says(SlicePlane::new([0.0; 3], [0.0; 3]), "normal");
+    says(SlicePlane::new([0.0; 3], [f64::NAN, 0.0, 1.0]), "normal");
+    says(SlicePlane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]), "point");
     let close = star(1.0, &[([1.0, 0.0, 0.0], 5.0, 1.0), (unit([1.0, 0.1, 0.0]), 5.0, 1.0)], |_| Profile::Cone);
     let q = Quadors::new(&close, Fillet::Auto).expect("built");
-    let at = |x: f64| q.slice(&Plane::new([x, 0.0, 0.0], [1.0, 0.0, 0.0]).expect("a plane"));
+    let at = |x: f64| q.slice(&SlicePlane::new([x, 0.0, 0.0], [1.0, 0.0, 0.0]).expect("a plane"));
     assert!(at(1.0).expect_err("refused").message.contains("overlap"));
     assert!(at(-3.0).expect("nothing there").loops.is_empty());
 }

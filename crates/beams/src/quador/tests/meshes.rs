@@ -163,7 +163,7 @@ fn fillets_take_triangles_as_the_chord_error_says() {
 
 #[test]
 fn beams_that_nearly_touch_without_a_common_hub_do_not_cross() {
-    let hub = |center: Vec3| crate::graph::Hub { center, radius: 0.5 };
+    let hub = |center: Vec3| crate::graph::HubBall { center, radius: 0.5 };
     let beam = |ends| Beam { ends, profile: Profile::Cylinder };
     for apart in [1e-3, 3e-3, 1e-2, 0.1] {
         let h = 1.0 + apart;
@@ -182,7 +182,7 @@ fn beams_that_nearly_touch_without_a_common_hub_do_not_cross() {
 fn shares_of_the_chord_error_ask_nothing_of_end_circles() {
     // End circles are divided by the chord error itself: hubs that are refined to a share of it, since their vertices could not be moved,
     // took more and more triangles there, without end.
-    let hub = |center, radius| crate::graph::Hub { center, radius };
+    let hub = |center, radius| crate::graph::HubBall { center, radius };
     let hubs = vec![
         hub([0.0; 3], 0.5),
         hub([10.0, 0.0, 0.0], 0.5),

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use super::{FeText, abaqus, lines, nastran, rows};
 use crate::fe_mesh::BeamMesh;
 use crate::formats::nastran_fields::{check_numbers, real};
-use crate::formats::vtu::{Array, Cells};
+use crate::formats::vtu::{ArrayValues, Cells};
 
 /// A format of beams: suffix, what it is, and what writes a mesh.
 pub type BeamFormat = (&'static str, &'static str, fn(&BeamMesh, &FeText, &mut dyn Write) -> io::Result<()>);
@@ -76,7 +76,7 @@ fn write_vtu(mesh: &BeamMesh, text: &FeText, out: &mut dyn Write) -> io::Result<
         kind: if width == 2 { 3 } else { 21 },
         width,
         count: mesh.elements.len(),
-        data: &[("radius", Array::Numbers(&mesh.radii))],
+        data: &[("radius", ArrayValues::Numbers(&mesh.radii))],
         fields: &text.fields,
     };
     cells.write(|| (0..mesh.elements.len()).flat_map(|i| mesh.nodes_of(i)), out)

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::{FeText, abaqus, lines, push};
 use crate::fe_mesh::{HexMesh, fraction_classes};
-use crate::formats::vtu::{Array, Cells};
+use crate::formats::vtu::{ArrayValues, Cells};
 
 /// A format of voxels: suffix, what it is, and what writes a mesh.
 pub type HexFormat = (&'static str, &'static str, fn(&HexMesh, &FeText, &mut dyn Write) -> io::Result<()>);
@@ -95,7 +95,7 @@ fn write_vtu(mesh: &HexMesh, text: &FeText, out: &mut dyn Write) -> io::Result<(
         kind: 12,
         width: 8,
         count: mesh.hexes.len(),
-        data: &[("fraction", Array::Numbers(&mesh.fraction))],
+        data: &[("fraction", ArrayValues::Numbers(&mesh.fraction))],
         fields: &text.fields,
     };
     cells.write(|| mesh.hexes.iter().flatten().copied(), out)

@@ -4,13 +4,13 @@ use std::io::{self, Write};
 
 use super::FeText;
 use crate::fe_mesh::{FeField, FeMesh, MIDDLES};
-use crate::formats::vtu::{Array, Cells};
+use crate::formats::vtu::{ArrayValues, Cells};
 
 pub(super) fn write(mesh: &FeMesh, text: &FeText, out: &mut dyn Write) -> io::Result<()> {
     let width = if mesh.middles.is_empty() { 4 } else { 10 };
-    let mut data = vec![("domain", Array::Labels(&mesh.domain))];
+    let mut data = vec![("domain", ArrayValues::Labels(&mesh.domain))];
     if !mesh.fraction.is_empty() {
-        data.push(("fraction", Array::Numbers(&mesh.fraction)));
+        data.push(("fraction", ArrayValues::Numbers(&mesh.fraction)));
     }
     let mut fields = text.fields.clone();
     if !mesh.axes.is_empty() {

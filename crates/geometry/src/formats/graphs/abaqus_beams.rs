@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 use super::nastran_beams::by_radius;
 use super::{BeamGraph, Ids, on_line, positive};
 use crate::fault::{Fault, counted};
-use crate::formats::text::{Lines, at_line, parse, shown};
+use crate::formats::text::{NumberedLines, at_line, parse, shown};
 use crate::math::{Vec3, cross, norm, sub, unit};
 
 /// Directions of the first axis of a section, of which the one least along the beams is taken.
@@ -85,7 +85,7 @@ struct Reading {
 pub fn read(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut reading, mut keyword, mut row) = (Reading::default(), None, Vec::new());
     let mut rows_of_keyword = 0;
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let text = String::from_utf8_lossy(text);
         let text = text.trim();
         if text.is_empty() || text.starts_with("**") {

@@ -6,8 +6,8 @@ use std::io::{self, Write};
 
 use super::{BeamGraph, on_line, positive};
 use crate::fault::{Fault, counted};
-use crate::formats::text::{Lines, at_line, parse, position, shown, words};
-use crate::formats::vtk::{Array, Shape, read_vtk};
+use crate::formats::text::{NumberedLines, at_line, parse, position, shown, words};
+use crate::formats::vtk::{DataArray, DataSet, read_vtk};
 
 /// VTK's numbers of lines and polylines.
 const LINE: u8 = 3;
@@ -30,7 +30,7 @@ pub fn write_obj(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
 /// Reads vertices and lines, which may have more than two points.
 pub fn read_obj(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut graph, mut faces) = (BeamGraph::default(), 0);
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let mut row = words(text);
         match row.next() {
             Some(b"v") => graph.nodes.push(position(line, row)?),
@@ -107,12 +107,12 @@ pub fn write_vtu_lines(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()>
 /// Reads line cells of an unstructured grid or of poly data; arrays named `radius` of points or cells are radii.
 pub fn read_vtk_lines(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let data = read_vtk(bytes)?;
-    let Shape::Mesh(elements) = &data.shape else {
+    let DataSet::Mesh(elements) = &data.shape else {
         return Err(Fault::new("", "this is a grid of voxels; lines are expected"));
     };
     data.check()?;
     let named = |of_cells: bool, most: usize| {
-        let fits = |a: &&Array| {
+        let fits = |a: &&DataArray| {
             let name = a.name.to_lowercase();
             a.of_cells == of_cells && (1..=most).contains(&a.components) && RADII.contains(&name.as_str())
         };

@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 use super::{BeamGraph, Ids, positive};
 use crate::fault::{Fault, counted};
 use crate::formats::nastran_fields::{check_numbers, grid, real, value};
-use crate::formats::text::{Lines, at_line, parse, shown};
+use crate::formats::text::{NumberedLines, at_line, parse, shown};
 use crate::math::{sub, unit};
 
 /// Beams by their mean radius, in the order in which these first occur; NaN for those without.
@@ -80,8 +80,8 @@ struct Card {
 fn cards(bytes: &[u8]) -> Vec<Card> {
     let mut cards: Vec<Card> = Vec::new();
     let begins = |t: &[u8]| t.trim_ascii().to_ascii_uppercase().starts_with(b"BEGIN");
-    let mut waiting = Lines::new(bytes).any(|(_, t)| begins(t));
-    for (line, text) in Lines::new(bytes) {
+    let mut waiting = NumberedLines::new(bytes).any(|(_, t)| begins(t));
+    for (line, text) in NumberedLines::new(bytes) {
         if waiting {
             waiting = !begins(text);
             continue;

@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 
 use super::{BeamGraph, Ids, on_line, positive};
 use crate::fault::Fault;
-use crate::formats::text::{Lines, at_line, column, parse, shown, words};
+use crate::formats::text::{NumberedLines, at_line, column, parse, shown, words};
 
 /// Writes a row for each beam: both ends and the radii there, mm.
 pub fn write_table(graph: &BeamGraph, out: &mut dyn Write) -> io::Result<()> {
@@ -55,7 +55,7 @@ fn places(headings: &[&[u8]]) -> Result<Option<Vec<usize>>, String> {
 pub fn read_table(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut graph, mut seen, mut first) = (BeamGraph::default(), FxHashMap::default(), true);
     let mut order: Option<Vec<usize>> = None;
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let text = text.split(|b| *b == b'#').next().unwrap_or_default();
         let separated = text.iter().any(|b| b",;\t".contains(b));
         let fields: Vec<&[u8]> = match separated {
@@ -118,7 +118,7 @@ fn unquoted(field: &[u8]) -> &[u8] {
 /// comment.
 pub fn read_grid(bytes: &[u8]) -> Result<BeamGraph, Fault> {
     let (mut graph, mut ids, mut pairs) = (BeamGraph::default(), Ids::default(), Vec::new());
-    for (line, text) in Lines::new(bytes) {
+    for (line, text) in NumberedLines::new(bytes) {
         let row: Vec<&[u8]> =
             text.split(|b| b.is_ascii_whitespace() || b",;".contains(b)).filter(|w| !w.is_empty()).collect();
         let Some(kind) = row.first().filter(|w| !w.starts_with(b"//") && !w.starts_with(b"#")) else { continue };

@@ -10,7 +10,7 @@ use crate::layer::Point;
 
 /// The pixels of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Raster {
+pub struct PixelGrid {
     /// The lower left corner of the picture, mm.
     pub origin: Point,
     /// Edge of a pixel, mm.
@@ -32,7 +32,7 @@ struct Cell {
 /// Calls `take` with the number of each row from the top and its pixels, 0 (void) to 255 (solid).
 pub fn coverage(
     loops: &[Vec<Point>],
-    raster: &Raster,
+    raster: &PixelGrid,
     mut take: impl FnMut(usize, &[u8]) -> io::Result<()>,
 ) -> io::Result<()> {
     let [width, height] = raster.size;
@@ -147,7 +147,7 @@ fn strip([x0, x1]: Point, height: f64, width: usize, row: u32, cells: &mut Vec<(
 mod tests {
     use super::*;
 
-    fn picture(loops: &[Vec<Point>], raster: &Raster) -> Vec<Vec<u8>> {
+    fn picture(loops: &[Vec<Point>], raster: &PixelGrid) -> Vec<Vec<u8>> {
         let mut rows = Vec::new();
         let take = |_: usize, row: &[u8]| {
             rows.push(row.to_vec());
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn boxes_and_triangles_have_their_fractions() {
-        let raster = Raster { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
+        let raster = PixelGrid { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
         let square = vec![[0.25, 0.5], [1.0, 0.5], [1.0, 1.25], [0.25, 1.25]];
         let half = 128; // 127.5 rounded up
         let want = [[half / 2, half, 0, 0], [half, 255, 0, 0], [0, 0, 0, 0]];
@@ -176,16 +176,16 @@ mod tests {
             .map(|i| crate::math::sin_cos_turns(f64::from(i) / 360.0))
             .map(|(s, c)| [1.0 + 0.9 * c, 1.0 + 0.9 * s])
             .collect();
-        let area = |loops: &[Vec<Point>], raster: &Raster| {
+        let area = |loops: &[Vec<Point>], raster: &PixelGrid| {
             let sum: f64 = picture(loops, raster).iter().flatten().map(|v| f64::from(*v)).sum();
             sum / 255.0 * raster.pixel * raster.pixel
         };
-        let whole = Raster { origin: [0.0; 2], pixel: 0.01, size: [200, 200] };
+        let whole = PixelGrid { origin: [0.0; 2], pixel: 0.01, size: [200, 200] };
         let want = crate::layer::signed_area(&circle);
         // 600 pixels on the boundary, each rounded by up to half a 255th.
         assert!((area(std::slice::from_ref(&circle), &whole) - want).abs() < 600.0 * 1e-4 * 0.5 / 255.0);
         for origin in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-            let half = Raster { origin, ..whole };
+            let half = PixelGrid { origin, ..whole };
             let found = area(std::slice::from_ref(&circle), &half);
             assert!((found - 0.5 * want).abs() < 300.0 * 1e-4 * 0.5 / 255.0 + 1e-9, "{origin:?} {found}");
         }

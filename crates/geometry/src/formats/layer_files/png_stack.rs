@@ -36,7 +36,7 @@ pub fn encode(stack: &Stack, _: usize, layer: &Layer) -> io::Result<Encoded> {
 
 /// How layers are described.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum StackFormat {
     Manifest,
     Sl1,
 }
@@ -44,7 +44,7 @@ enum Kind {
 struct Pictures<'a> {
     stack: &'a Stack,
     archive: Option<ZipWriter<&'a mut dyn Target>>,
-    kind: Kind,
+    kind: StackFormat,
     areas: Vec<f64>,
 }
 
@@ -53,7 +53,7 @@ pub fn open_zip<'a>(
     out: &'a mut dyn Target,
     _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
-    open(stack, out, Kind::Manifest)
+    open(stack, out, StackFormat::Manifest)
 }
 
 pub fn open_sl1<'a>(
@@ -61,10 +61,10 @@ pub fn open_sl1<'a>(
     out: &'a mut dyn Target,
     _: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
-    open(stack, out, Kind::Sl1)
+    open(stack, out, StackFormat::Sl1)
 }
 
-fn open<'a>(stack: &'a Stack, out: &'a mut dyn Target, kind: Kind) -> io::Result<Box<dyn LayerWriter + 'a>> {
+fn open<'a>(stack: &'a Stack, out: &'a mut dyn Target, kind: StackFormat) -> io::Result<Box<dyn LayerWriter + 'a>> {
     stack.raster()?;
     Ok(Box::new(Pictures { stack, archive: Some(ZipWriter::new(out)), kind, areas: Vec::new() }))
 }
@@ -79,8 +79,8 @@ impl Pictures<'_> {
 
     fn name(&self, index: usize) -> String {
         match self.kind {
-            Kind::Manifest => format!("{index:05}.png"),
-            Kind::Sl1 => format!("{}{index:05}.png", self.job()),
+            StackFormat::Manifest => format!("{index:05}.png"),
+            StackFormat::Sl1 => format!("{}{index:05}.png", self.job()),
         }
     }
 
@@ -162,11 +162,11 @@ impl LayerWriter for Pictures<'_> {
 
     fn finish(&mut self) -> io::Result<()> {
         match self.kind {
-            Kind::Manifest => {
+            StackFormat::Manifest => {
                 let text = self.manifest();
                 self.add("manifest.json", text.as_bytes(), CompressionMethod::Deflated)?;
             }
-            Kind::Sl1 => {
+            StackFormat::Sl1 => {
                 for (name, text) in self.settings() {
                     self.add(name, text.as_bytes(), CompressionMethod::Deflated)?;
                 }

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use super::{Encoded, LayerWriter, Stack, Target, by_size};
 use crate::formats::number::{push_f32, push_u32};
-use crate::formats::threemf::{Model, Piece};
+use crate::formats::threemf::{DeflatedChunk, ModelWriter};
 use crate::formats::xml::escaped;
 use crate::formats::{ByteSpool, invalid};
 use crate::layer::Layer;
@@ -16,7 +16,7 @@ const SLICE: &str = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"
 
 struct Slices<'a> {
     stack: &'a Stack,
-    model: Option<Model<'a>>,
+    model: Option<ModelWriter<'a>>,
     out: &'a mut dyn Target,
 }
 
@@ -25,8 +25,8 @@ pub fn open<'a>(
     out: &'a mut dyn Target,
     aside: &'a mut dyn ByteSpool,
 ) -> io::Result<Box<dyn LayerWriter + 'a>> {
-    let mut model = Model::new(aside);
-    let mut head = Model::head(&format!(" xmlns:s=\"{SLICE}\" requiredextensions=\"s\""));
+    let mut model = ModelWriter::new(aside);
+    let mut head = ModelWriter::head(&format!(" xmlns:s=\"{SLICE}\" requiredextensions=\"s\""));
     for (name, text) in [("Title", &stack.title), ("Application", &stack.application)] {
         if !text.is_empty() {
             head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text)));
@@ -34,7 +34,7 @@ pub fn open<'a>(
     }
     let bottom = stack.heights.first().copied().unwrap_or_default();
     head.push_str(&format!("<resources>\n<s:slicestack id=\"1\" zbottom=\"{}\">\n", bottom as f32));
-    model.push(Piece::of(head.as_bytes()))?;
+    model.push(DeflatedChunk::of(head.as_bytes()))?;
     Ok(Box::new(Slices { stack, model: Some(model), out }))
 }
 
@@ -45,7 +45,7 @@ pub fn encode(_: &Stack, _: usize, layer: &Layer) -> io::Result<Encoded> {
     push_f32(&mut text, layer.top as f32);
     if points == 0 {
         text.extend(b"\"/>\n");
-        return Ok(Encoded::Deflated(Piece::of(&text)));
+        return Ok(Encoded::Deflated(DeflatedChunk::of(&text)));
     }
     text.extend(b"\">\n<s:vertices>\n");
     let contours = by_size(layer);
@@ -72,7 +72,7 @@ pub fn encode(_: &Stack, _: usize, layer: &Layer) -> io::Result<Encoded> {
         first += count;
     }
     text.extend(b"</s:slice>\n");
-    Ok(Encoded::Deflated(Piece::of(&text)))
+    Ok(Encoded::Deflated(DeflatedChunk::of(&text)))
 }
 
 impl LayerWriter for Slices<'_> {
@@ -107,7 +107,7 @@ impl LayerWriter for Slices<'_> {
         tail.extend(
             b"</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"2\"/>\n</build>\n</model>\n",
         );
-        model.push(Piece::of(&tail))?;
+        model.push(DeflatedChunk::of(&tail))?;
         model.finish(self.out)
     }
 }

@@ -10,7 +10,7 @@ use tiff::encoder::{Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStanda
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, Tag};
 
 use super::coverage::coverage;
-use super::{Encoded, LayerWriter, Raster, Stack, Target};
+use super::{Encoded, LayerWriter, PixelGrid, Stack, Target};
 use crate::formats::{ByteSpool, invalid};
 use crate::layer::Layer;
 
@@ -65,7 +65,7 @@ fn failed(e: TiffError) -> io::Error {
 
 impl<K: TiffKind> Pages<'_, K> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), TiffError> {
-        let Raster { size: [width, height], pixel, .. } = *self.stack.raster()?;
+        let PixelGrid { size: [width, height], pixel, .. } = *self.stack.raster()?;
         let mut page = self.file.image_directory()?;
         let at = page.write_data(bytes)?;
         let offsets = [K::convert_offset(at)?];
@@ -120,7 +120,7 @@ mod tests {
 
     /// A layer with a square of 2.5 x 1.5 pixels from the lower left corner of a raster of 4 x 3 pixels of 0.5 mm.
     fn written<K: TiffKind>() -> Vec<u8> {
-        let raster = Raster { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
+        let raster = PixelGrid { origin: [0.0; 2], pixel: 0.5, size: [4, 3] };
         let stack = Stack {
             heights: vec![-4.8526, -4.6526, -4.5],
             bounds: Aabb { min: [0.0; 3], max: [2.0, 1.5, 0.4] },

@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use super::{Model, Piece, push_mesh, quoted};
+use super::{DeflatedChunk, ModelWriter, push_mesh, quoted};
 use crate::formats::number::{push_f32, push_u32};
 use crate::formats::{ByteSpool, Indexed, Metadata, in_order, invalid};
 use crate::math::Vec3;
@@ -91,13 +91,13 @@ pub fn write_beam_lattice(
     if lattice.nodes.len().max(lattice.beams.len()) >= i32::MAX as usize {
         return Err(invalid(format!("3MF counts to {}: the lattice has more nodes or beams", i32::MAX)));
     }
-    let mut model = Model::new(aside);
+    let mut model = ModelWriter::new(aside);
     let balls = !lattice.balls.is_empty();
     let (of_balls, required) = if balls { (format!(" xmlns:b2=\"{BALLS}\""), "b b2") } else { (String::new(), "b") };
     let attributes = format!(
         " xmlns:b=\"{BEAMS}\"{of_balls} xmlns:trabecula=\"urn:trabecula:design\" requiredextensions=\"{required}\""
     );
-    let mut head = format!("{}{}<resources>\n", Model::head(&attributes), meta.elements());
+    let mut head = format!("{}{}<resources>\n", ModelWriter::head(&attributes), meta.elements());
     let mut id = 0;
     let mut references = String::new();
     for (name, mesh, attribute) in
@@ -106,7 +106,7 @@ pub fn write_beam_lattice(
         let Some(mesh) = mesh else { continue };
         id += 1;
         head.push_str(&format!("<object id=\"{id}\" type=\"model\" name=\"{name}\">\n<mesh>\n<vertices>\n"));
-        model.push(Piece::of(head.as_bytes()))?;
+        model.push(DeflatedChunk::of(head.as_bytes()))?;
         push_mesh(&mut model, mesh)?;
         head = "</triangles>\n</mesh>\n</object>\n".into();
         references.push_str(&format!("{attribute}=\"{id}\""));
@@ -114,11 +114,11 @@ pub fn write_beam_lattice(
     id += 1;
     let name = if meta.title.is_empty() { String::new() } else { format!(" name=\"{}\"", quoted(&meta.title)) };
     head.push_str(&format!("<object id=\"{id}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n"));
-    model.push(Piece::of(head.as_bytes()))?;
+    model.push(DeflatedChunk::of(head.as_bytes()))?;
     super::push_vertices(&mut model, lattice.nodes.len(), |r| Ok(Cow::Borrowed(&lattice.nodes[r])))?;
     push_lattice(&mut model, lattice, &references)?;
     let tail = format!("</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"{id}\"/>\n</build>\n</model>\n");
-    model.push(Piece::of(tail.as_bytes()))?;
+    model.push(DeflatedChunk::of(tail.as_bytes()))?;
     model.finish(out)
 }
 
@@ -165,7 +165,7 @@ impl BeamDefaults {
 }
 
 /// Adds beams, balls and sets, after the nodes.
-fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> io::Result<()> {
+fn push_lattice(model: &mut ModelWriter, lattice: &BeamLattice, references: &str) -> io::Result<()> {
     let defaults = BeamDefaults::of(lattice);
     let length = |b: &Frustum| {
         let [p, q] = b.ends.map(|n| lattice.nodes[n as usize]);
@@ -182,19 +182,19 @@ fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> i
     let cap = defaults.cap.word();
     text.extend_from_slice(format!("\" cap=\"{cap}\"{references}{balls}>\n<b:beams>\n").as_bytes());
     let mut put = |piece| model.push(piece);
-    put(Piece::of(&text))?;
+    put(DeflatedChunk::of(&text))?;
     let rows = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
         lattice.beams[r].iter().for_each(|b| defaults.push(b, &mut text));
-        Ok(Piece::of(&text))
+        Ok(DeflatedChunk::of(&text))
     };
     in_order(lattice.beams.len(), CHUNK, rows, &mut put)?;
-    put(Piece::of(b"</b:beams>\n"))?;
+    put(DeflatedChunk::of(b"</b:beams>\n"))?;
     if !lattice.sets.is_empty() {
-        put(Piece::of(b"<b:beamsets>\n"))?;
+        put(DeflatedChunk::of(b"<b:beamsets>\n"))?;
         for (name, members) in &lattice.sets {
             let name = quoted(name);
-            put(Piece::of(format!("<b:beamset name=\"{name}\" identifier=\"{name}\">\n").as_bytes()))?;
+            put(DeflatedChunk::of(format!("<b:beamset name=\"{name}\" identifier=\"{name}\">\n").as_bytes()))?;
             let rows = |r: std::ops::Range<usize>| {
                 let mut text = Vec::with_capacity(r.len() * 24);
                 for index in &members[r] {
@@ -202,15 +202,15 @@ fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> i
                     push_u32(&mut text, *index);
                     text.extend_from_slice(b"\"/>\n");
                 }
-                Ok(Piece::of(&text))
+                Ok(DeflatedChunk::of(&text))
             };
             in_order(members.len(), CHUNK, rows, &mut put)?;
-            put(Piece::of(b"</b:beamset>\n"))?;
+            put(DeflatedChunk::of(b"</b:beamset>\n"))?;
         }
-        put(Piece::of(b"</b:beamsets>\n"))?;
+        put(DeflatedChunk::of(b"</b:beamsets>\n"))?;
     }
     if !lattice.balls.is_empty() {
-        put(Piece::of(b"<b2:balls>\n"))?;
+        put(DeflatedChunk::of(b"<b2:balls>\n"))?;
         let rows = |r: std::ops::Range<usize>| {
             let mut text = Vec::with_capacity(r.len() * 36);
             for (node, radius) in &lattice.balls[r] {
@@ -220,10 +220,10 @@ fn push_lattice(model: &mut Model, lattice: &BeamLattice, references: &str) -> i
                 push_f32(&mut text, *radius as f32);
                 text.extend_from_slice(b"\"/>\n");
             }
-            Ok(Piece::of(&text))
+            Ok(DeflatedChunk::of(&text))
         };
         in_order(lattice.balls.len(), CHUNK, rows, &mut put)?;
-        put(Piece::of(b"</b2:balls>\n"))?;
+        put(DeflatedChunk::of(b"</b2:balls>\n"))?;
     }
-    put(Piece::of(b"</b:beamlattice>\n"))
+    put(DeflatedChunk::of(b"</b:beamlattice>\n"))
 }

@@ -67,13 +67,13 @@ impl Object {
 
 /// A model file.
 #[derive(Default)]
-pub(super) struct Model {
+pub(super) struct ModelFile {
     pub unit: f64,
     pub objects: HashMap<u32, Object>,
     pub items: Vec<ObjectReference>,
 }
 
-impl Model {
+impl ModelFile {
     /// The number of its beam lattices.
     pub fn lattices(&self) -> usize {
         self.objects.values().filter(|o| o.lattice.is_some()).count()

@@ -20,18 +20,18 @@ const LOCATOR64: u32 = 0x0706_4b50;
 const DATE: u16 = 0x21;
 
 /// A piece of an entry, deflated so that pieces can be put one after the other.
-pub struct Piece {
+pub struct DeflatedChunk {
     bytes: Vec<u8>,
     crc: Hasher,
     size: u64,
 }
 
-impl Piece {
+impl DeflatedChunk {
     /// Deflates text, best of rows of one pattern.
-    pub fn of(text: &[u8]) -> Piece {
+    pub fn of(text: &[u8]) -> DeflatedChunk {
         let mut crc = Hasher::new();
         crc.update(text);
-        Piece { bytes: super::deflate::rows(text), crc, size: text.len() as u64 }
+        DeflatedChunk { bytes: super::deflate::rows(text), crc, size: text.len() as u64 }
     }
 
     /// Its bytes, and the CRC-32 and number of those of the text.
@@ -40,8 +40,8 @@ impl Piece {
     }
 
     /// From what `into_parts` gave.
-    pub fn of_parts(bytes: Vec<u8>, [crc, size]: [u64; 2]) -> Piece {
-        Piece { bytes, crc: Hasher::new_with_initial_len(crc as u32, size), size }
+    pub fn of_parts(bytes: Vec<u8>, [crc, size]: [u64; 2]) -> DeflatedChunk {
+        DeflatedChunk { bytes, crc: Hasher::new_with_initial_len(crc as u32, size), size }
     }
 }
 
@@ -68,7 +68,7 @@ impl<'a> Entry<'a> {
     }
 
     /// Adds a piece at the end.
-    pub fn push(&mut self, piece: Piece) -> io::Result<()> {
+    pub fn push(&mut self, piece: DeflatedChunk) -> io::Result<()> {
         self.crc.combine(&piece.crc);
         self.size += piece.size;
         self.packed += piece.bytes.len() as u64;
@@ -157,9 +157,9 @@ mod tests {
             let mut aside = [Vec::new(), Vec::new(), Vec::new()];
             let [a, b, c] = &mut aside;
             let mut long = Entry::new("a/long.txt", a);
-            text.chunks(7001).for_each(|c| long.push(Piece::of(c)).unwrap());
+            text.chunks(7001).for_each(|c| long.push(DeflatedChunk::of(c)).unwrap());
             let mut short = Entry::new("short", b);
-            short.push(Piece::of(b"x")).unwrap();
+            short.push(DeflatedChunk::of(b"x")).unwrap();
             let mut bytes = Vec::new();
             write(&mut [long, short, Entry::new("empty", c)], limit, &mut bytes).unwrap();
             let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();

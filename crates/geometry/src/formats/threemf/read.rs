@@ -10,7 +10,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::MODEL;
-use super::model::{Lattice, Model, Object, ObjectReference, PlacedObject, Placement, Source};
+use super::model::{Lattice, ModelFile, Object, ObjectReference, PlacedObject, Placement, Source};
 use crate::fault::{Fault, counted};
 use crate::formats::join::Joiner;
 use crate::formats::text::{parse, shown};
@@ -102,7 +102,7 @@ pub fn object_names(bytes: &[u8]) -> Result<Vec<String>, Fault> {
     Ok(names(&package.file(&root, model)?))
 }
 
-fn names(main: &Model) -> Vec<String> {
+fn names(main: &ModelFile) -> Vec<String> {
     main.items.iter().map(|i| main.objects.get(&i.id).map(|o| o.name.clone()).unwrap_or_default()).collect()
 }
 
@@ -196,7 +196,7 @@ pub(super) fn place_all(
     for i in 0..items {
         traversal.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
-    Ok(Contents { objects, items, lattices: files.values().map(Model::lattices).sum() })
+    Ok(Contents { objects, items, lattices: files.values().map(ModelFile::lattices).sum() })
 }
 
 /// The name of the main model.
@@ -223,14 +223,14 @@ fn target(relations: &mut dyn BufRead) -> Option<String> {
 }
 
 /// Other files that a model's components and items name.
-fn outside(model: &Model) -> impl Iterator<Item = String> {
+fn outside(model: &ModelFile) -> impl Iterator<Item = String> {
     let uses = model.objects.values().flat_map(|o| &o.components).chain(&model.items);
     uses.filter(|u| !u.path.is_empty()).map(|u| u.path.clone())
 }
 
 /// The objects of a build as they are reached through their components, and what may yet come of them.
 struct BuildTraversal<'a> {
-    files: &'a HashMap<String, Model>,
+    files: &'a HashMap<String, ModelFile>,
     unit: f64,
     take: &'a mut dyn FnMut(&PlacedObject) -> Result<(), Fault>,
     left: usize,
@@ -269,14 +269,14 @@ impl BuildTraversal<'_> {
 /// A model file as it is read.
 #[derive(Default)]
 struct ModelParser {
-    model: Model,
+    model: ModelFile,
     /// What stands before the core's element names: empty, or "c:" and the like. Extensions have another.
     prefix: Option<String>,
     object: Option<(u32, Object)>,
 }
 
 /// Parses one model file.
-fn model(text: &mut dyn BufRead) -> Result<Model, Fault> {
+fn model(text: &mut dyn BufRead) -> Result<ModelFile, Fault> {
     let (mut buffer, mut s) = (Vec::new(), Scanner::new(text, "3MF model"));
     let mut parser = ModelParser::default();
     loop {
@@ -404,7 +404,7 @@ fn check(s: &Source, id: u32, o: &Object) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::package::{self, Entry, Piece};
+    use super::super::package::{self, DeflatedChunk, Entry};
     use super::super::write;
     use super::*;
     use crate::formats::Metadata;
@@ -419,7 +419,7 @@ mod tests {
     fn pack(model: &str) -> Vec<u8> {
         let mut aside = Vec::new();
         let mut entry = Entry::new(MODEL, &mut aside);
-        entry.push(Piece::of(model.as_bytes())).unwrap();
+        entry.push(DeflatedChunk::of(model.as_bytes())).unwrap();
         archive(&mut [entry])
     }
 
@@ -494,9 +494,9 @@ mod tests {
         let (mut first, mut second) = (Vec::new(), Vec::new());
         let mut long = Entry::new("blanks", &mut first);
         let blanks = vec![b'\n'; 1 << 20];
-        (0..60).for_each(|_| long.push(Piece::of(&blanks)).unwrap());
+        (0..60).for_each(|_| long.push(DeflatedChunk::of(&blanks)).unwrap());
         let mut short = Entry::new("some", &mut second);
-        (0..9).for_each(|_| short.push(Piece::of(&blanks)).unwrap());
+        (0..9).for_each(|_| short.push(DeflatedChunk::of(&blanks)).unwrap());
         let bytes = archive(&mut [long, short]);
         let mut package = Package::open(&bytes).unwrap();
         let message = package.file("blanks", |_| Ok(())).unwrap_err().message;

@@ -1,6 +1,6 @@
 //! Grids of images (VTI) whose indices may run along any axes of space.
 
-use super::{Array, Shape, fault};
+use super::{DataArray, DataSet, fault};
 use crate::fault::Fault;
 use crate::math::Vec3;
 
@@ -54,18 +54,18 @@ impl Image {
     }
 
     /// The grid along the axes of space.
-    pub fn shape(&self) -> Shape {
+    pub fn shape(&self) -> DataSet {
         let (mut origin, of) = (self.origin, self.indices());
         for (at, (i, against)) in origin.iter_mut().zip(of) {
             let last = (self.nodes[i] - 1) as f64;
             *at += self.step[i] * if against { -self.first[i] - last } else { self.first[i] };
         }
-        Shape::Image { origin, step: of.map(|(i, _)| self.step[i]), nodes: of.map(|(i, _)| self.nodes[i]) }
+        DataSet::Image { origin, step: of.map(|(i, _)| self.step[i]), nodes: of.map(|(i, _)| self.nodes[i]) }
     }
 
     /// Puts the numbers of an array in the order of the axes of space, x fastest. Components are those along the axes of space before and
     /// after.
-    pub fn turn(&self, array: &mut Array) {
+    pub fn turn(&self, array: &mut DataArray) {
         if self.along == ALONG {
             return;
         }
@@ -92,7 +92,7 @@ impl Image {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use crate::formats::{Shape, read_vtk};
+    use crate::formats::{DataSet, read_vtk};
     use crate::math::{Mat3, Vec3, apply};
 
     /// Numbers of points and of cells, and the places of both, of an image of 3 × 4 × 2 nodes with this Direction.
@@ -129,7 +129,7 @@ mod tests {
                     m[order[i]][i] = if signs >> i & 1 == 1 { -1.0 } else { 1.0 };
                 }
                 let data = read_vtk(image(&m).as_bytes()).unwrap();
-                let Shape::Image { origin, step, nodes } = data.shape else { panic!("no image") };
+                let DataSet::Image { origin, step, nodes } = data.shape else { panic!("no image") };
                 for (array, shift) in data.arrays.iter().zip([0.0, 0.5]) {
                     let count = nodes.map(|n| if array.of_cells { n - 1 } else { n });
                     for (n, place) in array.values.chunks_exact(3).enumerate() {

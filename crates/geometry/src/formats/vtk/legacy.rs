@@ -1,6 +1,6 @@
 //! The legacy format (versions 1 to 5.1): a header of text, then sections of text or big-endian numbers.
 
-use super::{Array, Data, Elements, Scalar, Shape, check, fault};
+use super::{Data, DataArray, DataSet, Elements, Scalar, check, fault};
 use crate::fault::Fault;
 use crate::formats::text::{parse, shown};
 use crate::math::Vec3;
@@ -132,7 +132,7 @@ enum ArrayAssociation {
 }
 
 /// A file as read up to some section.
-struct File<'a> {
+struct LegacyVtkFile<'a> {
     reader: Reader<'a>,
     /// Name of the data set, in capitals.
     kind: String,
@@ -147,21 +147,21 @@ struct File<'a> {
     association: ArrayAssociation,
     /// Tuples of the arrays of the current section.
     tuples: usize,
-    arrays: Vec<Array>,
+    arrays: Vec<DataArray>,
 }
 
 /// Reads a file of STRUCTURED_POINTS, an UNSTRUCTURED_GRID or POLYDATA.
 pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
-    let mut file = File::open(bytes)?;
+    let mut file = LegacyVtkFile::open(bytes)?;
     while let Some(word) = file.reader.word() {
         file.section(&String::from_utf8_lossy(word).to_ascii_uppercase())?;
     }
     file.finish()
 }
 
-impl<'a> File<'a> {
+impl<'a> LegacyVtkFile<'a> {
     /// Takes in the three lines of the header.
-    fn open(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
+    fn open(bytes: &'a [u8]) -> Result<LegacyVtkFile<'a>, Fault> {
         let mut reader = Reader { bytes, at: 0, binary: false };
         reader.line();
         reader.line();
@@ -173,7 +173,7 @@ impl<'a> File<'a> {
                 return Err(fault(format!("the third line should say ASCII or BINARY, found \"{form}\"")));
             }
         };
-        Ok(File {
+        Ok(LegacyVtkFile {
             reader,
             kind: String::new(),
             nodes: [1; 3],
@@ -312,7 +312,12 @@ impl<'a> File<'a> {
     /// Keeps an array of points or cells.
     fn keep(&mut self, name: String, components: usize, values: Vec<f64>) {
         if self.association != ArrayAssociation::Whole {
-            self.arrays.push(Array { name, of_cells: self.association == ArrayAssociation::Cells, components, values });
+            self.arrays.push(DataArray {
+                name,
+                of_cells: self.association == ArrayAssociation::Cells,
+                components,
+                values,
+            });
         }
     }
 
@@ -323,7 +328,7 @@ impl<'a> File<'a> {
                 let (origin, step, nodes) = (self.origin, self.step, self.nodes);
                 let points = nodes.iter().try_fold(1usize, |n, m| n.checked_mul(*m)).unwrap_or(usize::MAX);
                 let cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).fold(1usize, usize::saturating_mul);
-                (Shape::Image { origin, step, nodes }, points, cells)
+                (DataSet::Image { origin, step, nodes }, points, cells)
             }
             "UNSTRUCTURED_GRID" | "POLYDATA" => {
                 if self.ends.len() + 1 == self.types.len() {
@@ -333,7 +338,7 @@ impl<'a> File<'a> {
                     return Err(fault(format!("{} cells and {} cell types", self.ends.len(), self.types.len())));
                 }
                 let mesh = Elements::of_numbers(&self.points, &self.connectivity, &self.ends, &self.types)?;
-                (Shape::Mesh(mesh), self.points.len() / 3, self.types.len())
+                (DataSet::Mesh(mesh), self.points.len() / 3, self.types.len())
             }
             _ => return Err(fault("the file names no data set")),
         };
@@ -426,7 +431,7 @@ mod tests {
             for binary in [false, true] {
                 let bytes = file(version, binary, &[POINTS, cells, ARRAYS].concat());
                 let data = read(&bytes).unwrap();
-                let Shape::Mesh(mesh) = &data.shape else { panic!("no mesh") };
+                let DataSet::Mesh(mesh) = &data.shape else { panic!("no mesh") };
                 assert_eq!((mesh.points.len(), mesh.connectivity.as_slice()), (4, &[0, 1, 2, 3][..]));
                 let found = data.arrays.iter().map(|a| (a.name.as_str(), a.of_cells, a.components, a.values.clone()));
                 let to = |n: i32| (0..n).map(f64::from).collect::<Vec<f64>>();
@@ -460,7 +465,7 @@ mod tests {
         for binary in [false, true] {
             let data = read(&file("5.1", binary, layout)).unwrap();
             let (origin, step, nodes) = ([4.0, 5.0, 6.0], [1.0, 2.0, 3.0], [2, 1, 2]);
-            assert_eq!(data.shape, Shape::Image { origin, step, nodes });
+            assert_eq!(data.shape, DataSet::Image { origin, step, nodes });
             assert_eq!((data.arrays.len(), data.arrays[1].values.as_slice()), (2, &[1.0, 2.0, 3.0, 4.0][..]));
         }
     }

@@ -8,9 +8,9 @@
 use rayon::prelude::*;
 
 use super::bits::{Bits, masks, ones};
-use super::lines::{NONE, Shape, Site};
+use super::lines::{MeshInSteps, NONE, Site};
 use super::nearest_site::distance_squared;
-use super::{Grid, Watch};
+use super::{SolidVoxels, Watch};
 use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
 use geometry::progress::Stopped;
 
@@ -48,9 +48,9 @@ pub(super) struct Ball {
 }
 
 /// Where a ball may be.
-pub(super) struct Space<'a> {
-    pub grid: &'a Grid,
-    pub shape: &'a Shape<'a>,
+pub(super) struct BallSpace<'a> {
+    pub grid: &'a SolidVoxels,
+    pub shape: &'a MeshInSteps<'a>,
     pub sites: &'a [Site],
     pub nearest: &'a [u32],
     /// For each triangle whether it is a cut; empty if that is not known.
@@ -76,19 +76,19 @@ struct Foot {
 }
 
 /// How far a ball can grow.
-struct Grown {
+struct TangentBall {
     foot: Foot,
     radius: f64,
     other: Option<Foot>,
 }
 
-impl Grown {
+impl TangentBall {
     fn center(&self) -> Vec3 {
         add(self.foot.at, scale(self.foot.away, self.radius))
     }
 }
 
-impl Space<'_> {
+impl BallSpace<'_> {
     /// Balls at all voxels near which one ends its growth, the largest first.
     pub(super) fn balls(&self, watch: &Watch) -> Result<Vec<Ball>, Stopped> {
         let [nx, ny, nz] = self.grid.shape;
@@ -318,9 +318,9 @@ impl Space<'_> {
     }
 
     /// The largest ball that touches `own` and none of the other triangles.
-    fn grow(&self, v: [usize; 3], own: Foot, around: &[u32]) -> Grown {
+    fn grow(&self, v: [usize; 3], own: Foot, around: &[u32]) -> TangentBall {
         let p = v.map(|c| c as f64);
-        let mut grown = Grown { foot: own, radius: f64::INFINITY, other: None };
+        let mut grown = TangentBall { foot: own, radius: f64::INFINITY, other: None };
         for &t in around.iter().filter(|t| **t != own.triangle) {
             // The place where it touches moves as the ball grows; twice is enough to follow.
             let mut seen = p;

@@ -22,15 +22,15 @@ pub(super) struct Site {
 }
 
 /// A mesh in steps from the centre of the first voxel.
-pub(super) struct Shape<'a> {
+pub(super) struct MeshInSteps<'a> {
     pub vertices: Vec<Vec3>,
     pub triangles: &'a [[u32; 3]],
     /// Unit normals, outwards; zero for triangles without area.
     pub normals: Vec<[f32; 3]>,
 }
 
-impl<'a> Shape<'a> {
-    pub(super) fn new(mesh: &'a Mesh, first: Vec3, step: f64) -> Shape<'a> {
+impl<'a> MeshInSteps<'a> {
+    pub(super) fn new(mesh: &'a Mesh, first: Vec3, step: f64) -> MeshInSteps<'a> {
         let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| scale(sub(*p, first), 1.0 / step)).collect();
         let normals = mesh.triangles.iter().map(|t| {
             let [a, b, c] = t.map(|v| vertices[v as usize]);
@@ -38,7 +38,7 @@ impl<'a> Shape<'a> {
             let length = norm(n);
             n.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 })
         });
-        Shape { normals: normals.collect(), triangles: &mesh.triangles, vertices }
+        MeshInSteps { normals: normals.collect(), triangles: &mesh.triangles, vertices }
     }
 
     pub(super) fn corners(&self, triangle: u32) -> [Vec3; 3] {
@@ -47,7 +47,7 @@ impl<'a> Shape<'a> {
 }
 
 /// The crossings of all lines along one axis.
-pub(super) struct Lines {
+pub(super) struct LineCrossings {
     /// Where each line's sites begin. Lines are numbered with the lower of the other two axes running fastest.
     start: Vec<usize>,
     sites: Vec<Site>,
@@ -59,10 +59,10 @@ struct Hit {
     inwards: bool,
 }
 
-impl Lines {
+impl LineCrossings {
     /// Crosses the shape along `axis`. Only the surface of what is inside at least once is kept: where bodies overlap,
     /// the surface of the one inside the other is not that of the solid.
-    pub(super) fn new(shape: &Shape, size: [usize; 3], axis: usize) -> Lines {
+    pub(super) fn new(shape: &MeshInSteps, size: [usize; 3], axis: usize) -> LineCrossings {
         let [lo, hi] = across(axis);
         let lines = size[lo] * size[hi];
         let mut start = vec![0usize; lines + 1];
@@ -98,7 +98,7 @@ impl Lines {
             }
             kept.push(sites.len());
         }
-        Lines { start: kept, sites }
+        LineCrossings { start: kept, sites }
     }
 
     /// Moves the sites to the end of `all`, to be known by their places there.
@@ -120,7 +120,7 @@ pub(super) fn across(axis: usize) -> [usize; 2] {
 }
 
 /// Calls `found` with the line and the crossing, for every triangle and every line that passes it.
-fn each_hit(shape: &Shape, size: [usize; 3], axis: usize, mut found: impl FnMut(usize, Hit)) {
+fn each_hit(shape: &MeshInSteps, size: [usize; 3], axis: usize, mut found: impl FnMut(usize, Hit)) {
     let [lo, hi] = across(axis);
     // Seen along y, the axes x and z are a left-handed pair.
     let hand = if axis == 1 { -1 } else { 1 };
@@ -181,9 +181,9 @@ mod tests {
     use geometry::mesh::samples::{cube, join, torus};
 
     fn lengths(mesh: &Mesh, size: [usize; 3]) -> [f64; 3] {
-        let shape = Shape::new(mesh, [0.0; 3], 1.0);
+        let shape = MeshInSteps::new(mesh, [0.0; 3], 1.0);
         [0, 1, 2].map(|axis| {
-            let mut lines = Lines::new(&shape, size, axis);
+            let mut lines = LineCrossings::new(&shape, size, axis);
             let mut sites = Vec::new();
             lines.file(&mut sites);
             let [lo, hi] = across(axis);

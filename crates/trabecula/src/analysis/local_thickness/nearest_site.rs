@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::Watch;
-use super::lines::{Lines, NONE, Site};
+use super::lines::{LineCrossings, NONE, Site};
 use geometry::progress::Stopped;
 
 /// Passes over the grid's layers along each axis, as they are counted by the watch.
@@ -18,7 +18,7 @@ pub(super) const PASSES: [usize; 3] = [0, 2, 2];
 pub(super) fn nearest_sites(
     size: [usize; 3],
     sites: &[Site],
-    lines: &[Lines; 3],
+    lines: &[LineCrossings; 3],
     watch: &Watch,
 ) -> Result<Vec<u32>, Stopped> {
     let transform = Transform { size, sites, lines, watch };
@@ -33,7 +33,7 @@ pub(super) fn nearest_sites(
 struct Transform<'a> {
     size: [usize; 3],
     sites: &'a [Site],
-    lines: &'a [Lines; 3],
+    lines: &'a [LineCrossings; 3],
     watch: &'a Watch<'a>,
 }
 
@@ -168,7 +168,7 @@ fn nearer(sites: &[Site], here: [f32; 3], a: u32, b: u32) -> u32 {
 }
 
 /// The nearest site on a line, for each of its voxels.
-fn nearest_on_line(lines: &Lines, line: usize, sites: &[Site], axis: usize, out: &mut [u32]) {
+fn nearest_on_line(lines: &LineCrossings, line: usize, sites: &[Site], axis: usize, out: &mut [u32]) {
     let mut rest = lines.of(line);
     let Some(mut here) = rest.next() else {
         out.fill(NONE);
@@ -243,7 +243,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::local_thickness::lines::Shape;
+    use crate::analysis::local_thickness::lines::MeshInSteps;
     use geometry::mesh::samples::torus;
     use geometry::progress::Silent;
 
@@ -254,8 +254,8 @@ mod tests {
             *v = 3.1 * *v + 10.3;
         }
         let size = [22, 19, 17];
-        let shape = Shape::new(&ring, [0.0; 3], 1.0);
-        let mut lines = [0, 1, 2].map(|a| Lines::new(&shape, size, a));
+        let shape = MeshInSteps::new(&ring, [0.0; 3], 1.0);
+        let mut lines = [0, 1, 2].map(|a| LineCrossings::new(&shape, size, a));
         let mut sites = Vec::new();
         lines.iter_mut().for_each(|l| l.file(&mut sites));
         let found = nearest_sites(size, &sites, &lines, &Watch::new(&Silent, 1)).expect("found");

@@ -55,7 +55,7 @@ pub(super) fn groups(mut present: u16) -> impl Iterator<Item = usize> {
 }
 
 /// Samples of a function on n³ nodes of the torus.
-pub(super) struct Grid {
+pub(super) struct TorusGrid {
     /// Nodes along each axis.
     pub n: usize,
     /// Values, x fastest.
@@ -68,16 +68,16 @@ pub(super) struct Grid {
     pub bend: f64,
 }
 
-impl Grid {
+impl TorusGrid {
     /// Samples f as finely as its gradient asks for, within 48³ and 96³ nodes.
-    pub(super) fn sample(f: Function) -> Grid {
-        let coarse = Grid::of(f, 48);
+    pub(super) fn sample(f: Function) -> TorusGrid {
+        let coarse = TorusGrid::of(f, 48);
         // A hundredth of the range keeps apart what an engineer would call apart.
         let wanted = (48.0 * (coarse.error / (0.02 * coarse.range())).sqrt() / 8.0).ceil() * 8.0;
-        if wanted > 48.0 { Grid::of(f, wanted.min(96.0) as usize) } else { coarse }
+        if wanted > 48.0 { TorusGrid::of(f, wanted.min(96.0) as usize) } else { coarse }
     }
 
-    fn of(f: Function, n: usize) -> Grid {
+    fn of(f: Function, n: usize) -> TorusGrid {
         let h = 1.0 / n as f64;
         let mut values = vec![0.0; n * n * n];
         let mut slopes = vec![[0.0; 3]; n * n * n];
@@ -87,7 +87,7 @@ impl Grid {
             f(&points, v, g);
         });
         let lengths = slopes.iter().map(|g| norm(*g)).collect();
-        let mut grid = Grid { n, values, slopes: lengths, error: 0.0, bend: 0.0 };
+        let mut grid = TorusGrid { n, values, slopes: lengths, error: 0.0, bend: 0.0 };
         let bend = (0..slopes.len() as u32).into_par_iter().map(|i| {
             let step = grid.steps(i);
             let change = |d: Int3| norm(sub(slopes[step(d).0 as usize], slopes[i as usize])) / h;

@@ -4,7 +4,7 @@
 //! graph of small tetrahedra, adjacent where they have solid on a common small triangle; a simplex enters the graph at
 //! the minimum "depth" of f on it. All levels are swept at once by union-find, deepest first.
 
-use super::subdivision::{Nodes, Subdivision};
+use super::subdivision::{Subdivision, SubdivisionNodes};
 use super::{Count, Part, TetCell};
 use geometry::union_find::unite;
 
@@ -33,12 +33,12 @@ fn least_depth(part: Part, values: &[f64]) -> f64 {
 
 /// A filtration of a graph: each node and each edge appears at a depth.
 #[derive(Default)]
-struct Sweep {
+struct GraphFiltration {
     nodes: Vec<f64>,
     edges: Vec<(f64, u32, u32)>,
 }
 
-impl Sweep {
+impl GraphFiltration {
     /// Pairs of a depth and the number of components from there on.
     fn counts(mut self, slack: f64) -> Vec<(f64, usize)> {
         let mut births = self.nodes.clone();
@@ -75,9 +75,9 @@ fn at(counts: &[(f64, usize)], depth: f64) -> usize {
 
 impl ComponentCounts {
     pub fn new(cell: &TetCell, part: Part) -> ComponentCounts {
-        let nodes = Nodes::new(cell, Subdivision { n: STEPS });
+        let nodes = SubdivisionNodes::new(cell, Subdivision { n: STEPS });
         let v = |i: usize| nodes.values[i];
-        let mut solid = Sweep::default();
+        let mut solid = GraphFiltration::default();
         let mut open = std::collections::HashMap::new();
         nodes.grid.each_tet(|p, _| {
             let corners = p.map(|[i, j, k]| Subdivision::index(i, j, k));
@@ -96,7 +96,7 @@ impl ComponentCounts {
             }
         });
         // The face k = 0: nodes (a, b) are (a, b, 0).
-        let mut trace = Sweep::default();
+        let mut trace = GraphFiltration::default();
         let mut open = std::collections::HashMap::new();
         nodes.grid.each_triangle(|p, _| {
             let corners = p.map(|[a, b]| Subdivision::index(a, b, 0));

@@ -1,6 +1,6 @@
 //! Solid fraction of a tetrahedral cell and its inverse.
 
-use super::subdivision::{Nodes, Subdivision};
+use super::subdivision::{Subdivision, SubdivisionNodes};
 use super::{Part, TetCell};
 use geometry::math::Interval;
 use geometry::roots::bisect;
@@ -13,7 +13,7 @@ const LEVELS: usize = 1024;
 const FACE: [usize; 2] = [160, 320];
 
 /// Share of the tetrahedron where f < t, at equally spaced levels.
-pub(crate) struct Table {
+pub(crate) struct FractionTable {
     range: Interval,
     below: Vec<f64>,
 }
@@ -61,7 +61,7 @@ fn ascending<const N: usize>(mut v: [f64; N]) -> [f64; N] {
 }
 
 /// The share below each level of `range`, by linear functions on the small tetrahedra.
-fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
+fn shares(nodes: &SubdivisionNodes, range: Interval) -> Vec<f64> {
     let step = (range.hi - range.lo) / LEVELS as f64;
     // What a small tetrahedron adds between its least and its greatest value, and that it is full beyond.
     let (mut part, mut full) = (vec![0.0; LEVELS + 1], vec![0u32; LEVELS + 2]);
@@ -83,9 +83,9 @@ fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
     done.collect()
 }
 
-impl Table {
-    pub fn new(cell: &TetCell) -> Table {
-        let nodes = STEPS.map(|n| Nodes::new(cell, Subdivision { n }));
+impl FractionTable {
+    pub fn new(cell: &TetCell) -> FractionTable {
+        let nodes = STEPS.map(|n| SubdivisionNodes::new(cell, Subdivision { n }));
         let fine = &nodes[1].values;
         let (lo, hi) = fine.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
         let range = Interval::new(lo, hi);
@@ -101,11 +101,11 @@ impl Table {
             })
             .collect();
         below[LEVELS] = 1.0;
-        Table { range, below }
+        FractionTable { range, below }
     }
 
     /// The table of a sample of values, each with its weight.
-    pub fn sampled(sample: &[(f64, Vec<f64>)]) -> Table {
+    pub fn sampled(sample: &[(f64, Vec<f64>)]) -> FractionTable {
         let values = sample.iter().flat_map(|s| &s.1);
         let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
         let mut below = vec![0.0; LEVELS + 1];
@@ -122,7 +122,7 @@ impl Table {
             *b = sum;
         }
         below.iter_mut().for_each(|b| *b /= sum);
-        Table { range: Interval::new(lo, hi), below }
+        FractionTable { range: Interval::new(lo, hi), below }
     }
 
     pub fn range(&self) -> Interval {

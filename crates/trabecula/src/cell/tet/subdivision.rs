@@ -94,7 +94,7 @@ impl Subdivision {
 
 /// A cell on a subdivision: values at the nodes, and slopes along the edges at both their ends. The same in all bits at
 /// points that differ in the order of their coordinates.
-pub struct Nodes {
+pub struct SubdivisionNodes {
     /// The subdivision.
     pub grid: Subdivision,
     /// Coordinates of the nodes.
@@ -107,9 +107,9 @@ pub struct Nodes {
     sorted: Vec<u32>,
 }
 
-impl Nodes {
+impl SubdivisionNodes {
     /// Evaluates f where coordinates descend, and copies it to the rest.
-    pub fn new(cell: &TetCell, grid: Subdivision) -> Nodes {
+    pub fn new(cell: &TetCell, grid: Subdivision) -> SubdivisionNodes {
         let whole = grid.whole();
         let descends = |k: &Whole| k.windows(2).all(|p| p[0] >= p[1]);
         let main: Vec<usize> = (0..whole.len()).filter(|i| descends(&whole[*i])).collect();
@@ -131,7 +131,7 @@ impl Nodes {
         for i in 0..whole.len() {
             values[i] = values[sorted[i] as usize];
         }
-        Nodes { grid, whole, values, gradients, sorted }
+        SubdivisionNodes { grid, whole, values, gradients, sorted }
     }
 
     /// The change of f over the small edge from node a to node b by its slope at a: ∂f/∂λ · (λ_b − λ_a).

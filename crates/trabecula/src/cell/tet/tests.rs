@@ -205,7 +205,7 @@ fn levels_invert_fractions() {
 #[test]
 fn values_are_the_same_in_all_bits_for_any_order_of_corners() {
     let s = known(&KNOWN[5]);
-    let nodes = Nodes::new(&s, Subdivision { n: 7 });
+    let nodes = SubdivisionNodes::new(&s, Subdivision { n: 7 });
     let find = |k: subdivision::Whole| nodes.whole.iter().position(|w| *w == k).expect("a node");
     let scale = s.series().amplitude();
     for (a, ka) in nodes.whole.iter().enumerate() {

@@ -176,7 +176,7 @@ fn numbered(pairs: &Pairs, count: usize, path: &str) -> Result<Vec<[u32; 2]>, De
 }
 
 /// Nodes listed in the design.
-pub(in crate::design) fn given(rows: &Rows) -> Nodes {
+pub(in crate::design) fn given(rows: &NodeRows) -> Nodes {
     let mut nodes = Nodes::default();
     for (i, row) in rows.0.iter().enumerate() {
         let (at, radius) = match *row {

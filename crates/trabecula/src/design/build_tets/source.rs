@@ -7,7 +7,7 @@ use crate::extract;
 use crate::kind::DesignError;
 use crate::solid::Solid;
 use geometry::fault::Fault;
-use geometry::formats::{self, Shape};
+use geometry::formats::{self, DataSet};
 use geometry::math::scale;
 use geometry::mesh::Mesh;
 use geometry::progress::{Silent, Stopped};
@@ -48,7 +48,7 @@ pub(super) fn triangles(file: &MeshFile, loader: &dyn Loader) -> Result<Mesh, De
 }
 
 /// The tetrahedral mesh that fTetWild makes of a surface.
-pub(super) fn wild(
+pub(super) fn ftetwild(
     made: &MadeTetsKind,
     surface: &Mesh,
     size: f64,
@@ -81,7 +81,7 @@ pub(super) fn from_file(
     let ZonedElements { elements, zones, names } = if formats::RESULTS.contains(&kind.as_str()) {
         let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
         let data = formats::read_result(&bytes, &kind, "").map_err(wrong)?;
-        let Shape::Mesh(elements) = data.shape else {
+        let DataSet::Mesh(elements) = data.shape else {
             let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
             return Err(DesignError::new(at, message).found(&file.path));
         };

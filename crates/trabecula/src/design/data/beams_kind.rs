@@ -188,12 +188,13 @@ pub enum NodesSpec {
     /// Path of a table (csv) of id, x, y, z (mm) and perhaps a hub's radius (mm), relative to the design file.
     Path(String),
     /// Rows of x, y, z (mm) and perhaps a hub's radius (mm); their ids are 0, 1, 2 …
-    Rows(Rows),
+    Rows(NodeRows),
 }
 
 /// Nodes: rows of x, y, z (mm) and perhaps a hub's radius (mm); their ids are 0, 1, 2 …
 #[derive(Clone, Debug, PartialEq, Kind)]
-pub struct Rows(#[kind(least = 1)] pub Vec<RowSpec>);
+#[kind(name = "Rows")]
+pub struct NodeRows(#[kind(least = 1)] pub Vec<RowSpec>);
 
 /// A node: x, y, z (mm) and perhaps a radius (mm).
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
@@ -264,7 +265,7 @@ impl Kind for NodeId {
 #[kind(name = "Pattern", noun = "a pattern", check = PatternSpec::stepped)]
 pub struct PatternSpec {
     /// Rows of x, y, z (mm) and perhaps a hub's radius (mm), at [0, 0, 0]; their ids are 0, 1, 2 …
-    pub nodes: Rows,
+    pub nodes: NodeRows,
     /// Rows of two ids and how many repeats on, along each step, the second node lies (0 unless given).
     #[kind(least = 1)]
     pub struts: Vec<PatternStrut>,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::GradeSpec;
+use crate::blend::BlendRule;
 use crate::kind::{Fault, Key, Kind};
 
 /// Several lattices in one part: which of them is where.
@@ -14,7 +15,7 @@ pub struct BlendSpec {
     pub lattices: BlendKind,
     /// What the blend keeps between one lattice and another.
     #[kind(default)]
-    pub by: BySpec,
+    pub by: BlendRule,
 }
 
 /// The lattices of a blend: two and one weight, or any number with a weight each.
@@ -24,7 +25,7 @@ pub enum BlendKind {
     /// Two.
     Between(BetweenSpec),
     /// Any number.
-    Of(OfSpec),
+    Of(WeightsSpec),
 }
 
 /// Two lattices.
@@ -49,19 +50,8 @@ impl BetweenSpec {
 
 /// Any number of lattices.
 #[derive(Clone, Debug, PartialEq, Kind)]
-pub struct OfSpec {
+pub struct WeightsSpec {
     /// Weight of each lattice, by name; divided by their sum. What is below 0 counts as 0.
     #[kind(least = 2)]
     pub of: BTreeMap<String, GradeSpec>,
-}
-
-/// What a blend keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(name = "By", noun = "word")]
-pub enum BySpec {
-    /// The solid fractions: each lattice's own where it is alone, their weighted mean between.
-    #[default]
-    Fraction,
-    /// The weighted sum of the fields as it comes; material is lost half-way.
-    Value,
 }

@@ -10,7 +10,7 @@ use crate::extract;
 use crate::region::Cuboid;
 use crate::solid::Solid;
 use crate::truss::Beams;
-use beams::{Beam, Graph, Hub, Profile, Quadors};
+use beams::{Beam, Graph, HubBall, Profile, Quadors};
 
 /// Hubs that are meshed.
 const HUBS: usize = 4;
@@ -83,7 +83,7 @@ fn meshed(beams: Quadors, low: [f64; 3], step: f64) -> Option<[f64; 2]> {
 
 /// A hub with some of its beams, whose other hubs have no more.
 fn star(quadors: &Quadors, hub: usize, incident: &[usize]) -> Option<Quadors> {
-    let ball = |i: usize| Hub { center: quadors.center(i), radius: quadors.hub(i).radius };
+    let ball = |i: usize| HubBall { center: quadors.center(i), radius: quadors.hub(i).radius };
     let mut graph = Graph { hubs: vec![ball(hub)], beams: Vec::new() };
     for &beam in incident {
         let next = graph.hubs.len() as u32;

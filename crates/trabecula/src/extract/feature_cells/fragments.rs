@@ -17,15 +17,15 @@ pub(in crate::extract) struct Fragments {
     pub values: Vec<[f64; 4]>,
     /// Whether the surface that cuts next is negative at each vertex.
     pub negative: Vec<bool>,
-    now: Pieces,
-    next: Pieces,
+    now: FragmentList,
+    next: FragmentList,
     /// Where the plane cuts the facets of one fragment, directed as in the new facet of its negative part.
     edges: Vec<(u16, u16)>,
 }
 
 /// Fragments one after the other, their facets, and the rings of these.
 #[derive(Default)]
-struct Pieces {
+struct FragmentList {
     /// The surfaces that are negative in each fragment, and the end of its facets.
     fragments: Vec<(u64, usize)>,
     /// The surface on which each facet lies, unless it is part of a facet of the simplex, and the end of its ring.
@@ -33,7 +33,7 @@ struct Pieces {
     rings: Vec<u16>,
 }
 
-impl Pieces {
+impl FragmentList {
     fn clear(&mut self) {
         self.fragments.clear();
         self.facets.clear();
@@ -61,7 +61,7 @@ impl Fragments {
 
     /// All facets: the surfaces that are negative in its fragment, the surface on which it lies, its ring.
     pub fn facets(&self) -> impl Iterator<Item = (u64, Option<usize>, &[u16])> {
-        let Pieces { fragments, facets, rings } = &self.now;
+        let FragmentList { fragments, facets, rings } = &self.now;
         let mut fragment = 0;
         let mut start = 0;
         facets.iter().enumerate().map(move |(n, &(surface, end))| {

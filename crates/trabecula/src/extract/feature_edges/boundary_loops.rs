@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::polygon_triangulation::triangles;
-use super::surface_patch::Patches;
+use super::surface_patch::PatchCandidates;
 use crate::extract::feature_cells::FeatureCells;
 use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
@@ -36,7 +36,7 @@ impl FeatureCells<'_> {
         let boundary_loops = boundary_loops(&steps.iter().map(Step::path).collect::<Vec<_>>());
         let (node, sides) = (self.nodes.index(cell), self.sides_of(cell, surface));
         let (edges, of) = (self.edges, self.cell_of(cell, surface));
-        let patches: Vec<Patches> = boundary_loops
+        let patches: Vec<PatchCandidates> = boundary_loops
             .iter()
             .map(|keys| match (self.boundary_loop(cell, keys), boundary_loops.len()) {
                 (boundary_loop, 1) => edges.patches(of, &boundary_loop, edges.neighbour_corners(of)),

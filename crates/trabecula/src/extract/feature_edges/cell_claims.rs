@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::TracedEdges;
 use crate::csg_tree::CsgTree;
-use crate::extract::block_nodes::Nodes;
+use crate::extract::block_nodes::BlockNodes;
 use crate::extract::sampling_grid::LocalSolid;
 use crate::extract::sign_words::{Signs, bits};
 
@@ -39,14 +39,14 @@ impl CellClaims {
         !self.surface.is_empty()
     }
 
-    pub(super) fn add(&mut self, nodes: &Nodes, cell: [usize; 3], surface: usize) {
+    pub(super) fn add(&mut self, nodes: &BlockNodes, cell: [usize; 3], surface: usize) {
         self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
         self.surface.insert(nodes.index(cell), surface);
     }
 
     /// Claims the feature cells in which a surface with feature edges is the only one: the sampled values near feature edges
     /// say little of the position of the surface, so such cells are filled from their boundary loops.
-    pub fn claim_sole(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
+    pub fn claim_sole(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &BlockNodes, surface: usize) {
         let featured: Vec<[usize; 3]> = signs.feature_cells().collect();
         for cell in featured {
             let [i, j, k] = cell;
@@ -65,7 +65,7 @@ impl CellClaims {
         &mut self,
         local: &LocalSolid,
         signs: &mut Signs,
-        nodes: &Nodes,
+        nodes: &BlockNodes,
         traced: &TracedEdges,
         surface: usize,
     ) {
@@ -94,7 +94,7 @@ impl CellClaims {
     }
 
     /// Whether a cell is fitted.
-    pub fn is_fitted(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
+    pub fn is_fitted(&self, nodes: &BlockNodes, [i, j, k]: [usize; 3]) -> bool {
         self.fitted[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 
@@ -108,7 +108,7 @@ impl CellClaims {
     }
 
     /// The claimed cells among a tile's own, with their surfaces.
-    pub fn own(&self, nodes: &Nodes, own: &[Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
+    pub fn own(&self, nodes: &BlockNodes, own: &[Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
         let ny = nodes.shape[1];
         let mut found = Vec::new();
         for (row, w) in self.cells.iter().enumerate() {

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::divided_faces::{CellFace, Corner, FaceScratch, FaceTriangle, Polygons};
+use super::divided_faces::{CellFace, FaceScratch, FaceTriangle, PolygonCorner, PolygonList};
 use super::polygon_triangulation::triangles;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex};
 use crate::extract::sign_words::bits;
@@ -64,7 +64,7 @@ impl FeatureCells<'_> {
         let mut solid = self.signs.is_negative(surface, low);
         for i in 0..4 {
             boundary.push((corners.len(), None));
-            corners.push(Corner { id: ring[i], code: i, key: VertexId::new(ring[i], &[], &[]) });
+            corners.push(PolygonCorner { id: ring[i], code: i, key: VertexId::new(ring[i], &[], &[]) });
             let (node, along) = (ring[i].min(ring[(i + 1) % 4]), if i % 2 == 0 { u } else { v });
             let points = self.points_of(node, along, surface);
             let order = if i > 1 { [1, 0] } else { [0, 1] };
@@ -74,7 +74,7 @@ impl FeatureCells<'_> {
                 let share = self.share_of(node, along, position);
                 let id = self.point(key, position, |k, f| k.value_along(f, node, along, share));
                 let code = 4 + 2 * i + n;
-                corners.push(Corner { id, code, key });
+                corners.push(PolygonCorner { id, code, key });
             }
         }
         if boundary.len() == 4 {
@@ -131,7 +131,7 @@ impl FeatureCells<'_> {
         &mut self,
         face: (usize, usize),
         ring: &[usize],
-        corners: &mut Vec<Corner>,
+        corners: &mut Vec<PolygonCorner>,
         boundary: &[(usize, Option<bool>)],
     ) -> Vec<Vec<usize>> {
         let edges = self.edges;
@@ -139,12 +139,12 @@ impl FeatureCells<'_> {
             let mut via = 0;
             let mut all = Vec::with_capacity(contours.len());
             for c in contours {
-                let end = |corners: &[Corner], key: VertexId| corners.iter().position(|c| c.key == key);
+                let end = |corners: &[PolygonCorner], key: VertexId| corners.iter().position(|c| c.key == key);
                 let mut path: Vec<usize> = end(corners, c.from).into_iter().collect();
                 for &(key, position) in &c.via {
                     let id = self.point(key, position, |k, f| k.value_between(f, position, ring));
                     path.push(corners.len());
-                    corners.push(Corner { id, code: 12 + via, key });
+                    corners.push(PolygonCorner { id, code: 12 + via, key });
                     via += 1;
                 }
                 path.extend(end(corners, c.to));
@@ -162,7 +162,7 @@ impl FeatureCells<'_> {
     fn parts(
         &self,
         axis: usize,
-        corners: &[Corner],
+        corners: &[PolygonCorner],
         boundary: &[(usize, Option<bool>)],
         contours: &[Vec<usize>],
         (solid, tries): (bool, usize),
@@ -235,7 +235,7 @@ impl FeatureCells<'_> {
     }
 
     /// Finds the triangles of a face cut by all surfaces but one, counter-clockwise about the face's axis.
-    fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace, found: &mut Polygons) {
+    fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace, found: &mut PolygonList) {
         found.corners.clear();
         found.ends.clear();
         let mut cut = self.fragments.take();

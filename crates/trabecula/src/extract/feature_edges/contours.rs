@@ -22,7 +22,7 @@ pub(in crate::extract) struct Contour {
 
 /// A crossing on the boundary of a face.
 #[derive(Clone, Copy)]
-struct Point {
+struct FaceCrossing {
     key: VertexId,
     position: Vec3,
     /// Which of the four grid edges.
@@ -41,7 +41,7 @@ struct CandidatePath {
 
 /// The search for the set of candidate paths nearest to the surface and to the points where its feature edges pierce the face.
 struct ContourSearch<'a> {
-    points: &'a [Point],
+    points: &'a [FaceCrossing],
     pierced: &'a [Vec3],
     axis: usize,
     /// Least distance between paths, mm.
@@ -116,7 +116,7 @@ impl EdgeStore {
         &self,
         context: &SurfaceContext<P>,
         (low, axis): (usize, usize),
-    ) -> Option<Vec<Point>> {
+    ) -> Option<Vec<FaceCrossing>> {
         let (nodes, signs) = (context.nodes, context.signs);
         let at = nodes.at(low);
         if at[axis] == 0
@@ -133,14 +133,14 @@ impl EdgeStore {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let (du, dv) = (nodes.stride[u], nodes.stride[v]);
         let edges = [(low, u, true), (low + du, v, true), (low + dv, u, false), (low, v, false)];
-        let mut points: Vec<Point> = Vec::with_capacity(8);
+        let mut points: Vec<FaceCrossing> = Vec::with_capacity(8);
         let mut solid = signs.is_negative(context.surface, low);
         for (edge, (node, along, forward)) in edges.into_iter().enumerate() {
             let ends = [node, node + nodes.stride[along]];
             let ends = ends.map(|n| signs.is_negative(context.surface, n));
             let mut add = |key: VertexId, position: Vec3| {
                 solid = !solid;
-                points.push(Point { key, position, edge, enters: solid });
+                points.push(FaceCrossing { key, position, edge, enters: solid });
             };
             if let Some(double_crossings) = self.double_crossings.get(&(context.surface, node, along)) {
                 for i in if forward { [0, 1] } else { [1, 0] } {
@@ -158,7 +158,7 @@ impl EdgeStore {
         &self,
         context: &SurfaceContext<P>,
         face: (usize, usize),
-        points: &[Point],
+        points: &[FaceCrossing],
         corners: &[Vec3],
     ) -> Vec<CandidatePath> {
         let mut candidates: Vec<CandidatePath> = Vec::new();
@@ -199,7 +199,7 @@ impl EdgeStore {
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
     /// A point in a face at the middle of two crossings of one grid edge, at a distance of `share` of theirs from it.
-    fn adjacent(&self, face: (usize, usize), from: &Point, to: &Point, share: f64) -> Vec3 {
+    fn adjacent(&self, face: (usize, usize), from: &FaceCrossing, to: &FaceCrossing, share: f64) -> Vec3 {
         let along = sub(to.position, from.position);
         let distance = along.iter().map(|x| x.abs()).fold(0.0, f64::max);
         let mut p = scale(math::add(from.position, to.position), 0.5);
@@ -226,9 +226,9 @@ fn orders(corners: &[Vec3], taken: &mut Vec<Vec3>, found: &mut impl FnMut(Vec<Ve
 }
 
 /// Calls `found` with every matching of entering to leaving crossings whose straight paths do not intersect.
-fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
+fn matchings(points: &[FaceCrossing], found: &mut impl FnMut(&[[usize; 2]])) {
     fn rest(
-        points: &[Point],
+        points: &[FaceCrossing],
         free: &[usize],
         pairs: &mut Vec<[usize; 2]>,
         found: &mut impl FnMut(&[[usize; 2]]),

@@ -12,7 +12,7 @@ const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 #[derive(Default)]
 pub(in crate::extract) struct CellFace {
     /// Its nodes and the points in it.
-    pub(super) corners: Vec<Corner>,
+    pub(super) corners: Vec<PolygonCorner>,
     pub(super) parts: Vec<FaceTriangle>,
     /// The triangles cut by all other surfaces, as the faces of feature cells are: the ids of all corners of the fragments, and
     /// for each fragment the surfaces that are negative in it and where its ids end.
@@ -26,7 +26,7 @@ pub(in crate::extract) struct CellFace {
 }
 
 #[derive(Clone, Copy)]
-pub(super) struct Corner {
+pub(super) struct PolygonCorner {
     pub id: usize,
     /// Nodes from 0, points of the four grid edges from 4 in pairs, corners of contours from 12.
     pub code: usize,
@@ -65,12 +65,12 @@ impl CellFace {
 /// Polygons one after the other: the ids and positions of their corners; for each the surfaces that are negative in it and where
 /// its corners end.
 #[derive(Default)]
-pub(super) struct Polygons {
+pub(super) struct PolygonList {
     pub(super) corners: Vec<(VertexId, Vec3)>,
     pub(super) ends: Vec<(u64, usize)>,
 }
 
-impl Polygons {
+impl PolygonList {
     /// Whether all polygons of a face keep their orientation in single precision. Together they fill the face, so then they do
     /// not overlap.
     pub(super) fn are_sound(&self, axis: usize) -> bool {
@@ -91,7 +91,7 @@ pub(super) struct FaceScratch {
     pub(super) polygon: Vec<usize>,
     pub(super) positions: Vec<[f64; 2]>,
     pub(super) parts: Vec<FaceTriangle>,
-    pub(super) fragments: Polygons,
+    pub(super) fragments: PolygonList,
 }
 
 /// The extra points of a block and the cell faces that they divide.

@@ -1,6 +1,6 @@
 //! The graph of feature edges in a cell, which divides a patch.
 
-use super::loop_patch::{BoundaryLoop, Cell, Patch};
+use super::loop_patch::{BoundaryLoop, LoopPatch, SurfaceCell};
 use crate::extract::feature_cells::middle;
 use geometry::math::{Vec3, add, cross, dot, norm, sub, unit};
 
@@ -9,7 +9,7 @@ use geometry::math::{Vec3, add, cross, dot, norm, sub, unit};
 const SAME: f64 = 2.0;
 
 /// A segment of a feature edge, by the indices of its ends.
-type Link = [usize; 2];
+type EdgeSegment = [usize; 2];
 
 /// The point from which a polygon is filled.
 enum Apex {
@@ -24,16 +24,16 @@ pub(super) struct EdgeGraph {
     positions: Vec<Vec3>,
     /// How many of them belong to the loop.
     boundary_loop: usize,
-    components: Vec<Vec<Link>>,
+    components: Vec<Vec<EdgeSegment>>,
 }
 
 impl EdgeGraph {
-    pub fn new(cell: Cell, boundary_loop: &BoundaryLoop, segments: &[[Vec3; 2]]) -> EdgeGraph {
+    pub fn new(cell: SurfaceCell, boundary_loop: &BoundaryLoop, segments: &[[Vec3; 2]]) -> EdgeGraph {
         let n = boundary_loop.positions.len();
         let close = SAME * cell.grid.margin * cell.grid.step;
         let mut graph =
             EdgeGraph { positions: boundary_loop.positions.clone(), boundary_loop: n, components: Vec::new() };
-        let mut links: Vec<Link> = Vec::with_capacity(segments.len());
+        let mut links: Vec<EdgeSegment> = Vec::with_capacity(segments.len());
         for segment in segments {
             let [a, b] = segment.map(|p| graph.number(p, close));
             // A segment within a cell face does not divide the patch.
@@ -45,7 +45,7 @@ impl EdgeGraph {
         // Edges that end inside the cell divide nothing.
         let mut count = vec![0; graph.positions.len()];
         links.iter().flatten().for_each(|i| count[*i] += 1);
-        let is_loose = |l: &Link, count: &[usize]| l.iter().any(|i| *i >= n && count[*i] == 1);
+        let is_loose = |l: &EdgeSegment, count: &[usize]| l.iter().any(|i| *i >= n && count[*i] == 1);
         while let Some(i) = links.iter().position(|l| is_loose(l, &count)) {
             links.swap_remove(i).iter().for_each(|i| count[*i] -= 1);
         }
@@ -53,7 +53,7 @@ impl EdgeGraph {
             *p = cell.within(*p);
         }
         for link in links {
-            let meets = |t: &Vec<Link>| t.iter().flatten().any(|i| *i >= n && link.contains(i));
+            let meets = |t: &Vec<EdgeSegment>| t.iter().flatten().any(|i| *i >= n && link.contains(i));
             let (joined, apart): (Vec<_>, Vec<_>) = graph.components.into_iter().partition(meets);
             graph.components = apart;
             graph.components.push(joined.into_iter().flatten().chain([link]).collect());
@@ -78,7 +78,7 @@ impl EdgeGraph {
 
     /// The divided patch and its mean squared distance from the surface; none if the graph does not divide the loop or a part
     /// cannot be filled.
-    pub fn patch(&self, cell: Cell) -> Option<(Patch, f64)> {
+    pub fn patch(&self, cell: SurfaceCell) -> Option<(LoopPatch, f64)> {
         if self.components.is_empty() {
             return None;
         }
@@ -104,16 +104,16 @@ impl EdgeGraph {
         }
         // Two parts that share a bent polyline must not both be cut across it.
         let routes = |t: &[usize; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-        let mut edges: Vec<Link> = triangles.iter().flat_map(routes).collect();
+        let mut edges: Vec<EdgeSegment> = triangles.iter().flat_map(routes).collect();
         edges.sort_unstable();
         let once = edges.windows(2).all(|w| w[0] != w[1]);
-        let patch = || Patch { inner, triangles, routes: self.routes() };
+        let patch = || LoopPatch { inner, triangles, routes: self.routes() };
         once.then(|| (patch(), sum / f64::from(count as u32)))
     }
 
     /// Polylines along each tree between leaves that follow each other on the loop.
     fn routes(&self) -> Vec<Vec<usize>> {
-        let of = |component: &Vec<Link>| {
+        let of = |component: &Vec<EdgeSegment>| {
             let ends = self.ends(component);
             let next = ends.iter().cycle().skip(1);
             let pairs = ends.iter().zip(next).take(if ends.len() == 2 { 1 } else { ends.len() });
@@ -124,7 +124,7 @@ impl EdgeGraph {
     }
 
     /// The leaves of a tree, which lie on the loop.
-    fn ends(&self, component: &[Link]) -> Vec<usize> {
+    fn ends(&self, component: &[EdgeSegment]) -> Vec<usize> {
         let points = component.iter().flatten().copied();
         let mut ends: Vec<usize> = points.filter(|i| *i < self.boundary_loop).collect();
         ends.sort_unstable();
@@ -133,7 +133,12 @@ impl EdgeGraph {
     }
 
     /// Divides a polygon by trees whose leaves are among its points; none if they are not trees, or cross.
-    fn divide(&self, ring: Vec<usize>, mut components: Vec<Vec<Link>>, parts: &mut Vec<Vec<usize>>) -> Option<()> {
+    fn divide(
+        &self,
+        ring: Vec<usize>,
+        mut components: Vec<Vec<EdgeSegment>>,
+        parts: &mut Vec<Vec<usize>>,
+    ) -> Option<()> {
         let Some(component) = components.pop() else {
             parts.push(ring);
             return Some(());
@@ -149,7 +154,7 @@ impl EdgeGraph {
             let count = (to + ring.len() - from) % ring.len();
             let arc = (0..=count).map(|k| ring[(from + k) % ring.len()]);
             let mut part: Vec<usize> = arc.collect();
-            let is_solid = |t: &Vec<Link>| self.ends(t).iter().all(|e| part.contains(e));
+            let is_solid = |t: &Vec<EdgeSegment>| self.ends(t).iter().all(|e| part.contains(e));
             let (own, others): (Vec<_>, Vec<_>) = components.into_iter().partition(is_solid);
             components = others;
             let back = path(&component, ring[to], ring[from])?;
@@ -163,7 +168,7 @@ impl EdgeGraph {
 
     /// The point from which a polygon is best filled and the sum of squared distances from the surface; none if the polygon is
     /// star-shaped from none of the candidates.
-    fn fan(&self, cell: Cell, part: &[usize]) -> Option<(Apex, f64)> {
+    fn fan(&self, cell: SurfaceCell, part: &[usize]) -> Option<(Apex, f64)> {
         let positions: Vec<Vec3> = part.iter().map(|i| self.positions[*i]).collect();
         let center = middle(&positions);
         let faces = || positions.iter().zip(positions.iter().cycle().skip(1));
@@ -192,7 +197,7 @@ impl EdgeGraph {
 }
 
 /// The path through a tree from one point to another; none if it is not a tree.
-fn path(component: &[Link], from: usize, to: usize) -> Option<Vec<usize>> {
+fn path(component: &[EdgeSegment], from: usize, to: usize) -> Option<Vec<usize>> {
     let mut routes = vec![vec![from]];
     for _ in 0..=component.len() {
         let route = routes.pop()?;
@@ -213,7 +218,7 @@ mod tests {
     use super::*;
 
     /// The parts into which trees divide a loop of `boundary_loop` points.
-    fn parts(boundary_loop: usize, components: &[&[Link]]) -> Option<Vec<Vec<usize>>> {
+    fn parts(boundary_loop: usize, components: &[&[EdgeSegment]]) -> Option<Vec<Vec<usize>>> {
         let graph = EdgeGraph {
             positions: Vec::new(),
             boundary_loop,
@@ -227,10 +232,10 @@ mod tests {
 
     #[test]
     fn parts_meet_in_the_trees_and_leave_the_rim_as_it_is() {
-        let through: &[Link] = &[[1, 5]];
-        let bent: &[Link] = &[[8, 3], [2, 8]];
-        let corner: &[Link] = &[[9, 6], [9, 0], [7, 9]];
-        let branched: &[Link] = &[[10, 0], [10, 2], [10, 11], [11, 4], [6, 11]];
+        let through: &[EdgeSegment] = &[[1, 5]];
+        let bent: &[EdgeSegment] = &[[8, 3], [2, 8]];
+        let corner: &[EdgeSegment] = &[[9, 6], [9, 0], [7, 9]];
+        let branched: &[EdgeSegment] = &[[10, 0], [10, 2], [10, 11], [11, 4], [6, 11]];
         for (components, count) in [
             (vec![], 1),
             (vec![through], 2),
@@ -240,11 +245,11 @@ mod tests {
         ] {
             let parts = parts(8, &components).expect("divided");
             assert_eq!(parts.len(), count);
-            let faces = |p: &Vec<usize>| -> Vec<Link> {
+            let faces = |p: &Vec<usize>| -> Vec<EdgeSegment> {
                 let next = p.iter().cycle().skip(1);
                 p.iter().zip(next).map(|(a, b)| [*a, *b]).collect()
             };
-            let mut faces: Vec<Link> = parts.iter().flat_map(faces).collect();
+            let mut faces: Vec<EdgeSegment> = parts.iter().flat_map(faces).collect();
             for link in components.iter().flat_map(|t| t.iter()) {
                 for route in [*link, [link[1], link[0]]] {
                     let at = faces.iter().position(|s| *s == route).expect("both ways");
@@ -252,7 +257,7 @@ mod tests {
                 }
             }
             faces.sort_unstable();
-            let boundary_loop: Vec<Link> = (0..8).map(|i| [i, (i + 1) % 8]).collect();
+            let boundary_loop: Vec<EdgeSegment> = (0..8).map(|i| [i, (i + 1) % 8]).collect();
             assert_eq!(faces, boundary_loop);
         }
     }
@@ -260,11 +265,11 @@ mod tests {
     #[test]
     fn what_crosses_or_closes_divides_nothing() {
         assert_eq!(parts(8, &[&[[0, 4]], &[[2, 6]]]), None);
-        let ring: &[Link] = &[[0, 8], [8, 9], [9, 10], [10, 8]];
+        let ring: &[EdgeSegment] = &[[0, 8], [8, 9], [9, 10], [10, 8]];
         assert_eq!(parts(8, &[ring]), None);
-        let loop_between: &[Link] = &[[0, 8], [8, 9], [9, 10], [10, 8], [9, 4]];
+        let loop_between: &[EdgeSegment] = &[[0, 8], [8, 9], [9, 10], [10, 8], [9, 4]];
         assert_eq!(parts(8, &[loop_between]), None);
-        let floating: &[Link] = &[[8, 9], [9, 10], [10, 8]];
+        let floating: &[EdgeSegment] = &[[8, 9], [9, 10], [10, 8]];
         assert_eq!(parts(8, &[floating]), None);
     }
 }

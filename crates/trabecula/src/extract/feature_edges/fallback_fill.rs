@@ -17,7 +17,7 @@ const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
 
 /// A polygon of a cell face, counter-clockwise seen from outside; the face's axis, and the part of the solid behind the
 /// polygon.
-struct Polygon {
+struct FacePolygon {
     ring: Vec<VertexId>,
     axis: usize,
     part: u8,
@@ -55,7 +55,7 @@ impl FeatureCells<'_> {
     }
 
     /// The faces of a cell, divided by all surfaces.
-    fn polygons(&self, cell: [usize; 3]) -> Vec<Polygon> {
+    fn polygons(&self, cell: [usize; 3]) -> Vec<FacePolygon> {
         let node = self.nodes.index(cell);
         let mut all = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
@@ -70,13 +70,13 @@ impl FeatureCells<'_> {
                     ring.reverse();
                 }
                 let part = self.part_in(cell, negative);
-                all.push(Polygon { ring, axis, part });
+                all.push(FacePolygon { ring, axis, part });
             }
         }
         all
     }
 
-    fn fallback_walls(&mut self, cell: [usize; 3], polygons: &[Polygon], center_part: u8, share: f64) {
+    fn fallback_walls(&mut self, cell: [usize; 3], polygons: &[FacePolygon], center_part: u8, share: f64) {
         let node = self.nodes.index(cell);
         let center = self.center_of(cell);
         let mut inner: HashMap<VertexId, u32> = HashMap::new();

@@ -2,8 +2,8 @@
 
 use super::boundary_loops::{Step, boundary_loops};
 use super::divided_faces::FaceTriangle;
-use super::loop_patch::{BoundaryLoop, Patch};
-use super::surface_patch::Patches;
+use super::loop_patch::{BoundaryLoop, LoopPatch};
+use super::surface_patch::PatchCandidates;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle, section};
 use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
@@ -13,7 +13,7 @@ use geometry::math::{Vec3, add, scale};
 const TRIES: usize = 6;
 
 /// A tetrahedron of a fitted cell.
-pub(super) struct Tet<'b> {
+pub(super) struct FittedTet<'b> {
     /// Nodes and points; the apex inside the volume comes last, the others in the same order in both tetrahedra that share
     /// them.
     simplex: Simplex,
@@ -37,10 +37,10 @@ pub(super) struct Base {
     pub divided: Option<(usize, [usize; 3])>,
 }
 
-impl<'b> Tet<'b> {
+impl<'b> FittedTet<'b> {
     /// From an apex to a triangle of a cell face.
-    pub fn over(b: &'b Base, apex: usize) -> Tet<'b> {
-        Tet {
+    pub fn over(b: &'b Base, apex: usize) -> FittedTet<'b> {
+        FittedTet {
             simplex: Simplex { nodes: [b.ids[0], b.ids[1], b.ids[2], apex], count: 4 },
             right: !b.left,
             inside: b.inside,
@@ -50,20 +50,20 @@ impl<'b> Tet<'b> {
     }
 
     /// The same where the patch is the cone from the apex.
-    fn of_cone(b: &'b Base, apex: usize) -> Tet<'b> {
+    fn of_cone(b: &'b Base, apex: usize) -> FittedTet<'b> {
         let [p, q, r] = b.on_patch;
-        Tet { on_patch: [p, q, r, false].map(|w| w && b.inside), ..Tet::over(b, apex) }
+        FittedTet { on_patch: [p, q, r, false].map(|w| w && b.inside), ..FittedTet::over(b, apex) }
     }
 
     /// From an apex to a triangle inside the cell, counter-clockwise seen from beyond it. `on_patch` is whether it lies on the
     /// surface.
-    pub fn inner(ids: [usize; 3], inside: bool, apex: usize, on_patch: bool) -> Tet<'b> {
+    pub fn inner(ids: [usize; 3], inside: bool, apex: usize, on_patch: bool) -> FittedTet<'b> {
         // The same order on both sides of the triangle.
         let mut sorted = ids;
         sorted.sort_unstable();
         let [a, b, c] = sorted;
         let left = [[a, b, c], [b, c, a], [c, a, b]].contains(&ids);
-        Tet {
+        FittedTet {
             simplex: Simplex { nodes: [a, b, c, apex], count: 4 },
             right: !left,
             inside,
@@ -74,7 +74,7 @@ impl<'b> Tet<'b> {
 }
 
 /// The id of a cut vertex inside a cell: the points between which it lies, and the surfaces that meet there.
-type Inner = ([usize; 4], u64);
+type InnerVertexId = ([usize; 4], u64);
 
 impl FeatureCells<'_> {
     /// Fills a fitted cell.
@@ -85,7 +85,7 @@ impl FeatureCells<'_> {
         let boundary_loops: Vec<(BoundaryLoop, Vec<usize>)> =
             boundary_loops.iter().map(|keys| self.bare_loop(cell, keys)).collect();
         let (edges, of) = (self.edges, self.cell_of(cell, surface));
-        let patches: Vec<Patches> = match &boundary_loops[..] {
+        let patches: Vec<PatchCandidates> = match &boundary_loops[..] {
             [(boundary_loop, _)] => vec![edges.patches(of, boundary_loop, None)],
             _ => boundary_loops.iter().map(|r| edges.patches_among(of, &r.0)).collect(),
         };
@@ -95,7 +95,7 @@ impl FeatureCells<'_> {
         for (divided, _) in routes.into_iter().filter(|w| w.1) {
             let patches = patches.iter().map(|p| p.best(divided));
             let ids = boundary_loops.iter().map(|r| &r.1[..]);
-            let all: Vec<(&[usize], &Patch)> = ids.zip(patches).collect();
+            let all: Vec<(&[usize], &LoopPatch)> = ids.zip(patches).collect();
             let tets = self.volumes(cell, &bases, &all);
             if tets.is_some_and(|t| self.is_filled(cell, surface, &bases, &t)) {
                 return;
@@ -111,7 +111,7 @@ impl FeatureCells<'_> {
         };
         for apex in apexes {
             let apex = self.inner_point(cell, apex);
-            let tets: Vec<Tet> = bases.iter().map(|b| Tet::of_cone(b, apex)).collect();
+            let tets: Vec<FittedTet> = bases.iter().map(|b| FittedTet::of_cone(b, apex)).collect();
             if self.is_filled(cell, surface, &bases, &tets) {
                 return;
             }
@@ -137,7 +137,7 @@ impl FeatureCells<'_> {
     }
 
     /// Adds the surface in some tetrahedra of a cell, unless it self-intersects in single precision.
-    fn is_filled(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) -> bool {
+    fn is_filled(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[FittedTet]) -> bool {
         let first = self.extra.triangles.len();
         self.fill(cell, surface, bases, tets);
         let failed = self.self_intersects_rounded(first);
@@ -196,9 +196,9 @@ impl FeatureCells<'_> {
     }
 
     /// Adds the surface in some tetrahedra of a cell.
-    fn fill(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) {
+    fn fill(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[FittedTet]) {
         let node = self.nodes.index(cell);
-        let mut names: Vec<(Inner, u32)> = Vec::with_capacity(16);
+        let mut names: Vec<(InnerVertexId, u32)> = Vec::with_capacity(16);
         let mut fragments = self.fragments.take();
         let mut ring: Vec<u32> = Vec::with_capacity(8);
         for tet in tets {
@@ -246,7 +246,14 @@ impl FeatureCells<'_> {
     }
 
     /// Adds the facets of a tetrahedron that lie on the surface, where no other surface crosses it.
-    fn fill_patch(&mut self, node: usize, sides: Sides, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
+    fn fill_patch(
+        &mut self,
+        node: usize,
+        sides: Sides,
+        bases: &[Base],
+        tet: &FittedTet,
+        names: &mut Vec<(InnerVertexId, u32)>,
+    ) {
         let facets = Simplex::facets(tet.right);
         for (ring, _) in facets.iter().zip(tet.on_patch).filter(|s| s.1) {
             let ring = ring.map(|c| {
@@ -262,9 +269,9 @@ impl FeatureCells<'_> {
         &mut self,
         node: usize,
         bases: &[Base],
-        tet: &Tet,
+        tet: &FittedTet,
         vertex: CutVertex,
-        inner: &mut Vec<(Inner, u32)>,
+        inner: &mut Vec<(InnerVertexId, u32)>,
     ) -> u32 {
         let corners = (0..4).filter(|c| vertex.corners >> c & 1 == 1);
         if vertex.corners & 8 == 0 {

@@ -9,7 +9,7 @@
 //! points inside a face or a cell their values lie between those of the nodes around. So no surface appears where an adjacent
 //! cell does not expect it.
 
-use super::divided_faces::Corner;
+use super::divided_faces::PolygonCorner;
 use super::{EdgeStore, OtherSurfaces, SurfaceContext};
 use crate::extract::feature_cells::FeatureCells;
 use crate::extract::vertex_id::VertexId;
@@ -171,7 +171,7 @@ impl FeatureCells<'_> {
     }
 
     /// A copy of an extra point with pseudo-random values of the same signs.
-    pub(super) fn perturbed(&mut self, low: usize, corner: &Corner, attempt: usize) -> usize {
+    pub(super) fn perturbed(&mut self, low: usize, corner: &PolygonCorner, attempt: usize) -> usize {
         let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
             return corner.id;
         };

@@ -1,14 +1,14 @@
 //! A boundary loop in a cell, and patches that fill it.
 
-use super::{Grid, Nodes, within};
+use super::{BlockNodes, SamplingGrid, within};
 use crate::field::Field;
 use geometry::math::{Vec3, add, scale};
 
 /// A cell and the surface whose patch it contains.
 #[derive(Clone, Copy)]
-pub(super) struct Cell<'a> {
-    pub grid: &'a Grid,
-    pub nodes: &'a Nodes<'a>,
+pub(super) struct SurfaceCell<'a> {
+    pub grid: &'a SamplingGrid,
+    pub nodes: &'a BlockNodes<'a>,
     /// The lowest node.
     pub node: usize,
     pub surface: usize,
@@ -24,21 +24,21 @@ pub(super) struct BoundaryLoop {
 }
 
 /// Triangles that fill a loop. Indices below the number of its points are these; the others are `inner`.
-pub(super) struct Patch {
+pub(super) struct LoopPatch {
     pub inner: Vec<Vec3>,
     pub triangles: Vec<[usize; 3]>,
     /// Polylines along the dividing feature edges, from one point of the loop to another.
     pub routes: Vec<Vec<usize>>,
 }
 
-impl Patch {
-    pub fn cone(boundary_loop: &BoundaryLoop, apex: Vec3) -> Patch {
+impl LoopPatch {
+    pub fn cone(boundary_loop: &BoundaryLoop, apex: Vec3) -> LoopPatch {
         let n = boundary_loop.positions.len();
-        Patch { inner: vec![apex], triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(), routes: Vec::new() }
+        LoopPatch { inner: vec![apex], triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(), routes: Vec::new() }
     }
 }
 
-impl Cell<'_> {
+impl SurfaceCell<'_> {
     /// A point clamped to the interior of the cell.
     pub fn within(&self, p: Vec3) -> Vec3 {
         let at = self.nodes.at(self.node);

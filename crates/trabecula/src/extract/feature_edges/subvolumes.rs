@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
 
-use super::fill_fitted::{Base, Tet};
-use super::loop_patch::Patch;
+use super::fill_fitted::{Base, FittedTet};
+use super::loop_patch::LoopPatch;
 use crate::extract::feature_cells::{FeatureCells, middle};
 use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
@@ -39,18 +39,18 @@ struct Volume<'b> {
 }
 
 /// An undirected edge between two points.
-type Line = [usize; 2];
+type UndirectedEdge = [usize; 2];
 
-fn line(a: usize, b: usize) -> Line {
+fn line(a: usize, b: usize) -> UndirectedEdge {
     [a.min(b), a.max(b)]
 }
 
-fn lines_of([a, b, c]: [usize; 3]) -> [Line; 3] {
+fn lines_of([a, b, c]: [usize; 3]) -> [UndirectedEdge; 3] {
     [line(a, b), line(b, c), line(c, a)]
 }
 
 /// The edges of a closed polyline.
-fn around(ring: &[usize]) -> Vec<Line> {
+fn around(ring: &[usize]) -> Vec<UndirectedEdge> {
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(a, b)| line(*a, *b)).collect()
 }
@@ -67,8 +67,8 @@ impl FeatureCells<'_> {
         &mut self,
         cell: [usize; 3],
         bases: &'b [Base],
-        patches: &[(&[usize], &Patch)],
-    ) -> Option<Vec<Tet<'b>>> {
+        patches: &[(&[usize], &LoopPatch)],
+    ) -> Option<Vec<FittedTet<'b>>> {
         // Points of faces that were divided again have other values in that face.
         let is_perturbed = |b: &Base| b.divided.is_some_and(|(n, _)| self.divided_faces.numbered(n).tries > 0);
         if bases.iter().any(is_perturbed) {
@@ -76,7 +76,7 @@ impl FeatureCells<'_> {
         }
         let face = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: FacetOrigin::CellFace(b) };
         let faces: Vec<Facet> = bases.iter().map(face).collect();
-        let boundary_loops: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
+        let boundary_loops: Vec<UndirectedEdge> = patches.iter().flat_map(|p| around(p.0)).collect();
         let mut volumes: Vec<Volume> = Vec::with_capacity(patches.len() + 1);
         for facets in parts(&faces, &boundary_loops) {
             let inside = matches!(facets[0].of, FacetOrigin::CellFace(b) if b.inside);
@@ -117,7 +117,7 @@ impl FeatureCells<'_> {
         cell: [usize; 3],
         mut volume: Volume<'b>,
         mut routes: Vec<Vec<usize>>,
-        tets: &mut Vec<Tet<'b>>,
+        tets: &mut Vec<FittedTet<'b>>,
     ) -> Option<()> {
         // One part after the other is cut off.
         while !self.fill_star_shaped(cell, &volume, tets) {
@@ -135,7 +135,7 @@ impl FeatureCells<'_> {
     }
 
     /// Adds the tetrahedra of a volume; false if no point is found in its kernel.
-    fn fill_star_shaped<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<Tet<'b>>) -> bool {
+    fn fill_star_shaped<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<FittedTet<'b>>) -> bool {
         let facets = volume.facets.iter();
         let positions: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.position_of(i))).collect();
         let step = self.grid.step;
@@ -144,9 +144,9 @@ impl FeatureCells<'_> {
         };
         let apex = self.inner_point(cell, apex);
         tets.extend(volume.facets.iter().map(|f| match f.of {
-            FacetOrigin::CellFace(b) => Tet::over(b, apex),
-            FacetOrigin::Patch => Tet::inner(f.ids, volume.inside, apex, volume.inside),
-            FacetOrigin::Partition => Tet::inner(f.ids, volume.inside, apex, false),
+            FacetOrigin::CellFace(b) => FittedTet::over(b, apex),
+            FacetOrigin::Patch => FittedTet::inner(f.ids, volume.inside, apex, volume.inside),
+            FacetOrigin::Partition => FittedTet::inner(f.ids, volume.inside, apex, false),
         }));
         true
     }
@@ -183,8 +183,8 @@ fn closed<'b>(mut half: Vec<Facet<'b>>, partition: &[[usize; 3]], line: [usize; 
 }
 
 /// The parts into which some edges divide a boundary.
-fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
-    let mut adjacent: FxHashMap<Line, Vec<usize>> = FxHashMap::default();
+fn parts<'b>(facets: &[Facet<'b>], lines: &[UndirectedEdge]) -> Vec<Vec<Facet<'b>>> {
+    let mut adjacent: FxHashMap<UndirectedEdge, Vec<usize>> = FxHashMap::default();
     for (i, f) in facets.iter().enumerate() {
         for l in lines_of(f.ids) {
             adjacent.entry(l).or_default().push(i);
@@ -216,7 +216,7 @@ fn back(facets: &[Facet], route: &[usize]) -> Option<Vec<usize>> {
     let is_cell_face = |f: &&Facet| matches!(f.of, FacetOrigin::CellFace(_));
     let others = facets.iter().filter(|f| !is_cell_face(f));
     let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
-    let lines: Vec<Line> = (facets.iter().filter(is_cell_face)).flat_map(|f| lines_of(f.ids)).collect();
+    let lines: Vec<UndirectedEdge> = (facets.iter().filter(is_cell_face)).flat_map(|f| lines_of(f.ids)).collect();
     let mut from: FxHashMap<usize, usize> = FxHashMap::default();
     let mut open = VecDeque::from([start]);
     while let Some(at) = open.pop_front() {

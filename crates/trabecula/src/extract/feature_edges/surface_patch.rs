@@ -4,7 +4,7 @@
 //! since the loop is a simple curve on the boundary of a convex cell; several fans are tested after they are made.
 
 use super::edge_graph::EdgeGraph;
-use super::loop_patch::{BoundaryLoop, Cell, Patch};
+use super::loop_patch::{BoundaryLoop, LoopPatch, SurfaceCell};
 use super::{EdgeStore, nearest};
 use crate::extract::feature_cells::{FeatureCells, middle};
 use crate::extract::vertex_id::VertexId;
@@ -15,22 +15,22 @@ use geometry::math::{Vec3, add, norm, scale, sub};
 const MOST: usize = 128;
 
 /// The candidates that fill a loop.
-pub(super) struct Patches {
+pub(super) struct PatchCandidates {
     /// Divided by feature edges, if that is nearer to the surface than a single cone.
-    pub divided: Option<Patch>,
-    pub cone: Patch,
+    pub divided: Option<LoopPatch>,
+    pub cone: LoopPatch,
 }
 
-impl Patches {
-    pub fn best(&self, divided: bool) -> &Patch {
+impl PatchCandidates {
+    pub fn best(&self, divided: bool) -> &LoopPatch {
         (self.divided.as_ref().filter(|_| divided)).unwrap_or(&self.cone)
     }
 }
 
 impl<'a> FeatureCells<'a> {
-    pub(super) fn cell_of(&self, cell: [usize; 3], surface: usize) -> Cell<'a> {
+    pub(super) fn cell_of(&self, cell: [usize; 3], surface: usize) -> SurfaceCell<'a> {
         let grid = self.grid;
-        Cell {
+        SurfaceCell {
             grid,
             nodes: self.nodes,
             node: self.nodes.index(cell),
@@ -55,25 +55,30 @@ impl<'a> FeatureCells<'a> {
 
 impl EdgeStore {
     /// The candidates for the only loop of a cell. `neighbour_corners`: as for [`EdgeStore::apex`].
-    pub(super) fn patches(&self, cell: Cell, boundary_loop: &BoundaryLoop, neighbour_corners: Option<Vec3>) -> Patches {
+    pub(super) fn patches(
+        &self,
+        cell: SurfaceCell,
+        boundary_loop: &BoundaryLoop,
+        neighbour_corners: Option<Vec3>,
+    ) -> PatchCandidates {
         let (apex, off) = self.apex(cell, boundary_loop, neighbour_corners);
         let is_exact = off < (cell.grid.margin * cell.grid.step).powi(2);
         let graph = (!is_exact).then(|| EdgeGraph::new(cell, boundary_loop, self.segments_in(cell)));
         let divided = graph.and_then(|w| w.patch(cell)).filter(|d| d.1 < off);
-        Patches { divided: divided.map(|d| d.0), cone: Patch::cone(boundary_loop, apex) }
+        PatchCandidates { divided: divided.map(|d| d.0), cone: LoopPatch::cone(boundary_loop, apex) }
     }
 
     /// The candidates for one of several loops.
-    pub(super) fn patches_among(&self, cell: Cell, boundary_loop: &BoundaryLoop) -> Patches {
+    pub(super) fn patches_among(&self, cell: SurfaceCell, boundary_loop: &BoundaryLoop) -> PatchCandidates {
         let graph = EdgeGraph::new(cell, boundary_loop, self.segments_in(cell));
         let own: Vec<[Vec3; 2]> = graph.segments().collect();
         let (apex, off) = self.best(cell, boundary_loop, &own, None);
         let divided = graph.patch(cell).filter(|d| d.1 < off);
-        Patches { divided: divided.map(|d| d.0), cone: Patch::cone(boundary_loop, apex) }
+        PatchCandidates { divided: divided.map(|d| d.0), cone: LoopPatch::cone(boundary_loop, apex) }
     }
 
     /// The corner in an adjacent cell that is the apex of this cell's patch, if there is one.
-    pub(super) fn neighbour_corners(&self, cell: Cell) -> Option<Vec3> {
+    pub(super) fn neighbour_corners(&self, cell: SurfaceCell) -> Option<Vec3> {
         self.neighbour_corners.get(&cell.node).copied()
     }
 
@@ -81,7 +86,7 @@ impl EdgeStore {
     /// is nearer; and the mean square of the distances of the cone from the surface and from the feature edges.
     pub(super) fn apex(
         &self,
-        cell: Cell,
+        cell: SurfaceCell,
         boundary_loop: &BoundaryLoop,
         neighbour_corners: Option<Vec3>,
     ) -> (Vec3, f64) {
@@ -89,7 +94,7 @@ impl EdgeStore {
     }
 
     /// The segments of feature edges in a cell; none if there are too many.
-    fn segments_in(&self, cell: Cell) -> &[[Vec3; 2]] {
+    fn segments_in(&self, cell: SurfaceCell) -> &[[Vec3; 2]] {
         let here = self.traced.segments.get(&(cell.surface, cell.node));
         here.filter(|p| p.len() <= MOST).map_or(&[], |p| p)
     }
@@ -97,7 +102,7 @@ impl EdgeStore {
     /// The best apex for some of the segments.
     fn best(
         &self,
-        cell: Cell,
+        cell: SurfaceCell,
         boundary_loop: &BoundaryLoop,
         segments: &[[Vec3; 2]],
         neighbour_corners: Option<Vec3>,

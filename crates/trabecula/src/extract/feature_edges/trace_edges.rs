@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::extract::block_nodes::{Nodes, PaddedNodes};
+use crate::extract::block_nodes::{BlockNodes, PaddedNodes};
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, scale, sub};
 
@@ -27,14 +27,14 @@ impl TracedEdges {
     }
 
     /// Traces the feature edges of a live surface through the cells of the block.
-    pub fn trace(&mut self, nodes: &Nodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
+    pub fn trace(&mut self, nodes: &BlockNodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
         for &i in segments {
             self.walk(nodes, padded, surface, of.segments[i as usize].ends);
         }
     }
 
     /// Traces one segment through the cells of the block and those around it.
-    fn walk(&mut self, nodes: &Nodes, padded: &PaddedNodes, surface: usize, [p, q]: [Vec3; 2]) {
+    fn walk(&mut self, nodes: &BlockNodes, padded: &PaddedNodes, surface: usize, [p, q]: [Vec3; 2]) {
         let along = sub(q, p);
         let mut stops = vec![0.0, 1.0];
         for a in 0..3 {
@@ -65,7 +65,7 @@ impl TracedEdges {
     }
 
     /// Marks the nodes within two cells of one that a feature edge passes.
-    fn mark(&mut self, nodes: &Nodes, cell: [isize; 3]) {
+    fn mark(&mut self, nodes: &BlockNodes, cell: [isize; 3]) {
         let reach = [0, 1, 2].map(|a| {
             let last = nodes.shape[a] as isize - 1;
             ((cell[a] - 1).max(0) as usize)..=((cell[a] + 2).min(last) as usize)
@@ -81,12 +81,12 @@ impl TracedEdges {
 
     /// Whether a feature edge lies within two cells of a node. Contours that end on grid edges farther away are known to every
     /// tile that has these edges.
-    pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
+    pub fn are_near(&self, nodes: &BlockNodes, [i, j, k]: [usize; 3]) -> bool {
         self.near[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 
     /// Adds the nodes around feature edges to those where the other surfaces are sampled.
-    pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
+    pub fn wanted(&self, nodes: &BlockNodes, wanted: &mut [u64]) {
         for &(_, node) in self.segments.keys() {
             let [i, j, k] = nodes.at(node);
             let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);

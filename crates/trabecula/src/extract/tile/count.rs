@@ -1,19 +1,19 @@
 //! About how many triangles a tile has, by the signs at its nodes alone.
 
-use super::{Nodes, Scratch, sample};
+use super::{BlockNodes, TileBuffers, sample};
 use crate::extract::cube_table::CASES;
 use crate::extract::planar_caps;
-use crate::extract::sampling_grid::Grid;
+use crate::extract::sampling_grid::SamplingGrid;
 use crate::extract::sign_words::{bits, within};
 
 /// Triangles of a feature cell on average, with those that it adds to adjacent cells.
 const FEATURE_CELL: usize = 14;
 
 /// About as many triangles as the tile's own cells get; `None` if bounds show that no surface crosses it.
-pub(in crate::extract) fn count(grid: &Grid, tile: [usize; 3], s: &mut Scratch) -> Option<usize> {
+pub(in crate::extract) fn count(grid: &SamplingGrid, tile: [usize; 3], s: &mut TileBuffers) -> Option<usize> {
     let block = grid.block(tile);
     let local = grid.local(&grid.nodes(tile), &block.bounds())?;
-    let nodes = Nodes::new(&block);
+    let nodes = BlockNodes::new(&block);
     let own = grid.own(tile);
     // Without feature edges: they add few triangles.
     s.edges.clear(nodes.shape);

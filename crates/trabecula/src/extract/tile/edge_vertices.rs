@@ -4,17 +4,17 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{BATCH, Nodes, Numbers, Scratch, Vertex};
+use super::{BATCH, BlockNodes, EdgeVertex, TileBuffers, VertexNumbers};
 use crate::extract::sign_words::{Signs, below};
 use crate::field::Field;
 use geometry::math::unit;
 use geometry::roots::Bracket;
 
 /// Lists the vertices of plain cells, surface by surface.
-pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
-    let Scratch { signs, numbers, vertices, edges, .. } = s;
+pub(super) fn list_vertices(s: &mut TileBuffers, nodes: &BlockNodes) {
+    let TileBuffers { signs, numbers, vertices, edges, .. } = s;
     vertices.clear();
-    numbers.resize_with(signs.negative.len(), Numbers::default);
+    numbers.resize_with(signs.negative.len(), VertexNumbers::default);
     let any_feature = signs.has_features();
     for (surface, numbers) in numbers.iter_mut().enumerate() {
         let features = if any_feature { Some(edges.claims.features(signs, surface)) } else { None };
@@ -25,9 +25,9 @@ pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn list_surface(
     signs: &Signs,
-    numbers: &mut Numbers,
-    vertices: &mut Vec<Vertex>,
-    nodes: &Nodes,
+    numbers: &mut VertexNumbers,
+    vertices: &mut Vec<EdgeVertex>,
+    nodes: &BlockNodes,
     surface: usize,
     features: Option<&[u64]>,
 ) {
@@ -56,7 +56,7 @@ fn list_surface(
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
                     let node = [i, j, k];
-                    vertices.push(Vertex {
+                    vertices.push(EdgeVertex {
                         node: node.map(|n| n as u8),
                         axis: axis as u8,
                         surface: surface as u8,
@@ -72,13 +72,13 @@ fn list_surface(
 
 /// A root along an edge: its bracket, below which is solid, and the next guess.
 #[derive(Clone, Copy)]
-struct Root {
+struct EdgeRoot {
     vertex: u32,
     bracket: Bracket,
     t: f64,
 }
 
-impl Root {
+impl EdgeRoot {
     /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess, or halves what is left.
     #[inline]
     fn narrow(&mut self, value: f64, slope: f64, halve: bool) -> f64 {
@@ -110,8 +110,8 @@ const SMOOTH: usize = 6;
 const ROUNDS: usize = SMOOTH + 20;
 
 /// Finds where a surface crosses the edges of its vertices, and its normals there.
-pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, surface: usize, which: Range<usize>) {
-    let Scratch { samples, points, values, gradients, vertices, normals, .. } = s;
+pub(super) fn solve(s: &mut TileBuffers, nodes: &BlockNodes, f: &dyn Field, surface: usize, which: Range<usize>) {
+    let TileBuffers { samples, points, values, gradients, vertices, normals, .. } = s;
     normals.resize(vertices.len(), [0.0; 3]);
     let samples = &samples[surface];
     let mut roots = Vec::with_capacity(BATCH);
@@ -123,11 +123,11 @@ pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, surface: usiz
             let (a, b) = if v.up { (low, high) } else { (high, low) };
             let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
             let bracket = Bracket { below: [0.0, a], above: [1.0, b] };
-            roots.push(Root { vertex: i as u32, bracket, t: bracket.chord() });
+            roots.push(EdgeRoot { vertex: i as u32, bracket, t: bracket.chord() });
         }
         for round in 0..ROUNDS {
             points.clear();
-            let position = |r: &Root| vertices[r.vertex as usize].at(nodes, r.t);
+            let position = |r: &EdgeRoot| vertices[r.vertex as usize].at(nodes, r.t);
             points.extend(roots.iter().map(position));
             values.resize(roots.len(), 0.0);
             gradients.resize(roots.len(), [0.0; 3]);

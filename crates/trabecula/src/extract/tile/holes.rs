@@ -1,12 +1,12 @@
 //! Where a wall does not keep the spaces adjacent to it apart.
 
-use super::{Nodes, Scratch};
+use super::{BlockNodes, TileBuffers};
 use crate::extract::sampling_grid::LocalSolid;
 use crate::extract::sign_words::{Signs, below, bits};
 use geometry::math::Vec3;
 
 /// A node of the region at which a wall is not thicker than rounding lets it be and nothing else separates its sides.
-pub(super) fn hole(s: &Scratch, local: &LocalSolid, nodes: &Nodes, faces: [usize; 2]) -> Option<Vec3> {
+pub(super) fn hole(s: &TileBuffers, local: &LocalSolid, nodes: &BlockNodes, faces: [usize; 2]) -> Option<Vec3> {
     let at = |f: usize| local.live.iter().position(|live| *live == f);
     let [a, b] = [&s.samples[at(faces[0])?], &s.samples[at(faces[1])?]];
     let [nx, ny, nz] = nodes.shape;

@@ -4,22 +4,22 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Kind, Numbers, Plain, Scratch};
+use super::{Plain, TileBuffers, TriangleRole, VertexNumbers};
 use crate::extract::cube_table::{CASES, EDGES, MOST};
-use crate::extract::sampling_grid::{Grid, LocalSolid, Sides};
+use crate::extract::sampling_grid::{LocalSolid, SamplingGrid, Sides};
 use crate::extract::sign_words::{Signs, within};
 
 /// Lists the triangles of all plain cells of the block, halo included; and the plain cells adjacent to feature cells, which
 /// `feature_cells` fills.
-pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, own: &[Range<usize>; 3]) {
-    let Scratch { signs, numbers, plain, edges, .. } = s;
+pub(super) fn list_triangles(s: &mut TileBuffers, grid: &SamplingGrid, local: &LocalSolid, own: &[Range<usize>; 3]) {
+    let TileBuffers { signs, numbers, plain, edges, .. } = s;
     plain.triangles.clear();
     plain.counts.clear();
     plain.kinds.clear();
     plain.seams.clear();
     plain.sides.clear();
     for (surface, numbers) in numbers.iter().enumerate().take(local.live.len()) {
-        let kind = if grid.surfaces[local.live[surface]].cut { Kind::Cut } else { Kind::Lattice };
+        let kind = if grid.surfaces[local.live[surface]].cut { TriangleRole::Cut } else { TriangleRole::Lattice };
         let before = plain.triangles.len();
         list_patches(signs, local, &edges.claims.cells, numbers, (surface, kind), own, plain);
         plain.counts.push(plain.triangles.len() - before);
@@ -35,8 +35,8 @@ fn list_patches(
     signs: &Signs,
     local: &LocalSolid,
     fill_edge_cell: &[u64],
-    numbers: &Numbers,
-    of: (usize, Kind),
+    numbers: &VertexNumbers,
+    of: (usize, TriangleRole),
     own: &[Range<usize>; 3],
     out: &mut Plain,
 ) {
@@ -89,12 +89,12 @@ fn list_patches(
                 for e in 0..EDGES.len() {
                     names[e] = first[e] + (crossed[e] & below).count_ones();
                 }
-                let mut kind = if mine >> i & 1 == 1 { kind } else { Kind::Neighbour };
+                let mut kind = if mine >> i & 1 == 1 { kind } else { TriangleRole::Neighbour };
                 if fill_edge_cell[row] >> i & 1 == 1 {
-                    kind = Kind::Neighbour;
+                    kind = TriangleRole::Neighbour;
                 } else if seam >> i & 1 == 1 {
                     seams.push(([i, j, k], surface));
-                    kind = Kind::Neighbour;
+                    kind = TriangleRole::Neighbour;
                 }
                 let count = triangles.len() + case.count;
                 triangles.extend_from_slice(&case.triangles.map(|t| t.map(|e| names[e as usize & 15])));
@@ -103,7 +103,7 @@ fn list_patches(
                 kinds.truncate(count);
                 if several {
                     let [behind, ahead] = signs.parts_beside(local, surface, [i, j, k]);
-                    sides.resize(count, Sides { behind, ahead, cut: kind == Kind::Cut });
+                    sides.resize(count, Sides { behind, ahead, cut: kind == TriangleRole::Cut });
                 }
             }
         }

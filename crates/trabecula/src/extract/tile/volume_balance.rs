@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Nodes, Scratch};
-use crate::extract::sampling_grid::{Grid, LocalSolid};
+use super::{BlockNodes, TileBuffers};
+use crate::extract::sampling_grid::{LocalSolid, SamplingGrid};
 use crate::extract::vertex_numbers::numbered;
 use geometry::math::Vec3;
 
@@ -21,7 +21,13 @@ const CREASE: f32 = 0.906;
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what surfaces its edge can move without running far along it.
-pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
+pub(super) fn balance(
+    s: &mut TileBuffers,
+    grid: &SamplingGrid,
+    local: &LocalSolid,
+    nodes: &BlockNodes,
+    own: &[Range<usize>; 3],
+) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];

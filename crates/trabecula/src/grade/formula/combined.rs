@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::parse::{AXES, reserved};
-use super::{Dual, Formula, LANES};
+use super::{DualNumber, Formula, LANES};
 use crate::field::Field;
-use crate::grade::{BuildGrade, Grade, GradeSpec, Quantity, Varying};
+use crate::grade::{BuildGrade, Grade, GradeSpec, Quantity, VaryingNumber};
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
@@ -109,8 +109,10 @@ impl Field for Combined {
                 number.gradients(points, &mut v[..points.len()], &mut g[..points.len()]);
             }
             let variable = |lane: usize, n: usize| match n.checked_sub(AXES.len()) {
-                Some(number) => Dual(numbers[number].0[lane], numbers[number].1[lane]),
-                None => Dual(points.get(lane).map_or(0.0, |p| p[n]), [0, 1, 2].map(|a| f64::from(u8::from(a == n)))),
+                Some(number) => DualNumber(numbers[number].0[lane], numbers[number].1[lane]),
+                None => {
+                    DualNumber(points.get(lane).map_or(0.0, |p| p[n]), [0, 1, 2].map(|a| f64::from(u8::from(a == n))))
+                }
             };
             let found = self.formula.run_lanes(variable, &mut stack);
             for ((v, g), d) in values.iter_mut().zip(gradients).zip(found) {
@@ -127,7 +129,7 @@ impl Field for Combined {
     }
 }
 
-impl Varying for Combined {
+impl VaryingNumber for Combined {
     /// The axes that the formula names or along which one of its numbers may change.
     fn varies(&self) -> [bool; 3] {
         let varies = self.numbers.iter().map(Grade::varies);

@@ -8,9 +8,9 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
     move || random(&mut s)
 }
 
-fn grid(shape: [usize; 3], size: Vec3) -> Grid {
+fn grid(shape: [usize; 3], size: Vec3) -> PhaseGrid {
     let b = Aabb { min: [-1.0, 0.5, 2.0], max: core::array::from_fn(|a| [-1.0, 0.5, 2.0][a] + size[a]) };
-    Grid::over(&b, shape)
+    PhaseGrid::over(&b, shape)
 }
 
 /// The part of a square below a line, by counting.
@@ -35,7 +35,8 @@ fn weighted_least_squares_are_least() {
     let mut random = noise(5);
     let k: Vec<Vec3> = (0..g.len()).map(|_| [random(), random(), random()]).collect();
     let s: Vec<f64> = (0..g.len()).map(|n| (-2.0 * (g.node(n)[0].abs() - 0.3).max(0.0)).exp().max(1e-3)).collect();
-    let Fit { values: f, steps, left } = EdgeSquares::new(g, &s, None).fit(&slopes(&g, &k), vec![0.0; g.len()], None);
+    let LeastSquaresSolution { values: f, steps, left } =
+        EdgeSquares::new(g, &s, None).fit(&slopes(&g, &k), vec![0.0; g.len()], None);
     assert!(left < RESIDUAL && steps < 30, "{steps} steps, {left}");
     let strides = g.strides();
     let sum = |f: &[f64]| {
@@ -82,9 +83,10 @@ fn tilted_least_squares_are_least() {
     let k: Vec<Vec3> = (0..g.len()).map(|_| [2.0 + random(), random(), random()]).collect();
     let even = vec![1.0; g.len()];
     for ratio in [0.1, 10.0] {
-        let tilt = Tilt::new(g, &k, ratio, &even).expect("tilted");
+        let tilt = AngleWeight::new(g, &k, ratio, &even).expect("tilted");
         let squares = EdgeSquares::new(g, &even, None);
-        let Fit { values: f, left, .. } = squares.fit(&slopes(&g, &k), vec![0.0; g.len()], Some(&tilt));
+        let LeastSquaresSolution { values: f, left, .. } =
+            squares.fit(&slopes(&g, &k), vec![0.0; g.len()], Some(&tilt));
         assert!(left < RESIDUAL);
         let strides = g.strides();
         let sum = |f: &[f64]| {
@@ -134,7 +136,7 @@ fn tilted_least_squares_are_least() {
 #[test]
 fn cut_faces_are_of_second_order() {
     let errors = [17, 33, 65].map(|n| {
-        let g = Grid::over(&Aabb { min: [-1.0, -1.0, 0.0], max: [1.0, 1.0, 0.5] }, [n, n, n / 4 + 2]);
+        let g = PhaseGrid::over(&Aabb { min: [-1.0, -1.0, 0.0], max: [1.0, 1.0, 0.5] }, [n, n, n / 4 + 2]);
         let depth: Vec<f64> = (0..g.len())
             .map(|n| {
                 let [x, y, _] = g.node(n);

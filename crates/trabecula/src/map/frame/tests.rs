@@ -6,9 +6,9 @@ fn formula(text: &str) -> Grade {
     Grade::from(Formula::parse(text).expect("formula"))
 }
 
-fn grid() -> (Grid, Vec<Vec3>) {
+fn grid() -> (PhaseGrid, Vec<Vec3>) {
     let b = Aabb { min: [1.0, 2.0, 3.0], max: [5.0, 5.0, 6.0] };
-    let g = Grid::over(&b, [12, 9, 8]);
+    let g = PhaseGrid::over(&b, [12, 9, 8]);
     let nodes = (0..g.len()).map(|n| g.node(n)).collect();
     (g, nodes)
 }

@@ -1,4 +1,4 @@
-use super::super::phase_grid::Grid;
+use super::super::phase_grid::PhaseGrid;
 use super::super::solution_quality::compared;
 use super::*;
 use crate::grade::Grade;
@@ -174,7 +174,7 @@ fn a_conformal_map_is_found_at_second_order() {
 #[test]
 fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
     let b = bounds([0.0; 3], [4.0, 5.0, 3.0]);
-    let grid = Grid::over(&b, [17, 21, 13]);
+    let grid = PhaseGrid::over(&b, [17, 21, 13]);
     let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
     let angles = [formula("30*y"), formula("10*x*z"), formula("40*x")];
     let frames = Orientation::Angles(angles).frames(&grid, &nodes, None, None, None).expect("frames").at_nodes;
@@ -378,7 +378,7 @@ fn what_hides_between_the_nodes_is_refused_or_resolved() {
         );
 
         let map = Phase::solve(&b, wanted, &SolverOptions::default()).expect("solved");
-        assert!(map.hasty().expect("reported").contains(words));
+        assert!(map.undersampled().expect("reported").contains(words));
         // 60 degrees within half a period, an eighth of a cell.
         assert!(key != "rotate" || map.distortion().turn > 110.0, "{}", map.distortion().turn);
         let [nx, ny, nz] = map.effort().0;
@@ -406,7 +406,7 @@ fn what_hides_between_the_nodes_is_refused_or_resolved() {
     // A period of several cells is carried by the usual grid.
     let slow = Phase::solve(&b, &about_z("30*sin(2*pi*x/12)", Grade::Constant(4.0)), &SolverOptions::default());
     let slow = slow.expect("solved");
-    assert!(slow.hasty().is_none() && slow.effort().0[0] < 50, "{:?}", slow.effort());
+    assert!(slow.undersampled().is_none() && slow.effort().0[0] < 50, "{:?}", slow.effort());
 }
 
 /// A ramp shorter than a cell is as steep as half a cell sees it; a long one is so on any length.
@@ -462,7 +462,12 @@ fn a_region_thinner_than_the_grid_is_judged_inside_it() {
         }
         let close = |a: f64, b: f64| (a - b).abs() < 0.1 * b.abs().max(1.0);
         assert!(close(d.density[0], density[0]) && close(d.density[1], density[1]), "{:?} {density:?}", d.density);
-        assert_eq!(map.hasty().is_some_and(|w| w.contains("thicker than about")), thick < 0.5, "{:?}", map.hasty());
+        assert_eq!(
+            map.undersampled().is_some_and(|w| w.contains("thicker than about")),
+            thick < 0.5,
+            "{:?}",
+            map.undersampled()
+        );
     }
 }
 

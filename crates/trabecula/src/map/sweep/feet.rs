@@ -1,6 +1,6 @@
 //! The foot of a position: the nearest point of a line.
 
-use super::line::{FINE, Line, Place};
+use super::line::{CurveParameter, FINE, FramedCurve};
 use geometry::math::{Aabb, Vec3, dot, norm, scale, sub};
 use rayon::prelude::*;
 
@@ -17,13 +17,13 @@ const MOST: f64 = 131_072.0;
 /// Least 1 − κ·d at a start: where it is less, feet move fast.
 const LEAST: f64 = 0.05;
 
-impl Line {
+impl FramedCurve {
     /// The foot, found from a place near it.
     ///
     /// With q = p − a, the parameter is a root of (c(x) − p) · c′(x), whose coefficients are those of (c − a) · c′ less
     /// those of q · c′.
     #[inline(always)]
-    pub fn foot(&self, p: Vec3, (mut span, mut x): Place) -> Place {
+    pub fn foot(&self, p: Vec3, (mut span, mut x): CurveParameter) -> CurveParameter {
         let mut count = 0;
         loop {
             let s = &self.spans[span];
@@ -66,7 +66,7 @@ impl Line {
 
     /// The feet of several positions: the same as one by one.
     #[inline(always)]
-    pub fn feet(&self, p: &[Vec3; LANES], starts: &[Place; LANES]) -> [Place; LANES] {
+    pub fn feet(&self, p: &[Vec3; LANES], starts: &[CurveParameter; LANES]) -> [CurveParameter; LANES] {
         let mut feet = *starts;
         let span = starts[0].0;
         let mut found = [false; LANES];
@@ -87,7 +87,7 @@ impl Line {
 
     /// Feet that are found on one span from starts on it, step by step as in `foot`; not a number for others.
     #[inline(always)]
-    fn feet_on(&self, span: usize, p: &[Vec3; LANES], starts: &[Place; LANES]) -> [f64; LANES] {
+    fn feet_on(&self, span: usize, p: &[Vec3; LANES], starts: &[CurveParameter; LANES]) -> [f64; LANES] {
         let s = &self.spans[span];
         let [a, b, c, d] = s.cubic;
         let [_, _, f3, f4, f5] = s.square;
@@ -125,7 +125,7 @@ impl Line {
     }
 
     /// The sample point nearest to a position, or the foot on one of the rays that an open line goes on with.
-    pub fn nearest(&self, p: Vec3) -> Place {
+    pub fn nearest(&self, p: Vec3) -> CurveParameter {
         let away: Vec<f64> = self.spans[self.bent()].iter().map(|s| s.bounds.distance(p).powi(2)).collect();
         let first = (0..away.len()).fold(0, |m, i| if away[i] < away[m] { i } else { m });
         let mut near = (f64::INFINITY, usize::MAX);
@@ -176,7 +176,7 @@ struct Start {
 
 impl Starts {
     /// The starts in a box.
-    pub fn new(line: &Line, reach: f64, b: &Aabb) -> Starts {
+    pub fn new(line: &FramedCurve, reach: f64, b: &Aabb) -> Starts {
         let volume: f64 = b.size().iter().product();
         let step = (reach / STARTS).min(norm(b.size())).max((volume / MOST).cbrt());
         let shape = b.size().map(|s| (s / step) as usize + 2);
@@ -187,7 +187,7 @@ impl Starts {
         };
         /// A foot, the parameter from the beginning of the line, its gradient, and whether it is a least distance.
         struct Node {
-            place: Place,
+            place: CurveParameter,
             t: f64,
             slope: Vec3,
         }
@@ -238,7 +238,7 @@ impl Starts {
 
     /// A place near the foot.
     #[inline(always)]
-    pub fn at(&self, line: &Line, p: Vec3) -> Place {
+    pub fn at(&self, line: &FramedCurve, p: Vec3) -> CurveParameter {
         let s: Vec3 = core::array::from_fn(|a| (p[a] - self.min[a]) * self.per_step + 0.5);
         // Negative and NaN, as integers, are zero.
         let i = s.map(|s| s as usize);

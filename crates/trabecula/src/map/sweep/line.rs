@@ -19,10 +19,10 @@ const SETTLED: f64 = 1e-6;
 const STEPS: usize = 6;
 
 /// What is tabulated: N₁, N₂, the arc length, and nothing, which fills the vector register.
-type Row = [f64; 8];
+type CurveTableRow = [f64; 8];
 
 /// A point of the line: its span and the parameter in it.
-pub(super) type Place = (usize, f64);
+pub(super) type CurveParameter = (usize, f64);
 
 /// The part of the line between two control points: the cubic a + x (b + x (c + x d)), 0 ≤ x ≤ `long`. A line that does not
 /// close has one more before its start and after its end, which go straight on for ever: c = d = 0, and `long` is zero.
@@ -93,7 +93,7 @@ impl Span {
 /// A sample point of the line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SamplePoint {
-    pub place: Place,
+    pub place: CurveParameter,
     pub position: Vec3,
     pub tangent: Vec3,
     /// The curvature vector, per mm.
@@ -106,7 +106,7 @@ pub(super) struct SamplePoint {
 
 /// A line with a frame at each point.
 #[derive(Clone, Debug)]
-pub(super) struct Line {
+pub(super) struct FramedCurve {
     pub closed: bool,
     pub spans: Vec<Span>,
     pub sample_points: Vec<SamplePoint>,
@@ -115,15 +115,15 @@ pub(super) struct Line {
     /// Rotation of the frame about the line, radians per mm.
     pub twist: f64,
     /// Polynomials of fifth degree that have values and two derivatives at the sample points, by powers.
-    pieces: Vec<[Row; 6]>,
+    pieces: Vec<[CurveTableRow; 6]>,
 }
 
-impl Line {
+impl FramedCurve {
     /// A line through points, its first normal nearest to `normal`.
     ///
     /// # Errors
     /// Neighbours that coincide, a normal along the line.
-    pub fn new(points: &[Vec3], closed: bool, normal: Option<Vec3>) -> Result<Line, Fault> {
+    pub fn new(points: &[Vec3], closed: bool, normal: Option<Vec3>) -> Result<FramedCurve, Fault> {
         let mut spans = spline(points, closed)?;
         if !closed {
             let end = &spans[spans.len() - 1];
@@ -135,7 +135,7 @@ impl Line {
             spans.push(Span::ray(position, slope, [0.0, f64::INFINITY], count + 1));
         }
         let (sample_points, pieces) = (Vec::new(), Vec::new());
-        let mut line = Line { closed, spans, sample_points, length: 0.0, twist: 0.0, pieces };
+        let mut line = FramedCurve { closed, spans, sample_points, length: 0.0, twist: 0.0, pieces };
         line.sample_points = line.walked(normal)?;
         let (first, last) = (line.sample_points[0], line.sample_points[line.sample_points.len() - 1]);
         line.length = last.s;
@@ -163,7 +163,7 @@ impl Line {
 
     /// The sample points: positions, arc lengths and frames. The last has the place of the first on a line that closes.
     fn walked(&self, normal: Option<Vec3>) -> Result<Vec<SamplePoint>, Fault> {
-        let sample = |(span, x): Place| {
+        let sample = |(span, x): CurveParameter| {
             let (position, first, second) = self.spans[span].at(x);
             let tangent = unit(first);
             let bend = scale(sub(second, scale(tangent, dot(second, tangent))), 1.0 / dot(first, first));
@@ -198,8 +198,8 @@ impl Line {
         Ok(all)
     }
 
-    fn tabulated(&self) -> Vec<[Row; 6]> {
-        let mut pieces: Vec<[Row; 6]> = Vec::new();
+    fn tabulated(&self) -> Vec<[CurveTableRow; 6]> {
+        let mut pieces: Vec<[CurveTableRow; 6]> = Vec::new();
         let straight = |sample: &SamplePoint, span: usize| {
             let [value, first, _] = self.frame(sample, span, 0.0);
             [value, first, [0.0; 8], [0.0; 8], [0.0; 8], [0.0; 8]]
@@ -222,7 +222,7 @@ impl Line {
     ///
     /// With v = |c′| a frame that does not rotate about the line has N′ = −(N·T′) T; with a twist N₁′ is v · twist · N₂ more,
     /// and N₂′ as much N₁ less.
-    fn frame(&self, sample: &SamplePoint, span: usize, x: f64) -> [Row; 3] {
+    fn frame(&self, sample: &SamplePoint, span: usize, x: f64) -> [CurveTableRow; 3] {
         let (_, slope, second) = self.spans[span].at(x);
         let third = scale(self.spans[span].cubic[3], 6.0);
         let (v, t) = (norm(slope), unit(slope));
@@ -247,7 +247,7 @@ impl Line {
 
     /// N₁, N₂ and the arc length.
     #[inline(always)]
-    pub fn row(&self, (span, x): Place) -> Row {
+    pub fn row(&self, (span, x): CurveParameter) -> CurveTableRow {
         let span = &self.spans[span];
         let k = ((x * span.per_piece) as usize).min(span.more);
         let y = x - k as f64 * span.piece;
@@ -262,7 +262,7 @@ impl Line {
     }
 
     /// Where the arc length is s.
-    pub fn at_length(&self, s: f64) -> Place {
+    pub fn at_length(&self, s: f64) -> CurveParameter {
         let last = self.sample_points.len() - 1;
         let (span, mut x) = match self.closed {
             false if s < 0.0 => (0, 0.0),
@@ -277,7 +277,7 @@ impl Line {
 }
 
 /// The polynomial of fifth degree with these values and first and second derivatives at 0 and h, by powers.
-fn quintic(h: f64, [f, df, ddf]: [Row; 3], [g, dg, ddg]: [Row; 3]) -> [Row; 6] {
+fn quintic(h: f64, [f, df, ddf]: [CurveTableRow; 3], [g, dg, ddg]: [CurveTableRow; 3]) -> [CurveTableRow; 6] {
     let mut powers = [f, df, ddf.map(|v| 0.5 * v), [0.0; 8], [0.0; 8], [0.0; 8]];
     for i in 0..8 {
         // What is missing at h.

@@ -2,13 +2,13 @@
 //! tears, and the refusal of regions in which it does.
 
 use super::Sweep;
-use super::line::{FINE, Line, SamplePoint};
+use super::line::{FINE, FramedCurve, SamplePoint};
 use crate::field::Field;
 use crate::map::Mapping;
 use geometry::fault::{Fault, position};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
-impl Line {
+impl FramedCurve {
     /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at
     /// most the least radius of curvature and half the width of the narrowest bottleneck. Open lines are followed `far` (mm)
     /// beyond their ends.

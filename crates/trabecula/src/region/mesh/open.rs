@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
 use crate::region::moved::Moved;
-use crate::region::{HalfSpace, Offset, OpenSurface, Region, Shape, halving};
+use crate::region::{HalfSpace, Offset, OpenSurface, Region, SignedDistance, halving};
 use geometry::distance::UNKNOWN;
 use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
@@ -134,7 +134,7 @@ impl Field for OpenMesh {
     }
 }
 
-impl Shape for OpenMesh {
+impl SignedDistance for OpenMesh {
     fn bounds(&self) -> Aabb {
         self.whole.bounds
     }

@@ -2,7 +2,7 @@ use super::*;
 use crate::csg_tree::CsgSolid;
 use crate::field::{Block, Field};
 use crate::region::tests::check_shape;
-use crate::region::{Cuboid, Cylinder, Difference, MeshRegion, Shape, Sphere};
+use crate::region::{Cuboid, Cylinder, Difference, MeshRegion, SignedDistance, Sphere};
 use geometry::math::{Aabb, norm};
 use geometry::mesh::Mesh;
 use geometry::random::random;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::Work;
+use super::MeshingContext;
 use crate::cell::Part;
 use crate::tiling::Tiling;
 use crate::tiling::mixture::{Size, weights};
@@ -65,7 +65,7 @@ impl Bending {
 
 impl InSteps {
     fn new(tiling: &Tiling, n: usize) -> Option<InSteps> {
-        let work = Work::in_steps(tiling, n).ok()?;
+        let work = MeshingContext::in_steps(tiling, n).ok()?;
         let touched = work.bent_nodes()?.touched(&tiling.map);
         let count = touched.len().min(TETS);
         let size = Size::new(&tiling.cells, n);
@@ -96,7 +96,7 @@ impl InSteps {
     }
 }
 
-fn bent_tet(work: &Work, size: &Size, t: usize) -> BentTet {
+fn bent_tet(work: &MeshingContext, size: &Size, t: usize) -> BentTet {
     let (map, nodes) = (&work.tiling.map, &work.cells[0].0);
     let corners = map.corners(t);
     let place = |k: &[u16; 4]| -> Vec3 {

@@ -12,9 +12,9 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::small_simplices::{Small, Template};
-use crate::cell::tet::{Nodes, Subdivision};
-use crate::map::Tets;
-use crate::map::bent_tets::{BoundaryEdge, Curves};
+use crate::cell::tet::{Subdivision, SubdivisionNodes};
+use crate::map::CarrierMesh;
+use crate::map::bent_tets::{Curves, SurfaceEdge};
 use crate::map::surface_feet::{edge_feet, feet_facing};
 use crate::map::tet_map::NONE;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -66,7 +66,7 @@ fn along(of: &[Vec3], x: f64) -> Vec3 {
 
 impl BentNodes {
     /// The moves for small tetrahedra of a template; `None` if the mesh is not bent.
-    pub fn new(map: &Tets, nodes: &Nodes, template: &Template) -> Option<BentNodes> {
+    pub fn new(map: &CarrierMesh, nodes: &SubdivisionNodes, template: &Template) -> Option<BentNodes> {
         let curves = map.curves()?;
         let n = nodes.grid.n;
         let found: Vec<Vec<([u32; 2], Vec<Vec3>)>> =
@@ -79,7 +79,7 @@ impl BentNodes {
 
     /// Reduces moves until no small tetrahedron is turned over: of the nodes of faces first, then of edges, after which the
     /// tetrahedra around these are checked again.
-    fn make_sound(&mut self, map: &Tets, nodes: &Nodes, template: &Template) {
+    fn make_sound(&mut self, map: &CarrierMesh, nodes: &SubdivisionNodes, template: &Template) {
         let mut halvings: HashMap<[u32; 2], usize> = HashMap::new();
         let mut left = self.touched(map);
         loop {
@@ -114,19 +114,19 @@ impl BentNodes {
     }
 
     /// The tetrahedra in which nodes may be moved.
-    pub fn touched(&self, map: &Tets) -> Vec<usize> {
+    pub fn touched(&self, map: &CarrierMesh) -> Vec<usize> {
         let touched = |t: &usize| map.across(*t).contains(&NONE) || self.edges_of(map, *t) != 0;
         (0..map.len()).filter(touched).collect()
     }
 
     /// The edges of a tetrahedron that are moved, a bit for each.
-    fn edges_of(&self, map: &Tets, t: usize) -> u8 {
+    fn edges_of(&self, map: &CarrierMesh, t: usize) -> u8 {
         let keys = keys(map, t);
         (0..6).fold(0, |m, e| m | u8::from(self.edges.contains_key(&keys[e])) << e)
     }
 
     /// The nodes of the small tetrahedra; `None` where nothing is moved.
-    pub fn places(&self, map: &Tets, t: usize, nodes: &Nodes) -> Option<Places> {
+    pub fn places(&self, map: &CarrierMesh, t: usize, nodes: &SubdivisionNodes) -> Option<Places> {
         let (keys, corners, n) = (keys(map, t), map.corners(t), self.n as f64);
         let moves: [Option<&Vec<Vec3>>; 6] = core::array::from_fn(|e| self.edges.get(&keys[e]));
         let edges = self.edges_of(map, t);
@@ -155,7 +155,13 @@ impl BentNodes {
     }
 
     /// The moves of the inner nodes of a face on to the surface, by node; `None` if they are on it.
-    fn face_moves(&self, map: &Tets, face: usize, nodes: &Nodes, at: &[Vec3]) -> Option<HashMap<usize, Vec3>> {
+    fn face_moves(
+        &self,
+        map: &CarrierMesh,
+        face: usize,
+        nodes: &SubdivisionNodes,
+        at: &[Vec3],
+    ) -> Option<HashMap<usize, Vec3>> {
         let inner = |k: &[u16; 4]| (0..4).all(|i| (k[i] == 0) == (i == face));
         let on: Vec<usize> = (0..at.len()).filter(|i| inner(&nodes.whole[*i])).collect();
         let points: Vec<Vec3> = on.iter().map(|i| at[*i]).collect();
@@ -181,7 +187,7 @@ impl BentNodes {
     }
 
     /// Moves all nodes by the moves of a face, fading out towards the corner opposite.
-    fn fade(&self, face: usize, nodes: &Nodes, moves: &HashMap<usize, Vec3>, at: &mut [Vec3]) {
+    fn fade(&self, face: usize, nodes: &SubdivisionNodes, moves: &HashMap<usize, Vec3>, at: &mut [Vec3]) {
         let n = self.n as f64;
         let others: Vec<usize> = (0..4).filter(|i| *i != face).collect();
         let index = |a: usize, b: usize| {
@@ -212,13 +218,13 @@ impl BentNodes {
 }
 
 /// The edges of a tetrahedron by their nodes.
-fn keys(map: &Tets, t: usize) -> [[u32; 2]; 6] {
+fn keys(map: &CarrierMesh, t: usize) -> [[u32; 2]; 6] {
     let ids = map.tet(t);
     EDGES.map(|[i, j]| [ids[i], ids[j]])
 }
 
 /// The moves of the nodes of some edges, of those that are moved.
-fn edge_moves(map: &Tets, curves: &Curves, some: &[BoundaryEdge], n: usize) -> Vec<([u32; 2], Vec<Vec3>)> {
+fn edge_moves(map: &CarrierMesh, curves: &Curves, some: &[SurfaceEdge], n: usize) -> Vec<([u32; 2], Vec<Vec3>)> {
     let (mut points, mut faces) = (Vec::new(), Vec::new());
     for e in some {
         let [a, b] = e.nodes.map(|v| map.nodes()[v as usize]);

@@ -4,8 +4,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::tet_surface::{NONE as NOBODY, Run, TetSurface};
-use crate::map::Tets;
+use super::tet_surface::{ComponentRun, NONE as NOBODY, TetSurface};
+use crate::map::CarrierMesh;
 use crate::map::tet_map::NONE;
 use crate::surface_maker::{ComponentGraph, Totals};
 use geometry::fault::{Fault, position};
@@ -17,9 +17,9 @@ use geometry::union_find::{find, unite};
 pub(super) struct ComponentLinks {
     graph: ComponentGraph,
     /// Runs on faces, by the tetrahedron and the corner on their other side.
-    faces: HashMap<(u32, u8), Vec<Run>>,
+    faces: HashMap<(u32, u8), Vec<ComponentRun>>,
     /// Runs of caps on edges of the boundary, by their nodes.
-    boundary_edges: HashMap<[u32; 2], Vec<Run>>,
+    boundary_edges: HashMap<[u32; 2], Vec<ComponentRun>>,
     /// Edges and nodes whose vertices are counted.
     edges: HashSet<[u32; 2]>,
     nodes: HashSet<u32>,
@@ -29,7 +29,7 @@ impl ComponentLinks {
     /// Adds the next tetrahedron with the totals of its surface components.
     pub fn add(
         &mut self,
-        map: &Tets,
+        map: &CarrierMesh,
         t: usize,
         mask: u8,
         tet_surface: &TetSurface,
@@ -42,8 +42,8 @@ impl ComponentLinks {
         for (b, solid) in tet_surface.solid_of.iter().enumerate() {
             unite(&mut self.graph.solid, (base + b) as u32, inner(*solid));
         }
-        let named = |runs: &[Run]| -> Vec<Run> {
-            let one = |r: &Run| Run { surface: surface(r.surface), solid: inner(r.solid), ..*r };
+        let named = |runs: &[ComponentRun]| -> Vec<ComponentRun> {
+            let one = |r: &ComponentRun| ComponentRun { surface: surface(r.surface), solid: inner(r.solid), ..*r };
             runs.iter().map(one).collect()
         };
         let across = map.across(t);
@@ -112,7 +112,7 @@ impl ComponentLinks {
     }
 
     /// Joins what two tetrahedra have at the same points in the same order.
-    fn join(&mut self, a: &[Run], b: &[Run]) {
+    fn join(&mut self, a: &[ComponentRun], b: &[ComponentRun]) {
         let (mut a, mut b) = (a.iter().copied(), b.iter().copied());
         let (mut x, mut y) = (a.next(), b.next());
         while let (Some(r), Some(s)) = (&mut x, &mut y) {
@@ -150,7 +150,7 @@ impl ComponentLinks {
 }
 
 /// Refuses a mesh whose boundary is no manifold: where tetrahedra meet in an edge or a node alone, solids would touch there.
-pub(super) fn manifold(map: &Tets) -> Result<(), Fault> {
+pub(super) fn manifold(map: &CarrierMesh) -> Result<(), Fault> {
     let boundary = map.boundary();
     let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
     for t in &boundary.triangles {

@@ -9,11 +9,11 @@ use std::collections::{BTreeMap, HashMap};
 use rayon::prelude::*;
 
 use super::component_links::ComponentLinks;
-use super::tet_surface::{Scratch, TetSurface};
-use super::{TetSurfaceRef, Work};
+use super::tet_surface::{TetBuffers, TetSurface};
+use super::{MeshingContext, TetSurfaceRef};
 use crate::map::tet_map::NONE;
 use crate::surface_maker::Totals;
-use crate::tiling::{Level, Tiling};
+use crate::tiling::{NodalLevel, Tiling};
 
 /// Steps along the edge of a tetrahedron, and finer ones at which pieces are counted again: necks thinner than a step part.
 const STEPS: usize = 16;
@@ -78,7 +78,7 @@ pub fn steps_enough(tiling: &Tiling, least: usize) -> Option<usize> {
 /// The connectivity on a subdivision of `n` steps.
 fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
     let most = if tiling.map.overlap() > 0.0 { MOST_BLENDED } else { MOST } / n.pow(3);
-    let work = Work::in_steps(tiling, n).ok()?;
+    let work = MeshingContext::in_steps(tiling, n).ok()?;
     let map = &tiling.map;
     if map.overlap() > 0.0 {
         // Overlapping tetrahedra need positions, which are found in parallel themselves.
@@ -96,7 +96,7 @@ fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
             return None;
         }
     }
-    let surface = |scratch: &mut Scratch, t: &usize| {
+    let surface = |scratch: &mut TetBuffers, t: &usize| {
         let made = match work.tet_surface(*t, scratch) {
             TetSurfaceRef::Own(surface) => *surface,
             TetSurfaceRef::Shared(surface) => surface.clone(),
@@ -104,7 +104,7 @@ fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
         // Without positions.
         TetSurface { vertices: Vec::new(), triangles: Vec::new(), ..made }
     };
-    let surfaces: Vec<TetSurface> = firsts.par_iter().map_init(Scratch::default, surface).collect();
+    let surfaces: Vec<TetSurface> = firsts.par_iter().map_init(TetBuffers::default, surface).collect();
     let mut links = ComponentLinks::default();
     // For each component of the solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
@@ -165,7 +165,7 @@ fn numbers(tiling: &Tiling, t: usize) -> Vec<u64> {
         out.push(t as u64);
         return out;
     }
-    if let Level::Nodes(of) = &tiling.level {
+    if let NodalLevel::Nodes(of) = &tiling.level {
         out.extend(at(of));
     }
     for c in &tiling.cells {

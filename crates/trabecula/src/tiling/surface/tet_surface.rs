@@ -13,7 +13,7 @@
 use super::cubic_root::first_root;
 use super::small_simplices::{Template, Tile, pair};
 use crate::cell::Part;
-use crate::cell::tet::{Bary, Nodes};
+use crate::cell::tet::{Bary, SubdivisionNodes};
 use geometry::tetmesh::{EDGES, FACES};
 use geometry::union_find::{find, unite};
 
@@ -25,16 +25,16 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// A run of consecutive points that belong to one component of the surface (`NONE`: to none) and one of the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Run {
+pub(super) struct ComponentRun {
     pub count: u32,
     pub surface: u32,
     pub solid: u32,
 }
 
-fn push(runs: &mut Vec<Run>, surface: u32, solid: u32) {
+fn push(runs: &mut Vec<ComponentRun>, surface: u32, solid: u32) {
     match runs.last_mut() {
         Some(r) if (r.surface, r.solid) == (surface, solid) => r.count += 1,
-        _ => runs.push(Run { count: 1, surface, solid }),
+        _ => runs.push(ComponentRun { count: 1, surface, solid }),
     }
 }
 
@@ -60,46 +60,46 @@ pub(super) struct TetSurface {
     /// The component of the solid that each component of the surface bounds.
     pub solid_of: Vec<u32>,
     /// On each closed face, all corners, then all solid nodes.
-    pub faces: [Vec<Run>; 4],
+    pub faces: [Vec<ComponentRun>; 4],
     /// On each closed edge, all vertices of caps.
-    pub boundary_edges: [Vec<Run>; 6],
+    pub boundary_edges: [Vec<ComponentRun>; 6],
 }
 
 /// Input of the cut: f and the level at the nodes, and the change of f along the edges by its slope at both ends.
 pub(super) struct Core<'a> {
     pub values: &'a [f64],
     pub slopes: &'a [[f64; 2]],
-    pub levels: Levels<'a>,
+    pub levels: CornerLevels<'a>,
 }
 
 /// The level at the nodes.
 #[derive(Clone, Copy)]
-pub(super) enum Levels<'a> {
+pub(super) enum CornerLevels<'a> {
     Same(f64),
     Each(&'a [f64]),
 }
 
-impl Levels<'_> {
+impl CornerLevels<'_> {
     #[inline]
     fn at(&self, node: u32) -> f64 {
         match self {
-            Levels::Same(t) => *t,
-            Levels::Each(t) => t[node as usize],
+            CornerLevels::Same(t) => *t,
+            CornerLevels::Each(t) => t[node as usize],
         }
     }
 }
 
 /// One inequality: f against `sign` · t.
 #[derive(Clone, Copy)]
-struct Side {
+struct LevelInequality {
     sign: f64,
     below: bool,
 }
 
-fn sides(part: Part) -> &'static [Side] {
-    const BELOW: Side = Side { sign: 1.0, below: true };
-    const ABOVE: Side = Side { sign: 1.0, below: false };
-    const BACK: Side = Side { sign: -1.0, below: false };
+fn sides(part: Part) -> &'static [LevelInequality] {
+    const BELOW: LevelInequality = LevelInequality { sign: 1.0, below: true };
+    const ABOVE: LevelInequality = LevelInequality { sign: 1.0, below: false };
+    const BACK: LevelInequality = LevelInequality { sign: -1.0, below: false };
     match part {
         Part::Lower => &[BELOW],
         Part::Upper => &[ABOVE],
@@ -109,7 +109,7 @@ fn sides(part: Part) -> &'static [Side] {
 
 /// Buffers, used for one tetrahedron after another.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(super) struct TetBuffers {
     /// The vertex on each edge for each side.
     corner: Vec<[u32; 2]>,
     /// The vertex at each node.
@@ -124,12 +124,12 @@ pub(super) struct Scratch {
 impl TetSurface {
     /// Cuts the tetrahedron; `mask` has a bit for each face that is to be capped.
     pub fn new(
-        nodes: &Nodes,
+        nodes: &SubdivisionNodes,
         template: &Template,
         core: &Core,
         part: Part,
         mask: u8,
-        scratch: &mut Scratch,
+        scratch: &mut TetBuffers,
     ) -> TetSurface {
         let sides = sides(part);
         let mut out = TetSurface::default();
@@ -180,7 +180,14 @@ impl TetSurface {
     }
 
     /// The corners on the edges.
-    fn corners(&mut self, nodes: &Nodes, template: &Template, core: &Core, sides: &[Side], scratch: &mut Scratch) {
+    fn corners(
+        &mut self,
+        nodes: &SubdivisionNodes,
+        template: &Template,
+        core: &Core,
+        sides: &[LevelInequality],
+        scratch: &mut TetBuffers,
+    ) {
         let n = nodes.grid.n as f64;
         for (e, [a, b]) in template.edges.iter().enumerate() {
             let crossed = |s: usize| scratch.below[s][*a as usize] != scratch.below[s][*b as usize];
@@ -228,7 +235,7 @@ impl TetSurface {
     }
 
     /// The triangles in the small tetrahedra.
-    fn cut(&mut self, template: &Template, sides: &[Side], scratch: &mut Scratch) {
+    fn cut(&mut self, template: &Template, sides: &[LevelInequality], scratch: &mut TetBuffers) {
         let count = self.vertices.len() as u32;
         scratch.surface.clear();
         scratch.surface.extend(0..count);
@@ -268,7 +275,7 @@ impl TetSurface {
     }
 
     /// The solid's trace on a face: a polygon in each tile, its corners on the tile's edges in order.
-    fn cap(&mut self, tiles: &[Tile], sides: &[Side], scratch: &mut Scratch) {
+    fn cap(&mut self, tiles: &[Tile], sides: &[LevelInequality], scratch: &mut TetBuffers) {
         for tile in tiles {
             let mut around = [NONE; 6];
             let mut n = 0;
@@ -305,7 +312,7 @@ impl TetSurface {
     }
 
     /// Numbers the components, sorts triangles by component, and lists the runs on faces and on edges of the boundary.
-    fn sort(&mut self, template: &Template, mask: u8, scratch: &mut Scratch) {
+    fn sort(&mut self, template: &Template, mask: u8, scratch: &mut TetBuffers) {
         let count = self.vertices.len();
         for (n, v) in scratch.node.iter().enumerate() {
             if *v != NONE {

@@ -7,10 +7,10 @@
 use rayon::prelude::*;
 
 use super::small_simplices::Template;
-use super::tet_surface::{Core, Levels, Scratch, TetSurface};
+use super::tet_surface::{Core, CornerLevels, TetBuffers, TetSurface};
 use crate::cell::Part;
-use crate::cell::tet::Nodes;
-use crate::tiling::{Level, Tiling};
+use crate::cell::tet::SubdivisionNodes;
+use crate::tiling::{NodalLevel, Tiling};
 
 /// Levels at which a shift is found where they vary; between them it is linear.
 const KNOTS: usize = 5;
@@ -23,7 +23,7 @@ const SHEET: f64 = 0.75;
 
 /// A cell on small tetrahedra: its values there and its slopes along their edges, as [`Core`] has them.
 pub(super) struct Stencil<'a> {
-    pub nodes: &'a Nodes,
+    pub nodes: &'a SubdivisionNodes,
     pub template: &'a Template,
     pub values: &'a [f64],
     pub slopes: &'a [[f64; 2]],
@@ -31,11 +31,11 @@ pub(super) struct Stencil<'a> {
 
 impl Stencil<'_> {
     /// The levels of a lattice of one cell, shifted.
-    pub fn shifted(&self, tiling: &Tiling) -> Level {
+    pub fn shifted(&self, tiling: &Tiling) -> NodalLevel {
         let of = |t: f64| self.shifted_level(tiling, t);
         match &tiling.level {
-            Level::Same(t) => Level::Same(of(*t)),
-            Level::Nodes(levels) => {
+            NodalLevel::Same(t) => NodalLevel::Same(of(*t)),
+            NodalLevel::Nodes(levels) => {
                 let range = tiling.levels();
                 let step = (range.hi - range.lo) / (KNOTS - 1) as f64;
                 let knots = (0..KNOTS).into_par_iter().map(|i| {
@@ -51,7 +51,7 @@ impl Stencil<'_> {
                     let i = (at as usize).min(KNOTS - 2);
                     shifts[i] + (at - i as f64) * (shifts[i + 1] - shifts[i])
                 };
-                Level::Nodes(levels.iter().map(|t| t + shift(*t)).collect::<Vec<f64>>().into())
+                NodalLevel::Nodes(levels.iter().map(|t| t + shift(*t)).collect::<Vec<f64>>().into())
             }
         }
     }
@@ -71,7 +71,7 @@ impl Stencil<'_> {
         if !(1e-6..1.0 - 1e-6).contains(&wanted) || rate.abs() < 1e-3 / width {
             return t;
         }
-        let mut scratch = Scratch::default();
+        let mut scratch = TetBuffers::default();
         let (mut level, mut best) = (t, (f64::INFINITY, t));
         for _ in 0..ROUNDS {
             let off = wanted - self.enclosed(tiling, level, &mut scratch);
@@ -87,8 +87,8 @@ impl Stencil<'_> {
     }
 
     /// The share of a tetrahedron that the surface at a level encloses with caps on all faces.
-    fn enclosed(&self, tiling: &Tiling, level: f64, scratch: &mut Scratch) -> f64 {
-        let core = Core { values: self.values, slopes: self.slopes, levels: Levels::Same(level) };
+    fn enclosed(&self, tiling: &Tiling, level: f64, scratch: &mut TetBuffers) -> f64 {
+        let core = Core { values: self.values, slopes: self.slopes, levels: CornerLevels::Same(level) };
         let surface = TetSurface::new(self.nodes, self.template, &core, tiling.part, 15, scratch);
         // Six times the volume, by three of the coordinates; six times that of the tetrahedron is one.
         let cone = |v: &[u32; 3]| {

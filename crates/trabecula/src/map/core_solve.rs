@@ -1,16 +1,16 @@
 //! Cores of singular lines: what covers the place at which no lattice is without a flaw.
 
 use super::branch_cuts::BranchCuts;
-use super::branched_solve::{Branched, Numbers};
+use super::branched_solve::{Branched, FreeIntegers};
 use super::core_branches::{labels, rotations};
-use super::core_cover::{CoreFill, Covering};
 use super::cut_cells::{self, CutCells};
 use super::edge_squares::weights;
-use super::pace;
+use super::grid_choice;
 use super::periods::{least, nearest};
 use super::phase_candidate::Candidate;
 use super::phase_request::{PhaseRequest, SolverOptions};
 use super::phase_target::{LEAST_ROOT, SolveDomain, Target, wavelengths};
+use super::singular_core::{CoreFill, CoreOptions};
 use super::singular_lines::{FrameEquivalence, SingularLine, singular_lines};
 use super::solution::Solution;
 use super::solution_quality::{SolutionQuality, fold_at_node, fold_between};
@@ -50,7 +50,7 @@ pub(super) struct Covered {
     pub cores: Cores,
 }
 
-impl Covering {
+impl CoreOptions {
     /// The map outside the cores of `lines`, which are those on a coarser grid; `None` where a finer one has none.
     pub(super) fn solve(
         &self,
@@ -62,7 +62,7 @@ impl Covering {
         refuse(wanted)?;
         let radius = self.radius(wanted, lines)?;
         let step = settings.step.unwrap_or(coarse).min(radius / FINE);
-        let chosen = pace::choose(bounds, wanted, Some(step), settings.region)
+        let chosen = grid_choice::choose(bounds, wanted, Some(step), settings.region)
             .map_err(|f| if f.at == "step" { too_fine(radius) } else { f })?;
         let domain = SolveDomain::over(bounds, chosen.grid.padded(PADDING), wanted, settings.region)?;
         checkpoint();
@@ -251,7 +251,7 @@ fn found(
         let (half, nodes) = domain.grid.halved();
         let k = target.k.each_ref().map(|k| nodes.iter().map(|n| k[*n]).collect());
         let roots: Vec<f64> = nodes.iter().map(|n| roots[*n]).collect();
-        Numbers::new(&half, &k, weights(half, &roots, None), &mut cuts.at(&nodes))
+        FreeIntegers::new(&half, &k, weights(half, &roots, None), &mut cuts.at(&nodes))
     };
     let asked = least(&numbers.form, numbers.free.len());
     let part = OutsideTube { region: settings.region, tube };

@@ -12,12 +12,12 @@
 use rayon::prelude::*;
 
 use super::grid_cells::GridCells;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
 /// The part of the weight that is no multiple of the identity.
-pub(super) struct Tilt {
-    grid: Grid,
+pub(super) struct AngleWeight {
+    grid: PhaseGrid,
     cells: GridCells,
     /// For each cell K̂ and what the part counts.
     of: Vec<(Vec3, f64)>,
@@ -25,17 +25,17 @@ pub(super) struct Tilt {
     across: bool,
 }
 
-impl Tilt {
+impl AngleWeight {
     /// For the wanted gradient `k` at the nodes, `ratio` between an error of angle and one of spacing, and the roots `s` of the
     /// nodes' weights. `None` where both count alike.
-    pub fn new(grid: Grid, k: &[Vec3], ratio: f64, s: &[f64]) -> Option<Tilt> {
+    pub fn new(grid: PhaseGrid, k: &[Vec3], ratio: f64, s: &[f64]) -> Option<AngleWeight> {
         if ratio == 1.0 {
             return None;
         }
         let cells = GridCells::new(grid);
         let across = ratio > 1.0;
         let more = if across { ratio } else { 1.0 / ratio } - 1.0;
-        let mut tilt = Tilt { grid, cells, of: Vec::new(), across };
+        let mut tilt = AngleWeight { grid, cells, of: Vec::new(), across };
         let each = (0..tilt.cells.len()).into_par_iter().map(|c| {
             let near = tilt.cells.corners(c);
             let wanted = near.iter().fold([0.0; 3], |m, n| add(m, k[*n]));

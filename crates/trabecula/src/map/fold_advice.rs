@@ -1,6 +1,6 @@
 //! What is advised where a map folds, or where directions wind round lines that no core covers.
 
-use super::covering;
+use super::core_solve;
 use super::frame::Orientation;
 use super::phase_request::PhaseRequest;
 use super::singular_lines::{FrameEquivalence, SingularLine};
@@ -22,12 +22,12 @@ impl PhaseRequest {
     /// How the lines can be covered, if they can.
     fn cover(&self, singular: &[SingularLine]) -> Option<String> {
         let served = !singular.is_empty()
-            && singular.len() <= covering::MOST
+            && singular.len() <= core_solve::MOST
             && self.core.is_none()
             && !matches!(self.alike(), FrameEquivalence::Line)
             && !singular.iter().any(SingularLine::is_closed);
         let lines = if singular.len() == 1 { "the line" } else { "the lines" };
-        served.then(|| match covering::refuse(self) {
+        served.then(|| match core_solve::refuse(self) {
             Ok(()) => format!("cover {lines} with core = \"solid\" or \"void\""),
             Err(clash) => format!("cover {lines} with core = \"solid\" or \"void\" in place of {}", clash.at),
         })

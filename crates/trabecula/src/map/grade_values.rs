@@ -5,7 +5,11 @@ use geometry::fault::{Fault, number, position};
 use geometry::math::Vec3;
 
 /// Values of several grades at points: one tuple for each point.
-pub(super) fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
+pub(super) fn grade_values<const N: usize>(
+    of: &[Grade; N],
+    points: &[Vec3],
+    key: &str,
+) -> Result<Vec<[f64; N]>, Fault> {
     let mut out = vec![[0.0; N]; points.len()];
     let mut values = vec![0.0; points.len()];
     for (c, grade) in of.iter().enumerate() {

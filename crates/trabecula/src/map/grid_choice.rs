@@ -6,7 +6,7 @@
 //! K can hide from it: the nodes' own shows at the second.
 
 use super::frame::Orientation;
-use super::phase_grid::Grid;
+use super::phase_grid::PhaseGrid;
 use super::phase_request::PhaseRequest;
 use super::phase_target::wavelengths;
 use super::spline;
@@ -34,10 +34,10 @@ const FALSE: [f64; 2] = [0.2, 0.1];
 const HALVINGS: usize = 6;
 
 /// The grid, and what it misses.
-pub(super) struct Chosen {
-    pub grid: Grid,
+pub(super) struct ChosenGrid {
+    pub grid: PhaseGrid,
     /// A target that varies faster than cells of this size can, in words.
-    pub hasty: Option<String>,
+    pub undersampled: Option<String>,
     /// A target that has little to do with what the nodes see.
     lost: Option<Fault>,
 }
@@ -48,14 +48,14 @@ pub(super) fn choose(
     wanted: &PhaseRequest,
     step: Option<f64>,
     region: Option<&dyn Field>,
-) -> Result<Chosen, Fault> {
+) -> Result<ChosenGrid, Fault> {
     let first = start(bounds, wanted, step)?;
     let Some(probe) = Probe::new(bounds, wanted, region)? else {
-        return Ok(Chosen { grid: first, hasty: None, lost: None });
+        return Ok(ChosenGrid { grid: first, undersampled: None, lost: None });
     };
     let missed = probe.missed(first.step)?;
     if !missed.iter().any(SamplingError::much) {
-        return Ok(Chosen { grid: first, hasty: None, lost: None });
+        return Ok(ChosenGrid { grid: first, undersampled: None, lost: None });
     }
     let (grid, left) = probe.refined(bounds, first, missed)?;
     // In words: of the axis along which most is missed.
@@ -81,18 +81,18 @@ pub(super) fn choose(
         wrong.then(|| Fault::new(missed[axis].key, message))
     };
     if step.is_some() {
-        let hasty = format!("{what}: between its nodes the map follows the target roughly; {remedy}");
-        return Ok(Chosen { grid: first, hasty: Some(hasty), lost: lost(&missed) });
+        let undersampled = format!("{what}: between its nodes the map follows the target roughly; {remedy}");
+        return Ok(ChosenGrid { grid: first, undersampled: Some(undersampled), lost: lost(&missed) });
     }
     let [x, y, z] = grid.step.map(|h| number((h * 1e4).round() / 1e4));
-    let hasty = format!(
+    let undersampled = format!(
         "{what}; the phases are solved with steps of {x}, {y} and {z} mm, but cells can hardly follow what varies within them: let it \
          vary more slowly, or use smaller cells"
     );
-    Ok(Chosen { grid, hasty: Some(hasty), lost: lost(&left) })
+    Ok(ChosenGrid { grid, undersampled: Some(undersampled), lost: lost(&left) })
 }
 
-impl Chosen {
+impl ChosenGrid {
     /// Refuses a target that has little to do with what the nodes see.
     pub fn refuse(&self) -> Result<(), Fault> {
         self.lost.clone().map_or(Ok(()), Err)
@@ -100,10 +100,10 @@ impl Chosen {
 }
 
 /// The grid that resolves the least wavelength, or has the requested spacing `step` (mm).
-fn start(bounds: &Aabb, wanted: &PhaseRequest, step: Option<f64>) -> Result<Grid, Fault> {
+fn start(bounds: &Aabb, wanted: &PhaseRequest, step: Option<f64>) -> Result<PhaseGrid, Fault> {
     let size = bounds.size();
     let coarse: Vec<Vec3> = {
-        let g = Grid::over(bounds, [13; 3]);
+        let g = PhaseGrid::over(bounds, [13; 3]);
         (0..g.len()).map(|n| g.node(n)).collect()
     };
     let all = wavelengths(&wanted.wavelength, &coarse)?;
@@ -129,21 +129,21 @@ fn start(bounds: &Aabb, wanted: &PhaseRequest, step: Option<f64>) -> Result<Grid
                     ),
                 ));
             }
-            Ok(Grid::over(bounds, shape(h)))
+            Ok(PhaseGrid::over(bounds, shape(h)))
         }
         None => {
             let mut h = (least / FINE).max((size.iter().product::<f64>() / NODES[0]).cbrt());
             while count(shape(h)) > 1.3 * NODES[0] {
                 h *= 1.05;
             }
-            Ok(Grid::over(bounds, shape(h)))
+            Ok(PhaseGrid::over(bounds, shape(h)))
         }
     }
 }
 
 /// The number of nodes along a side of length `s` (mm) that are at most `h` apart.
 fn nodes_along(s: f64, h: f64) -> usize {
-    Grid::handy(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST))
+    PhaseGrid::fft_friendly(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST))
 }
 
 fn count(shape: [usize; 3]) -> f64 {
@@ -292,9 +292,9 @@ impl<'a> Probe<'a> {
     fn refined(
         &self,
         bounds: &Aabb,
-        first: Grid,
+        first: PhaseGrid,
         missed: [SamplingError; 3],
-    ) -> Result<(Grid, [SamplingError; 3]), Fault> {
+    ) -> Result<(PhaseGrid, [SamplingError; 3]), Fault> {
         let (mut grid, mut missed) = (first, missed);
         let mut halvings = [0; 3];
         loop {
@@ -308,7 +308,7 @@ impl<'a> Probe<'a> {
             if count(shape) > NODES[0].max(count(first.shape)) {
                 return Ok((grid, missed));
             }
-            grid = Grid::over(bounds, shape);
+            grid = PhaseGrid::over(bounds, shape);
             missed[axis] = self.missed_along(axis, grid.step[axis])?;
             halvings[axis] += 1;
         }
@@ -316,7 +316,7 @@ impl<'a> Probe<'a> {
 }
 
 /// A region that is thinner than the grid resolves, `deepest` (mm) below its surface at most, in words.
-pub(super) fn thin(grid: &Grid, deepest: f64) -> Option<String> {
+pub(super) fn thin(grid: &PhaseGrid, deepest: f64) -> Option<String> {
     let (thick, step) = (2.0 * deepest, grid.step.into_iter().fold(f64::INFINITY, f64::min));
     if thick >= step {
         return None;
@@ -355,7 +355,7 @@ fn jumps(of: &Grade, [mut a, mut b]: [Vec3; 2]) -> bool {
 }
 
 /// Refuses wavelengths that jump between nodes, or whose variation the nodes do not resolve.
-pub(super) fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
+pub(super) fn check_pace(grid: &PhaseGrid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
     if of.iter().all(|g| g.constant().is_some()) {
         return Ok(());
     }

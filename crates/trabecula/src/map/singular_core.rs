@@ -14,7 +14,7 @@ pub enum CoreFill {
 
 /// How singular lines are covered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Covering {
+pub struct CoreOptions {
     /// What their cores are.
     pub fill: CoreFill,
     /// The radius of the cores, mm; half the wavelength at the lines if none.
