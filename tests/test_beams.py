@@ -365,7 +365,7 @@ CASES = [
     (but(OWN, nodes=[[0, 0]]), "nodes[0]", ["x, y, z"]),
     (but(OWN, nodes=[[0, 0, math.inf]]), "nodes[0][2]", ["finite", "inf"]),
     (but(OWN, nodes=[[1, 1, 5, 0], *SQUARE[1:]]), "nodes[0]", ["radius is 0"]),
-    (but(OWN, radius=None), "", ["no node has a radius"]),
+    (but(OWN, radius=None), "", ["no node has one"]),
     (but(OWN, map=GOOD["map"]), "map", ["nodes and map at once"]),
     (but(OWN, nodes="missing.csv"), "nodes", ["missing.csv"]),
     (
@@ -382,7 +382,7 @@ CASES = [
     (but(PATTERN, pattern=SWIRL | {"repeat": []}), "pattern.repeat", ["at least 1 item"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 0}]}), "pattern.repeat[0].count", ["at least 1"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 200, "scale": 0.5}]}), "pattern.repeat[0].scale", ["times as large"]),
-    ({}, "", ["exactly one of cell and map; nodes and struts; path; pattern"]),
+    ({}, "", ["exactly one of cell with map, nodes with struts, path, pattern"]),
 ]
 
 

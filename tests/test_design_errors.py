@@ -38,7 +38,7 @@ CASES = [
         "fraction = 0.3",
         "fraction = 0.3\niso = 0.2",
         LEVEL,
-        ["fraction and iso at once", "exactly one of thickness, pore, fraction"],
+        ["found fraction and iso", "exactly one of thickness, pore, fraction"],
     ),
     ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of thickness, pore, fraction"]),
     ("fraction = 0.3", "porosity = 0", f"{LEVEL}.porosity", ["porosity is 0", "greater than 0 and less than 1"]),
@@ -194,7 +194,7 @@ CASES = [
         "blend.between[1]",
         ["b", "core"],
     ),
-    ('units = "mm"', "beams.a.radius = 1", "beams.a", ["exactly one of cell and map; nodes and struts"]),
+    ('units = "mm"', "beams.a.radius = 1", "beams.a", ["exactly one of cell with map, nodes with struts"]),
     ("fraction = 0.3", f"fraction = 0.3\n[lattice.shell]\n{SHELL}", "lattice.shell", ["blend", "between"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]

@@ -237,7 +237,7 @@ def test_a_net_may_be_on_a_part_of_the_surface():
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     assert areas[middles > 1].sum() > 2 * areas[middles < -1].sum()
     for keys, words in (
-        ({"surface": "rounded", "net": {"radius": 1}}, 'there is a net with surface = "net" alone, found "rounded"'),
+        ({"surface": "rounded", "net": {"radius": 1}}, 'a net needs surface = "net", found "rounded"'),
         ({"surface": "net", "net": {"on": lt.region.sphere(radius=2)}}, "no triangle of the mesh's boundary has its middle"),
         ({"surface": "net", "net": {"radius": 6}}, "make up"),
         ({"surface": "nets"}, 'did you mean "net"'),

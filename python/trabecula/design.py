@@ -57,10 +57,10 @@ class Beams:
     "cone", "cylinder", {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v},
     {"alpha": v}, {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within ``merge`` (mm)
     are one. ``pattern``, instead of a cell or nodes and struts, is a program of repeats: ``nodes``, ``struts`` (two nodes
-    and how many repeats on the second lies) and ``repeat``, up to three steps {count, by, rotate, scale, about}. ``path``,
-    instead of these, is a file of another program (3mf, ltcx, csv, json, obj, vtu, vtk, inp, bdf, nas, txt), whose radii hold
-    unless ``radius``, ``hub`` or ``fraction`` is given; ``unit`` is that of its lengths, unless it names one, and ``scale`` a
-    factor on them.
+    and for each step the number of repeats from the first to the second) and ``repeat``, up to three steps {count, by,
+    rotate, scale, about}. ``path``, instead of these, is a file of another program (3mf, ltcx, csv, json, obj, vtu, vtk, inp,
+    bdf, nas, txt), whose radii hold unless ``radius``, ``hub`` or ``fraction`` is given; ``unit`` is that of its lengths,
+    unless it names one, and ``scale`` a factor on them.
     """
 
     cell: BeamName | None = None

@@ -82,7 +82,7 @@ class Simulated(Resolution):
         ``of``: ``"solid"``; ``"pore"``, the rest of the region; ``"lower"`` or ``"upper"``, the space on one side of a sheet;
         ``"all"``, the wall and both spaces of a sheet, else solid and pore, with common nodes.
 
-        ``periodic`` is for a box with whole cells: nodes and faces on opposite sides match in all bits.
+        ``periodic`` is for a box with whole cells: nodes and faces on opposite faces of the box match bit for bit.
 
         Crumbs, flat tetrahedra at the boundary, and places where it touches itself are left out, ``report().dropped`` is their
         volume. ``islands`` says what becomes of components other than the largest, which no support on that one holds:

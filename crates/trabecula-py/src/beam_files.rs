@@ -60,7 +60,7 @@ impl BeamCell {
     }
 }
 
-/// The formats of graphs, in the order in which texts name them: suffix, what it is, whether it is written.
+/// The formats of graphs, in the order in which texts name them: suffix and title, whether it is written.
 #[pyfunction]
 pub fn graph_formats() -> Vec<(&'static str, &'static str, bool)> {
     GRAPH_FORMATS.iter().map(|f| (f.suffix, f.title, f.writes())).collect()

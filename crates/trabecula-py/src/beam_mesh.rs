@@ -106,7 +106,7 @@ impl BeamElements {
     }
 }
 
-/// The formats of beams as finite elements: suffix, what it is.
+/// The formats of beams as finite elements: suffix and title.
 pub fn formats() -> Vec<(&'static str, &'static str)> {
     BEAM_FORMATS.iter().map(|f| (f.0, f.1)).collect()
 }

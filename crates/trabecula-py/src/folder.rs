@@ -91,12 +91,12 @@ fn in_memory(name: &str) -> Result<Vec<u8>, String> {
             let found = py.import("trabecula.base.memory")?.getattr("content")?.call1((name,))?;
             Ok(found.cast::<PyBytes>()?.as_bytes().to_vec())
         };
-        read().map_err(|e| words(py, &e))
+        read().map_err(|e| message_of(py, &e))
     })
 }
 
 /// What an exception says.
-fn words(py: Python<'_>, e: &PyErr) -> String {
+fn message_of(py: Python<'_>, e: &PyErr) -> String {
     e.value(py).to_string()
 }
 
@@ -109,7 +109,7 @@ fn elements(path: &str) -> Result<ZonedElements, String> {
             let elements = made(&points, &connectivity, &ends, &kinds);
             Ok(ZonedElements { elements, zones: zones.as_array().to_vec(), names })
         };
-        read().map_err(|e| words(py, &e))
+        read().map_err(|e| message_of(py, &e))
     })
 }
 
@@ -142,7 +142,7 @@ fn result(path: &str, array: &str) -> Result<Data, String> {
             }
             Ok(Data { shape: DataSet::Mesh(made(&points, &connectivity, &ends, &kinds)), arrays })
         };
-        read().map_err(|e| words(py, &e))
+        read().map_err(|e| message_of(py, &e))
     })?;
     data.check().map_err(|f| format!("{path}: {}", f.message))?;
     Ok(data)
@@ -157,7 +157,7 @@ fn scan(path: &str) -> Result<Scan, String> {
                 read.extract()?;
             Ok(Scan { shape, values: values.as_array().to_vec(), placed: Some([origin, step]) })
         };
-        read().map_err(|e| words(py, &e))
+        read().map_err(|e| message_of(py, &e))
     })
 }
 
@@ -185,7 +185,7 @@ fn cad(name: &str, path: &str, how: &Tessellation) -> Result<CadMesh, String> {
                 volume: part.getattr("volume")?.extract()?,
             })
         };
-        read().map_err(|e| words(py, &e))
+        read().map_err(|e| message_of(py, &e))
     })
 }
 
@@ -205,7 +205,7 @@ fn tetrahedra(name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMe
                 zones: Vec::new(),
             })
         };
-        make().map_err(|e| words(py, &e))
+        make().map_err(|e| message_of(py, &e))
     })
 }
 

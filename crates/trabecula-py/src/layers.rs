@@ -85,7 +85,7 @@ impl Layers {
     }
 }
 
-/// The formats of layers: suffix, what it is, whether it holds pictures, whether all layers have one thickness.
+/// The formats of layers: suffix and title, whether it holds pictures, whether all layers have one thickness.
 pub fn formats() -> Vec<(&'static str, &'static str, bool, bool)> {
     LAYER_FORMATS.iter().map(|f| (f.suffix, f.title, f.pictures, f.uniform)).collect()
 }

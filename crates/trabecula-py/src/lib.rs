@@ -125,32 +125,32 @@ mod _core {
         geometry::formats::FORMATS.iter().map(MeshFormat::of).collect()
     }
 
-    /// The formats of layers, in the order in which texts name them: suffix, what it is, whether it holds pictures, whether all
+    /// The formats of layers, in the order in which texts name them: suffix and title, whether it holds pictures, whether all
     /// layers have one thickness.
     #[pyfunction]
     fn layer_formats() -> Vec<(&'static str, &'static str, bool, bool)> {
         crate::layers::formats()
     }
 
-    /// The formats of volume meshes, in the order in which texts name them: suffix, what it is.
+    /// The formats of volume meshes, in the order in which texts name them: suffix and title.
     #[pyfunction]
     fn volume_formats() -> Vec<(&'static str, &'static str)> {
         crate::volume::formats()
     }
 
-    /// The formats of shells: suffix, what it is.
+    /// The formats of shells: suffix and title.
     #[pyfunction]
     fn shell_formats() -> Vec<(&'static str, &'static str)> {
         crate::shells::formats()
     }
 
-    /// The formats of beams as finite elements: suffix, what it is.
+    /// The formats of beams as finite elements: suffix and title.
     #[pyfunction]
     fn beam_element_formats() -> Vec<(&'static str, &'static str)> {
         crate::beam_mesh::formats()
     }
 
-    /// The formats of voxels as finite elements: suffix, what it is.
+    /// The formats of voxels as finite elements: suffix and title.
     #[pyfunction]
     fn voxel_element_formats() -> Vec<(&'static str, &'static str)> {
         crate::voxel_elements::formats()

@@ -224,7 +224,7 @@ impl Joined {
         let made = py.detach(|| ranges.finish(&options)).map_err(error::stopped)?;
         let kept = made.kept.iter().map(|r| (r.start, r.end)).collect();
         let summary = report(py, "SurfaceReport", &SurfaceReport::from(&made.summary))?;
-        Ok((summary, made.summary.components.words(), kept, made.triangles))
+        Ok((summary, made.summary.components.description(), kept, made.triangles))
     }
 
     /// The figures of the whole surface, in a region of this volume (mm³): as `Solid.measure`.

@@ -105,7 +105,7 @@ impl Shells {
     }
 }
 
-/// The formats of shells: suffix, what it is.
+/// The formats of shells: suffix and title.
 pub fn formats() -> Vec<(&'static str, &'static str)> {
     SHELL_FORMATS.iter().map(|f| (f.0, f.1)).collect()
 }

@@ -343,7 +343,7 @@ impl Solid {
         let options = SurfaceOptions { resolution: edge, islands: islands_word(islands)? };
         let made = run(py, threads, progress, |p| self.built.surface().mesh(&options, p))?.map_err(error::stopped)?;
         let others = report(py, "IslandsReport", &IslandsReport::from(&made.components))?;
-        Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
+        Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.description()))
     }
 
     /// The figures of the surface at grid spacing `edge` (mm), in a region of this volume (mm³), taken while it is made:
@@ -401,7 +401,7 @@ impl Solid {
         let made = made.map_err(error::stopped)?.into_iter();
         made.map(|SpaceMade { made, .. }| {
             let others = report(py, "IslandsReport", &IslandsReport::from(&made.components))?;
-            Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
+            Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.description()))
         })
         .collect()
     }
@@ -501,7 +501,7 @@ impl Solid {
             surface_maker::stream_mesh(&*maker, &options, (&extension, &meta), scratch, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
-        Ok((report(py, "SurfaceReport", &SurfaceReport::from(&s))?, s.components.words()))
+        Ok((report(py, "SurfaceReport", &SurfaceReport::from(&s))?, s.components.description()))
     }
 
     /// Along which axes the region begins and ends in plane faces.

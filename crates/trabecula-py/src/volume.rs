@@ -202,7 +202,7 @@ impl VolumeMesh {
     }
 }
 
-/// The formats of volume meshes: suffix, what it is.
+/// The formats of volume meshes: suffix and title.
 pub fn formats() -> Vec<(&'static str, &'static str)> {
     FE_FORMATS.iter().map(|f| (f.suffix, f.title)).collect()
 }

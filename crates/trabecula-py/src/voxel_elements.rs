@@ -94,7 +94,7 @@ impl VoxelElements {
     }
 }
 
-/// The formats of voxels as finite elements: suffix, what it is.
+/// The formats of voxels as finite elements: suffix and title.
 pub fn formats() -> Vec<(&'static str, &'static str)> {
     HEX_FORMATS.iter().map(|f| (f.0, f.1)).collect()
 }

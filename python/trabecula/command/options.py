@@ -87,8 +87,8 @@ NOTICES = (
     option("--strict", action="store_true", help="a warning is an error: exit status 1, and no file is written"),
 )
 LIGHTER = (
-    option("--tolerance", type=LENGTH, metavar="MM", help="fewer triangles, the surface moved by at most this, mm"),
-    option("--triangles", type=TRIANGLES, metavar="N", help="fewer triangles, down to this number"),
+    option("--tolerance", type=LENGTH, metavar="MM", help="simplify, the surface moved by at most this, mm"),
+    option("--triangles", type=TRIANGLES, metavar="N", help="simplify to this number of triangles"),
 )
 #: Surfaces that outgrow one process or one run.
 APART = (

@@ -219,7 +219,7 @@ COMMANDS = {
         [
             option("--edge", type=LENGTH, metavar="MM", help="longest edge of most tetrahedra, longest element of beams, mm"),
             option("--per-cell", type=SAMPLES, metavar="N", help="edges along the smallest wavelength"),
-            option("--wall", type=SAMPLES, metavar="N", help="edges through the thinnest wall (default: 2)"),
+            option("--wall", type=SAMPLES, metavar="N", help="number of edges across the thinnest wall (default: 2)"),
             option("--voxels", type=LENGTH, metavar="MM", help="hexahedra of a grid instead, with their exact solid fractions"),
         ],
         option("--order", type=int, choices=(1, 2), help="linear or quadratic elements (default: 1, of beams 2, but in .bdf)"),
@@ -239,7 +239,7 @@ COMMANDS = {
             help="components other than the largest, which no support on that one holds: keep (default), with a warning if "
             "it is the solid, drop, or refuse",
         ),
-        option("--periodic", action="store_true", help="match opposite sides of a box of whole cells in all bits"),
+        option("--periodic", action="store_true", help="match opposite faces of a box of whole cells bit for bit"),
         option("--least", type=NUMBER, metavar="F", help="least solid fraction of a voxel that is an element (default: 0.01)"),
         option("--sets", type=names, metavar="NAMES", help="sets that must not be empty, by commas"),
         option(

@@ -1,4 +1,4 @@
-//! Which triangles are near a place, and whether two triangles meet.
+//! A bounding-volume tree of triangles that are edited: those near a position, and whether two intersect.
 //!
 //! The tree is made once, over the triangles in the order of a space-filling curve. Triangles that a collapse changes
 //! keep their positions in it, and the boxes above them grow.

@@ -1,4 +1,4 @@
-//! Colours of what is distinguished by number.
+//! Colours of areas and lines by number.
 
 use super::paper::Colour;
 

@@ -1,4 +1,4 @@
-//! Spellings of Hermann–Mauguin symbols, and what else a symbol could be.
+//! Spellings of Hermann–Mauguin symbols, and the nearest known ones.
 
 use super::{Group, SpaceGroupEntry, rows};
 use crate::fault::{Fault, nearest};

@@ -61,7 +61,7 @@ impl<'a> Finish<'a> {
         let map = format!("{}.map.tets", environment.path);
         let net = match (&joined.net, joined.surface) {
             (Some(_), ends) if ends != SurfaceEnds::Net => {
-                let message = format!("there is a net with surface = \"net\" alone, found \"{}\"", ends.word());
+                let message = format!("a net needs surface = \"net\", found \"{}\"", ends.word());
                 return Err(DesignError::new(format!("{map}.net"), message));
             }
             (net, _) => net.as_deref().cloned().unwrap_or_default(),

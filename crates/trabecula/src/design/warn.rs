@@ -293,7 +293,7 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         let all: f64 = d.singular.iter().map(|l| l.length).sum();
         say(format!(
             "axes do not come back to themselves round {}, {all:.1} mm in all: no lattice is without a flaw there",
-            longest.words(d.singular.len())
+            longest.description(d.singular.len())
         ));
     }
     if d.outside > OUTSIDE {
@@ -308,7 +308,7 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         say(exceeded);
     }
     if d.density[0] <= 0.0 {
-        say(format!("the map folds: cells turn inside out at {}", position(d.least_at)));
+        say(format!("the map folds (det J ≤ 0): cells turn inside out at {}", position(d.least_at)));
     } else if d.density[0] < PRESSED {
         say(format!(
             "the map nearly folds: cells are {:.1} % as many in a volume as asked for at {}, where axes may not fit together; let \

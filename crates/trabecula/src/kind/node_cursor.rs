@@ -250,7 +250,7 @@ impl<'a> Fields<'a> {
         match (given.next(), given.next()) {
             (Some((key, at)), None) => Ok((key.name, at.clone())),
             (Some((a, _)), Some((b, at))) => {
-                Err(at.error(format!("{} and {} at once; give exactly one of {}", a.name, b.name, names())))
+                Err(at.error(format!("found {} and {}; give exactly one of {}", a.name, b.name, names())))
             }
             (None, _) => {
                 let message = format!("the {noun} is missing; give exactly one of {}", names());
@@ -269,13 +269,13 @@ impl<'a> Fields<'a> {
             let own = |set: &Vec<Key>| {
                 let own = set.iter().filter(|k| !shared(k.name));
                 let needed: Vec<&str> = own.clone().filter(|k| k.required).map(|k| k.name).collect();
-                match needed[..] {
+                match &needed[..] {
                     [] => own.map(|k| k.name).collect::<Vec<_>>().join(" or "),
-                    _ => needed.join(" and "),
+                    [one] => (*one).into(),
+                    [one, more @ ..] => format!("{one} with {}", more.join(" and ")),
                 }
             };
-            let each: Vec<String> = sets.iter().map(own).collect();
-            each.join(if each.iter().any(|e| e.contains(' ')) { "; " } else { ", " })
+            sets.iter().map(own).collect::<Vec<String>>().join(", ")
         };
         // The set of which most required keys are given, or else of which any key is.
         let needed = |set: &[Key]| {
@@ -299,7 +299,7 @@ impl<'a> Fields<'a> {
         }
         let stray = self.entries.iter().find(|(name, _)| !has(&sets[first], name) && known(sets, name));
         match (given(&sets[first]), stray) {
-            (Some(a), Some((b, at))) => Err(at.error(format!("{a} and {b} at once; give exactly one of {}", each()))),
+            (Some(a), Some((b, at))) => Err(at.error(format!("found {a} and {b}; give exactly one of {}", each()))),
             _ => Ok(first),
         }
     }

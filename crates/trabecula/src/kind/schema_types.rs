@@ -107,12 +107,12 @@ pub(super) fn merged(choices: &[Node]) -> Node {
     let (listed, others): (Vec<&Node>, Vec<&Node>) = choices.iter().partition(|c| c.get("enum").is_some());
     let own = others.iter().flat_map(|c| c.entries()).filter(|e| !["type", "description"].contains(&e.0));
     let out = own.fold(Node::table([("type", names.into())]), |out, (key, node)| out.with(key, node.clone()));
-    listed.into_iter().fold(out, words)
+    listed.into_iter().fold(out, with_words)
 }
 
 /// Adds the words that text may be. Editors offer the words in an `anyOf` but look into no `then`, which alone refuses others with
 /// a list of these; hence the second choice of `anyOf`, which allows anything.
-fn words(schema: Node, words: &Node) -> Node {
+fn with_words(schema: Node, words: &Node) -> Node {
     let anything: Node = Value::Table(Vec::new()).into();
     let words = match words.get("x-kind").and_then(Node::as_text) {
         Some(name) => reference(name),

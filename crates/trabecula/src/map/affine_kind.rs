@@ -50,7 +50,7 @@ impl Cells {
 
     /// As `scaled`, by a scale that has to be the same everywhere.
     fn sized(&self, edge: &Grade, length: &str, path: &str) -> Result<Cells, DesignError> {
-        let message = format!("fraction and {length} vary, and this map is the same everywhere; use map.phase");
+        let message = format!("fraction and {length} vary, and the cells of this map have one size; use map.phase");
         let edge = edge.constant().ok_or_else(|| DesignError::new(path, message))?;
         self.scaled(edge, length, path)
     }
@@ -58,7 +58,7 @@ impl Cells {
 
 /// Explains that numbers of this map are constant.
 fn uniform(at: &NodeCursor) -> Result<(), DesignError> {
-    let message = "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary";
+    let message = "this map takes constants; use map.phase for a wavelength or an orientation that varies";
     for (key, at) in at.entries("a map").unwrap_or_default() {
         match key {
             "wavelength" | "rotate" | "offset" => constant(&at, message)?,

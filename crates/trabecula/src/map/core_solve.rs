@@ -1,4 +1,4 @@
-//! Cores of singular lines: what covers the place at which no lattice is without a flaw.
+//! Solid rods or bores about singular lines, at which no phases are continuous.
 
 use super::branch_cuts::BranchCuts;
 use super::branched_solve::{Branched, FreeIntegers};
@@ -164,7 +164,7 @@ fn path(
     if line.is_closed() {
         let message = format!(
             "a singular line is closed, {}: core covers lines from surface to surface; {}, or leave core out",
-            line.words(1),
+            line.description(1),
             wanted.smoother()
         );
         return Err(Fault::new("core", message));

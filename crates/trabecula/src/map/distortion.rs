@@ -149,7 +149,7 @@ impl Distortion {
         match self.singular.first() {
             None => String::new(),
             Some(longest) => {
-                format!("; axes do not come back to themselves round {}", longest.words(self.singular.len()))
+                format!("; axes do not come back to themselves round {}", longest.description(self.singular.len()))
             }
         }
     }

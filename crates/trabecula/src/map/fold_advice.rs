@@ -1,4 +1,4 @@
-//! What is advised where a map folds, or where directions wind round lines that no core covers.
+//! Advice where a map folds, or where directions wind round lines that no core covers.
 
 use super::core_solve;
 use super::frame::Orientation;
@@ -58,7 +58,7 @@ pub(super) fn remedy(wanted: &PhaseRequest, longest: f64, covered: bool, singula
 /// A map that folds at a place.
 pub(super) fn folded(p: Vec3, remedy: &str, tried: &str) -> Fault {
     let message = format!(
-        "the map folds at {}: cells turn inside out there{tried}. {remedy}, or allow it with folds = true",
+        "the map folds at {} (det J ≤ 0): cells turn inside out there{tried}. {remedy}, or allow it with folds = true",
         position(p)
     );
     Fault::new("", message)

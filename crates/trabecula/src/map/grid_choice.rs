@@ -60,7 +60,7 @@ pub(super) fn choose(
     let (grid, left) = probe.refined(bounds, first, missed)?;
     // In words: of the axis along which most is missed.
     let axis = (0..3).fold(0, |m, a| if missed[a].share > missed[m].share { a } else { m });
-    let what = missed[axis].words(first.step[axis]);
+    let what = missed[axis].description(first.step[axis]);
     let enough = grid.step.into_iter().fold(f64::INFINITY, f64::min);
     let enough = rounded_down(enough);
     let fits = count(bounds.size().map(|s| nodes_along(s, enough))) <= NODES[1];
@@ -177,7 +177,7 @@ impl SamplingError {
     }
 
     /// What varies, how much, how fast and where.
-    fn words(&self, step: f64) -> String {
+    fn description(&self, step: f64) -> String {
         let (half, place) = (number((self.within * 1000.0).round() / 1000.0), position(self.at));
         let step = number((step * 1000.0).round() / 1000.0);
         let what = if self.key == "wavelength" {

@@ -1,4 +1,4 @@
-//! A solution of phases, and what it was found for.
+//! A solution of phases, and the target it was found for.
 
 use super::integral::EdgeWeights;
 use super::periods::Period;

@@ -1,4 +1,4 @@
-//! How the cores of singular lines are covered.
+//! The cores of singular lines, as a design describes them.
 
 use crate::kind::Kind;
 

@@ -43,7 +43,7 @@ impl SingularLine {
     }
 
     /// Where it is, as the longest of `count` lines.
-    pub(crate) fn words(&self, count: usize) -> String {
+    pub(crate) fn description(&self, count: usize) -> String {
         let at = |[x, y, z]: Vec3| format!("({x:.1}, {y:.1}, {z:.1})");
         let [a, b] = self.ends();
         let place = if self.is_closed() {

@@ -3,8 +3,9 @@
 use crate::field::Block;
 use geometry::math::{Aabb, Interval, norm};
 
-/// Fills `out` (x fastest) with values less `level` (mm) at a block's nodes, as [`super::SignedDistance::fill_level`] says: the block is halved
-/// until a part lies on one side of the level by its bound, or is eight nodes.
+/// Fills `out` (x fastest) with values less `level` (mm) at a block's nodes, as
+/// [`super::SignedDistance::fill_level`] says: the block is halved until a part lies on one side of the level by its bound,
+/// or is eight nodes.
 pub(super) fn fill(
     block: &Block,
     level: f64,

@@ -110,7 +110,7 @@ impl Components {
     }
 
     /// One sentence on the components other than the largest: number, volume, position.
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         let Some(second) = self.second else {
             return "one piece".into();
         };
@@ -360,6 +360,6 @@ fn crumbs(whole: &[Totals], roots: &[usize], limit: f64) -> Vec<usize> {
 
 /// Why a solid in several pieces is refused.
 fn refusal(p: &Components) -> String {
-    let words = p.words();
+    let words = p.description();
     format!("the solid is not in one piece: {words}; drop them, make walls thicker, or change what cuts them off")
 }

@@ -41,7 +41,8 @@ proptest! {
         let sheet = sheet(name, Level::Fraction(Grade::Constant(fraction)), rotate);
         let region = if round { ball([0.1, 0.0, -0.2], 1.0) } else { cuboid([-0.7; 3], [0.8, 0.9, 1.0]) };
         let whole = solid(region, Some(sheet.clone()));
-        let make = |quadratic| shell_mesh(&whole, &[], &ShellMeshOptions { edge: 1.0 / 16.0, quadratic }, &Silent).expect("shells");
+        let options = |quadratic| ShellMeshOptions { edge: 1.0 / 16.0, quadratic };
+        let make = |quadratic| shell_mesh(&whole, &[], &options(quadratic), &Silent).expect("shells");
         let (linear, made) = (make(false).mesh, make(true));
         let mesh = &made.mesh;
         prop_assert_eq!(&mesh.triangles, &linear.triangles);

@@ -174,7 +174,7 @@ fn a_file_name_occurs_once_in_a_crate() {
 /// Type names of a crate that are still given twice.
 const REPEATED: &[(&str, &str)] = &[("geometry", "Quality"), ("geometry", "Report"), ("trabecula", "Spread")];
 
-/// The types, traits and aliases that a formatted source defines for its module: those of functions, traits and inner modules are indented.
+/// The types, traits and aliases that a formatted source defines for its module; those of functions and traits are indented.
 fn type_names(text: &str) -> Vec<&str> {
     let name = |line| {
         let visible = |w: &&str| w.starts_with("pub") || w.ends_with(')') || *w == "unsafe";
@@ -188,8 +188,8 @@ fn type_names(text: &str) -> Vec<&str> {
 
 #[test]
 fn types_of_functions_and_traits_are_none_of_the_module() {
-    let text = "/// struct A\npub(in crate::a) struct B<'a>(u8);\npub enum C {\n    D,\n}\ntrait E: F {\n    type G;\n}\npub type H = u8;\n\
-                pub use i::J;\nfn k() {\n    struct L;\n}\nstruct M;\n";
+    let text = "/// struct A\npub(in crate::a) struct B<'a>(u8);\npub enum C {\n    D,\n}\ntrait E: F {\n    type G;\n}\n\
+                pub type H = u8;\npub use i::J;\nfn k() {\n    struct L;\n}\nstruct M;\n";
     assert_eq!(type_names(text), ["B", "C", "E", "H", "M"]);
 }
 

@@ -337,7 +337,7 @@ impl BallSpace<'_> {
                 } else {
                     -dot(towards, towards) / (2.0 * dot(own.away, towards))
                 };
-                // What is nearer than the nearest is the same edge seen twice.
+                // No point of the surface is nearer than `own`: a smaller radius comes from another triangle at the same edge.
                 if !(radius >= 0.9 * own.distance - 0.05 && radius < grown.radius) {
                     met = None;
                     break;
@@ -451,8 +451,8 @@ fn paint_ball(
     }
 }
 
-/// The shortest of all means of some directions: the way that leads from all of them alike, zero in their midst. By the
-/// rule of Frank and Wolfe, which needs few steps for so few directions.
+/// The point of the convex hull of some directions that is nearest to the origin, by the method of Frank and Wolfe,
+/// which needs few steps for so few directions.
 fn between(directions: impl Iterator<Item = Vec3> + Clone) -> Vec3 {
     let Some(mut mean) = directions.clone().next() else {
         return [0.0; 3];

@@ -1,7 +1,7 @@
 //! A grid of voxels over a mesh, and where the lines through the voxels' centres cross its surface.
 //!
-//! Whether a line passes a triangle is decided exactly, and lines that hit an edge or a corner are thought a little
-//! aside, all in the same direction: every line crosses a closed surface as often inwards as outwards.
+//! Whether a line passes a triangle is decided exactly. Ties at edges and corners are broken by a symbolic perturbation,
+//! the same for all lines: a line crosses a closed surface as often inwards as outwards.
 
 use core::ops::Range;
 

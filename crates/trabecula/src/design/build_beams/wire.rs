@@ -153,7 +153,7 @@ pub(super) fn tables(
         return Err(DesignError::new(below("nodes"), message));
     }
     if spec.radius.is_none() && spec.fraction.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
-        let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
+        let message = "\"radius\" is missing (mm, of beams at mid length), and no node has one";
         return Err(DesignError::new(&environment.path, message));
     }
     Ok((wire, GivenRadii { nodes: nodes.radii, struts: Vec::new() }))

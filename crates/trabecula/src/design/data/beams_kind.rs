@@ -266,7 +266,7 @@ impl Kind for NodeId {
 pub struct PatternSpec {
     /// Rows of x, y, z (mm) and perhaps a hub's radius (mm), at [0, 0, 0]; their ids are 0, 1, 2 …
     pub nodes: NodeRows,
-    /// Rows of two ids and how many repeats on, along each step, the second node lies (0 unless given).
+    /// Rows of two ids and, for each step, the number of repeats from the first node to the second (0 unless given).
     #[kind(least = 1)]
     pub struts: Vec<PatternStrut>,
     /// One to three steps, such as { count = 12, rotate = [0, 0, 30] }.
