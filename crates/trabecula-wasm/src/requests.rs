@@ -218,7 +218,7 @@ impl Session {
         let triangles = surface.mesh.triangles.len();
         let apart = &made.components;
         let words =
-            (apart.others > apart.dropped).then(|| format!("the result is not in one piece: {}", apart.words()));
+            (apart.others > apart.dropped).then(|| format!("the result is not in one piece: {}", apart.description()));
         let coarse = match resolution {
             Resolution::Grid(edge) => {
                 built.coarse_steps(edge, figures.volume + apart.dropped_volume, apart.others as usize + 1)
