@@ -301,13 +301,23 @@ def test_the_boundary_may_be_left_open(tmp_path):
 
 @pytest.mark.parametrize("edge", [0.5, 0.3])
 @pytest.mark.parametrize("surface", ["net", "rounded"])
-def test_tiny_tetrahedra_at_fine_features_break_no_guarantee(tmp_path, surface, edge):
+@pytest.mark.parametrize(
+    "width, turned, at, leaning, tilted, sloped",
+    [
+        (0.3, 7, 5, 20, 10, 14),
+        # Both surfaces of the sheet cross grid edges just where an edge of the groove does.
+        (0.424031748758227, 19.69035475438495, 4.180124258059419, 15.1586283666785, 4.007582171979511, 7.584921587243051),
+    ],
+)
+def test_tiny_tetrahedra_at_fine_features_break_no_guarantee(
+    tmp_path, surface, edge, width, turned, at, leaning, tilted, sloped
+):
     """A groove far finer than the cells: some tetrahedra are fifty times as steep as most, on grids that resolve neither."""
     manifold3d = pytest.importorskip("manifold3d")
     block = manifold3d.Manifold.cube((20, 14, 8))
-    block -= manifold3d.Manifold.cube((30, 0.3, 0.4)).rotate((0, 0, 7)).translate((-2, 5, 7.7))
-    block -= manifold3d.Manifold.cylinder(20, 1.2, 1.2, 24).rotate((20, 10, 0)).translate((12, 7, -5))
-    block -= manifold3d.Manifold.cube((30, 30, 10)).rotate((0, 14, 0)).translate((-3, -3, 7.5))
+    block -= manifold3d.Manifold.cube((30, width, 0.4)).rotate((0, 0, turned)).translate((-2, at, 7.7))
+    block -= manifold3d.Manifold.cylinder(20, 1.2, 1.2, 24).rotate((leaning, tilted, 0)).translate((12, 7, -5))
+    block -= manifold3d.Manifold.cube((30, 30, 10)).rotate((0, sloped, 0)).translate((-3, -3, 7.5))
     made = block.to_mesh()
     lt.Mesh.of(made.vert_properties[:, :3], made.tri_verts).write(tmp_path / "block.stl")
     cell, part, fraction = ("diamond", "lower", 0.25) if surface == "net" else ("diamond_sheet", "sheet", 0.12)

@@ -339,9 +339,10 @@ fn barycentric(values: &[[f64; 4]; 3], dimensions: usize) -> [f64; 4] {
     }
     // Signs along a grid edge follow the order of its crossings, which values at its ends may contradict: the functions then vanish
     // beyond the simplex, and the nearest point within stands for that.
+    // Functions that are multiples of each other vanish at no single point.
     let mut inner = [0.0; 4];
     for c in 0..=dimensions.min(3) {
-        inner[c] = w[c].clamp(INNER, 1.0);
+        inner[c] = if w[c].is_nan() { 1.0 } else { w[c].clamp(INNER, 1.0) };
     }
     let sum: f64 = inner.iter().sum();
     inner.map(|x| x / sum)

@@ -11,11 +11,13 @@ use super::polygon_triangulation::triangles;
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex};
 use crate::extract::sign_words::bits;
 use crate::extract::vertex_id::VertexId;
-use geometry::math::Vec3;
+use geometry::math::{Vec3, add, cross, scale, sub};
 use geometry::mesh::exact::drop_axis;
 
 /// Most attempts to divide a face that self-intersects in single precision.
 const TRIES: usize = 8;
+/// Least share of a segment at which another one intersects it, where rounding says that it does so beyond its end.
+const INSIDE: f64 = 1e-3;
 
 /// The grid edges of a face on which a corner lies, as bits.
 fn lines(code: usize) -> u8 {
@@ -24,6 +26,15 @@ fn lines(code: usize) -> u8 {
         4..12 => 1 << ((code - 4) / 2),
         _ => 0,
     }
+}
+
+/// Where two segments in a plane normal to an axis intersect: a point inside the first one.
+fn intersection([p, q]: [Vec3; 2], [r, s]: [Vec3; 2], axis: usize) -> Vec3 {
+    let across = |a: Vec3, b: Vec3| cross(a, b)[axis];
+    let (along, other) = (sub(q, p), sub(s, r));
+    let share = across(sub(r, p), other) / across(along, other);
+    let share = if share.is_nan() { 0.5 } else { share.clamp(INSIDE, 1.0 - INSIDE) };
+    add(p, scale(along, share))
 }
 
 impl FeatureCells<'_> {
@@ -249,7 +260,7 @@ impl FeatureCells<'_> {
                 found.corners.extend(ring.iter().map(|v| {
                     let vertex = cut.vertices[usize::from(*v)];
                     let key = self.face_vertex_id(at, face, &part.corners, vertex);
-                    (key, self.face_vertex_position(key, face, &simplex, vertex))
+                    (key, self.face_vertex_position(at, face, (&part.corners, &simplex), vertex))
                 }));
                 found.ends.push((negative, found.corners.len()));
             }
@@ -258,13 +269,44 @@ impl FeatureCells<'_> {
     }
 
     /// The position of a cut vertex of a triangle in a face.
-    fn face_vertex_position(&mut self, key: VertexId, face: &CellFace, simplex: &Simplex, vertex: CutVertex) -> Vec3 {
-        if key.is_between() || vertex.surfaces == 0 {
-            // With each attempt cut vertices keep farther from the points.
-            return self.vertex_position(simplex, vertex, (1 + 2 * face.tries) as f64);
+    fn face_vertex_position(
+        &mut self,
+        at: (usize, usize),
+        face: &CellFace,
+        (corners, simplex): (&[usize], &Simplex),
+        vertex: CutVertex,
+    ) -> Vec3 {
+        let key = self.face_vertex_id(at, face, corners, vertex);
+        if !key.is_between() && vertex.surfaces != 0 {
+            let v = self.vertex(key);
+            return self.positions[v as usize];
         }
-        let v = self.vertex(key);
-        self.positions[v as usize]
+        if vertex.corners.count_ones() == 3 {
+            // Where two segments intersect: crossings with grid edges may lie elsewhere than the values at the corners say.
+            let [f, g] = [vertex.surfaces.trailing_zeros(), 63 - vertex.surfaces.leading_zeros()];
+            let [first, second] = [f, g].map(|f| self.segment_in_triangle(at, face, (corners, simplex), f as usize));
+            return intersection(first, second, at.1);
+        }
+        // With each attempt cut vertices keep farther from the points.
+        self.vertex_position(simplex, vertex, (1 + 2 * face.tries) as f64)
+    }
+
+    /// The ends of the segment in which a surface cuts a triangle in a face.
+    fn segment_in_triangle(
+        &mut self,
+        at: (usize, usize),
+        face: &CellFace,
+        of: (&[usize], &Simplex),
+        surface: usize,
+    ) -> [Vec3; 2] {
+        let negative = (0..3).fold(0u8, |w, c| w | u8::from(self.is_negative(surface, of.1.nodes[c])) << c);
+        // The corner that the segment cuts off.
+        let single = if negative.is_power_of_two() { negative } else { 7 & !negative };
+        let others = 7 & !single;
+        [others & others.wrapping_neg(), others & (others - 1)].map(|other| {
+            let vertex = CutVertex { corners: single | other, surfaces: 1 << surface };
+            self.face_vertex_position(at, face, of, vertex)
+        })
     }
 
     /// The surfaces that are negative at all corners of a simplex and those that change sign; for the fitted surface `inside`
