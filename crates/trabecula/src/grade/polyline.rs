@@ -5,6 +5,7 @@ use super::{BuildGrade, Grade, Quantity, VaryingNumber, directed};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
+use geometry::bvh::{Bvh, Split, WideBvh};
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -62,9 +63,50 @@ pub struct Polyline {
     points: Vec<Vec3>,
     axis: Option<Vec3>,
     sharpness: Option<f64>,
-    /// Two directions across the axis, where the line has an inside.
-    plane: Option<[Vec3; 2]>,
+    /// The line as a polygon, where it has an inside.
+    polygon: Option<Polygon>,
     longest: f64,
+    /// The segments, in the order `order` of their numbers.
+    tree: WideBvh,
+    order: Vec<u32>,
+}
+
+/// A closed line in the plane across an axis.
+struct Polygon {
+    /// Two directions in the plane.
+    plane: [Vec3; 2],
+    /// The ends of each edge.
+    edges: Vec<[[f64; 2]; 2]>,
+    tree: Bvh,
+}
+
+impl Polygon {
+    fn new(points: &[Vec3], axis: Vec3) -> Polygon {
+        let least = (0..3).fold(0, |m, a| if axis[a].abs() < axis[m].abs() { a } else { m });
+        let mut e = [0.0; 3];
+        e[least] = 1.0;
+        let u = unit(cross(axis, e));
+        let v = cross(axis, u);
+        let edges: Vec<[[f64; 2]; 2]> =
+            points.windows(2).map(|w| [w[0], w[1]].map(|q| [dot(q, u), dot(q, v)])).collect();
+        let bounds = |[[ax, ay], [bx, by]]: &[[f64; 2]; 2]| Aabb::EMPTY.with([*ax, *ay, 0.0]).with([*bx, *by, 0.0]);
+        let boxes: Vec<Aabb> = edges.iter().map(bounds).collect();
+        let tree = Bvh::new(&boxes, (0..edges.len() as u32).collect(), Split::Median);
+        Polygon { plane: [u, v], edges, tree }
+    }
+
+    /// Whether a ray from a point crosses the line an odd number of times.
+    fn contains(&self, p: Vec3) -> bool {
+        let [x, y] = self.plane.map(|d| dot(p, d));
+        let ray = Aabb { min: [x, y, 0.0], max: [f64::INFINITY, y, 0.0] };
+        let mut inside = false;
+        self.tree.overlapping(&ray, |some| {
+            for [[ax, ay], [bx, by]] in some.iter().map(|i| self.edges[*i as usize]) {
+                inside ^= (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax);
+            }
+        });
+        inside
+    }
 }
 
 impl Polyline {
@@ -98,14 +140,13 @@ impl Polyline {
             );
             return Err(Fault::new("points", message));
         }
-        let plane = axis.filter(|_| closed && sharpness.is_none()).map(|n| {
-            let least = (0..3).fold(0, |m, a| if n[a].abs() < n[m].abs() { a } else { m });
-            let mut e = [0.0; 3];
-            e[least] = 1.0;
-            let u = unit(cross(n, e));
-            [u, cross(n, u)]
-        });
-        Ok(Polyline { points, axis, sharpness, plane, longest })
+        let polygon = axis.filter(|_| closed && sharpness.is_none()).map(|n| Polygon::new(&points, n));
+        let boxes: Vec<Aabb> = points.windows(2).map(|w| Aabb::EMPTY.with(w[0]).with(w[1])).collect();
+        let tree = Bvh::new(&boxes, (0..boxes.len() as u32).collect(), Split::Median);
+        let order = tree.order().to_vec();
+        let boxes: Vec<Aabb> = order.iter().map(|i| boxes[*i as usize]).collect();
+        let tree = WideBvh::new(&tree, &boxes);
+        Ok(Polyline { points, axis, sharpness, polygon, longest, tree, order })
     }
 
     /// The most by which the smooth form is off, mm; 0 for the exact one.
@@ -116,7 +157,7 @@ impl Polyline {
     /// Two segments of a line with an inside that cross or touch, but for those that follow each other: their numbers, and where
     /// (mm, projected along the axis). A line without an inside may cross itself.
     pub fn crossing(&self) -> Option<([usize; 2], Vec3)> {
-        self.plane?;
+        self.polygon.as_ref()?;
         let segments: Vec<[Vec3; 2]> = self.points.windows(2).map(|w| [w[0], w[1]]).collect();
         let boxes: Vec<Aabb> = segments.iter().map(|[a, b]| Aabb::EMPTY.with(*a).with(*b)).collect();
         let last = segments.len() - 1;
@@ -138,47 +179,49 @@ impl Polyline {
         None
     }
 
-    /// The unsigned distance to the nearest segment (mm), and the nearest point.
+    /// The ends of the segment at a position in the tree's order, and its number.
+    fn segment(&self, at: usize) -> ([Vec3; 2], u32) {
+        let i = self.order[at];
+        ([self.points[i as usize], self.points[i as usize + 1]], i)
+    }
+
+    /// The unsigned distance to the nearest segment (mm), and the nearest point; of the first segment where several are as near.
     fn nearest(&self, p: Vec3) -> (f64, Vec3) {
-        let mut best = (f64::INFINITY, self.points[0]);
-        for w in self.points.windows(2) {
-            let d = sub(w[1], w[0]);
-            let t = (dot(sub(p, w[0]), d) / dot(d, d)).clamp(0.0, 1.0);
-            let foot = add(w[0], scale(d, t));
+        let mut best = (f64::INFINITY, u32::MAX, self.points[0]);
+        self.tree.nearest(p, f64::INFINITY, |at| {
+            let ([a, b], i) = self.segment(at);
+            let d = sub(b, a);
+            let t = (dot(sub(p, a), d) / dot(d, d)).clamp(0.0, 1.0);
+            let foot = add(a, scale(d, t));
             let r = norm(sub(p, foot));
-            if r < best.0 {
-                best = (r, foot);
+            if (r, i) < (best.0, best.1) {
+                best = (r, i, foot);
             }
-        }
-        best
+            best.0 * best.0
+        });
+        (best.0, best.2)
     }
 
     /// Equation 25 for the segment that it makes nearest.
     fn smooth(&self, p: Vec3, k: f64) -> f64 {
         let s = |x: f64| 1.0 / (1.0 + (-x).exp());
-        let each = self.points.windows(2).map(|w| {
-            let d = sub(w[1], w[0]);
-            let t = dot(sub(p, w[0]), d) / dot(d, d);
+        let mut best = f64::INFINITY;
+        self.tree.nearest(p, f64::INFINITY, |at| {
+            let ([a, b], _) = self.segment(at);
+            let d = sub(b, a);
+            let t = dot(sub(p, a), d) / dot(d, d);
             let to = |q: Vec3| norm(sub(p, q));
-            to(w[0]) * s(-k * t)
-                + to(add(w[0], scale(d, t))) * s(k * t) * s(k * (1.0 - t))
-                + to(w[1]) * s(k * (t - 1.0))
+            let weighted =
+                to(a) * s(-k * t) + to(add(a, scale(d, t))) * s(k * t) * s(k * (1.0 - t)) + to(b) * s(k * (t - 1.0));
+            best = best.min(weighted);
+            (best + self.error()).powi(2)
         });
-        each.fold(f64::INFINITY, f64::min)
+        best
     }
 
-    /// Whether a point lies inside a closed line, projected along the axis: a ray from it crosses the line an odd number of times.
+    /// Whether a point lies inside a closed line, projected along the axis.
     fn inside(&self, p: Vec3) -> bool {
-        let Some([u, v]) = self.plane else {
-            return false;
-        };
-        let at = |q: Vec3| [dot(q, u), dot(q, v)];
-        let [x, y] = at(p);
-        let crossed = self.points.windows(2).filter(|w| {
-            let ([ax, ay], [bx, by]) = (at(w[0]), at(w[1]));
-            (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax)
-        });
-        crossed.count() % 2 == 1
+        self.polygon.as_ref().is_some_and(|line| line.contains(p))
     }
 
     fn across(&self, p: Vec3) -> Vec3 {
@@ -247,7 +290,7 @@ impl Field for Polyline {
         let reach = norm(b.size()) / 2.0 * (1.0 + 1e-12) + 1e-12 * (1.0 + norm(middle));
         let r = Interval::new(d - reach, d + reach);
         match self.sharpness {
-            None if self.plane.is_some() => r,
+            None if self.polygon.is_some() => r,
             None => Interval::new(r.lo.max(0.0), r.hi),
             // More than one in all, and between segments whichever seems nearer.
             Some(_) => Interval::new((r.lo.max(0.0) - self.error()).max(0.0), r.hi * (1.0 + 1e-4) + self.error()),
@@ -283,6 +326,33 @@ mod tests {
                 worst = worst.max((exact.at(p) - smooth.at(p)).abs());
             }
             assert!(worst <= smooth.error() * 1.006 && worst > 0.9 * most && worst <= most * 1.01, "{k} {worst}");
+        }
+    }
+
+    /// A line through many points, closed about an axis or not: all distances are the least over its segments, one by one, and
+    /// the inside is where the line winds round an odd number of times.
+    #[test]
+    fn of_many_segments_the_nearest_is_found() {
+        let turn = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
+        let star = |i: u32| {
+            let r = 3.0 + (7.0 * turn(i, 300)).sin() + 0.3 * f64::from(i * 37 % 11) / 11.0;
+            [r * turn(i, 300).cos(), r * turn(i, 300).sin(), 0.01 * f64::from(i % 5)]
+        };
+        let points: Vec<Vec3> = (0..300).map(star).collect();
+        let line = Polyline::new(points.clone(), true, Some([0.0, 0.0, 1.0]), None).unwrap();
+        let smooth = Polyline::new(points.clone(), false, None, Some(20.0)).unwrap();
+        for p in positions() {
+            let each = |of: &Polyline| {
+                let parts = of.points.windows(2).map(|w| w.to_vec());
+                let one = |part| Polyline::new(part, false, None, of.sharpness).unwrap().at(of.across(p));
+                parts.map(one).fold(f64::INFINITY, f64::min)
+            };
+            assert_eq!(line.at(p).abs(), each(&line), "{p:?}");
+            assert_eq!(smooth.at(p), each(&smooth), "{p:?}");
+            let angle = |a: Vec3, b: Vec3| cross(a, b)[2].atan2(a[0] * b[0] + a[1] * b[1]);
+            let around = (0..300).map(|i| angle(sub(points[i], p), sub(points[(i + 1) % 300], p)));
+            let winding = around.sum::<f64>() / std::f64::consts::TAU;
+            assert_eq!(line.at(p) < 0.0, winding.round() as i64 % 2 != 0, "{p:?} {winding}");
         }
     }
 
