@@ -138,8 +138,9 @@ impl SamplingGrid {
         Fault::new(
             "edge",
             format!(
-                "near ({}) mm a surface made in steps of {} mm crosses itself in the files' single precision, {} mm there; move the \
-                 part nearer to the origin, or use another edge",
+                "near ({}) mm a surface made in steps of {} mm crosses itself in the files' single precision, {} mm there: walls \
+                 may not be thinner; keep a grade from letting them shrink to nothing, move the part nearer to the origin, or \
+                 use another edge",
                 at.map(number).join(", "),
                 number(self.step),
                 format_args!("{finest:.1e}"),

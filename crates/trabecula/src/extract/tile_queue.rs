@@ -25,6 +25,39 @@ pub(super) fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
 /// Tiles per thread that may be extracted ahead of their turn: few enough to stay in the cache.
 const AHEAD: usize = 4;
 
+/// Tiles that are looked at, at most, to find how much work is done after how many.
+const SAMPLED: usize = 1024;
+
+/// The work in some tiles, in tiles that have a surface: the others take no time, and in a mesh region they are many and come
+/// together.
+struct Workload {
+    /// Every so many tiles one is looked at.
+    every: usize,
+    /// How many of these have a surface, up to each.
+    busy: Vec<u64>,
+}
+
+impl Workload {
+    fn new(grid: &SamplingGrid, tiles: &Range<usize>) -> Workload {
+        let every = tiles.len().div_ceil(SAMPLED).max(1);
+        let sampled = tiles.clone().skip(every / 2).step_by(every).map(|i| grid.tile(i));
+        let is_busy = |tile| grid.local(&grid.nodes(tile), &grid.block(tile).bounds()).is_some();
+        let busy = sampled.scan(0, |all, tile| {
+            *all += u64::from(is_busy(tile));
+            Some(*all)
+        });
+        Workload { every, busy: busy.collect() }
+    }
+
+    /// The work in the first tiles, in `every`ths of a tile.
+    fn of(&self, tiles: usize) -> u64 {
+        let (whole, rest) = (tiles / self.every, (tiles % self.every) as u64);
+        let up_to = |n: usize| n.checked_sub(1).map_or(0, |n| self.busy[n.min(self.busy.len() - 1)]);
+        let [low, high] = [whole, whole + 1].map(up_to);
+        low * self.every as u64 + (high - low) * rest
+    }
+}
+
 /// State shared by the threads.
 struct Queue<T> {
     /// The next tile to extract.
@@ -58,6 +91,7 @@ pub(super) fn each_tile<T: Send>(
     let work = TileWork {
         grid,
         progress,
+        workload: Workload::new(grid, &tiles),
         tiles,
         ahead: AHEAD * threads,
         spare,
@@ -81,6 +115,7 @@ pub(super) fn each_tile<T: Send>(
 struct TileWork<'a, T, C, K> {
     grid: &'a SamplingGrid,
     progress: &'a dyn Progress,
+    workload: Workload,
     tiles: Range<usize>,
     ahead: usize,
     spare: &'a Mutex<Vec<TileBuffers>>,
@@ -142,7 +177,8 @@ where
                 (Err(fault), _) => Err(Stopped::Refused(fault)),
                 _ => Ok(()),
             };
-            let go_on = self.progress.step((turn - self.tiles.start) as u64 + 1, self.tiles.len() as u64);
+            let [done, all] = [turn - self.tiles.start + 1, self.tiles.len()].map(|n| self.workload.of(n).max(1));
+            let go_on = self.progress.step(done, all);
             q = self.queue();
             q.turn += 1;
             if q.ended.is_ok() {
