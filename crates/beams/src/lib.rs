@@ -57,7 +57,7 @@ pub use graph::{Beam, Graph, HubBall, Profile, Wireframe};
 pub use pattern::{Pattern, PatternField};
 pub use quador::slice::{Slice, SlicePlane};
 pub use quador::{Fillet, MassProperties, Pencil, Quadors, Tessellation};
-pub use step::{StepSummary, write_step};
+pub use step::write_step;
 
 use geometry::math::Vec3;
 

@@ -9,30 +9,13 @@ use std::collections::HashMap;
 use std::io;
 
 use geometry::fault::Fault;
-use geometry::formats::part21::{Id, Part21, Product, Title, list, real, spline_curve};
+use geometry::formats::part21::{Id, Part21, Product, StepReport, Title, list, real, spline_curve};
 use geometry::math::{Vec3, add, cross};
 use geometry::progress::{Stopped, checkpoint};
 
 use crate::quador::Quadors;
 use crate::quador::brep::{Brep, CurveKey, EdgeUse, HubGroup, Surface};
 use crate::quador::slice::SlicePlane;
-
-/// What a STEP file contains.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StepSummary {
-    /// Number of solids: connected components, or placed parts of an assembly.
-    pub solids: usize,
-    /// Number of distinct parts of an assembly, each a hub with its half-beams; `None` if there is none.
-    pub parts: Option<usize>,
-    /// Number of faces written.
-    pub faces: usize,
-    /// Number of edges.
-    pub edges: usize,
-    /// Number of vertices.
-    pub vertices: usize,
-    /// Enclosed volume, mm³.
-    pub volume: f64,
-}
 
 /// Number of hubs up to which a lattice is one shell unless asked otherwise.
 const SHELL: usize = 2000;
@@ -55,7 +38,7 @@ pub fn write_step(
     title: Title,
     assembly: Option<bool>,
     out: &mut dyn io::Write,
-) -> Result<StepSummary, Stopped> {
+) -> Result<StepReport, Stopped> {
     let many = assembly.unwrap_or(quadors.len() > SHELL);
     let groups = if many { quadors.hub_groups(planes) } else { Vec::new() };
     if assembly.unwrap_or(2 * groups.len() <= quadors.len()) && many {
@@ -98,11 +81,11 @@ fn write(
     (components, volume): (&[Vec<u32>], f64),
     title: Title,
     out: &mut dyn io::Write,
-) -> io::Result<StepSummary> {
+) -> io::Result<StepReport> {
     let mut file = Part21::new(out, title)?;
     let product = Product::write(&mut file)?;
     let planar = file.parameter_plane()?;
-    let mut summary = StepSummary { volume, ..StepSummary::default() };
+    let mut summary = StepReport { volume, ..StepReport::default() };
     let solids = write_solids(brep, components, &mut file, planar, &mut summary)?;
     product.finish(&mut file, &solids)?;
     file.finish()?;
@@ -115,7 +98,7 @@ fn write_solids(
     components: &[Vec<u32>],
     file: &mut Part21,
     planar: Id,
-    summary: &mut StepSummary,
+    summary: &mut StepReport,
 ) -> io::Result<Vec<Id>> {
     let (corners, edges) = (vec![None; brep.corners.len()], vec![None; brep.edge_count()]);
     let mut writer = Writer { brep, file, planar, corners, curves: HashMap::new(), edges };
@@ -135,13 +118,13 @@ fn write_assembly(
     groups: &[HubGroup],
     title: Title,
     out: &mut dyn io::Write,
-) -> Result<StepSummary, Stopped> {
+) -> Result<StepReport, Stopped> {
     quadors.require_brep().map_err(Stopped::Refused)?;
     let mut file = Part21::new(out, title).map_err(Stopped::Io)?;
     let whole = Product::write(&mut file).map_err(Stopped::Io)?;
     let planar = file.parameter_plane().map_err(Stopped::Io)?;
     let mut parts = Vec::with_capacity(groups.len());
-    let mut summary = StepSummary::default();
+    let mut summary = StepReport::default();
     let mut solids = 0;
     for group in groups {
         checkpoint();
@@ -179,7 +162,7 @@ fn write_assembly(
     }
     whole.assemble(&mut file, &parts).map_err(Stopped::Io)?;
     file.finish().map_err(Stopped::Io)?;
-    Ok(StepSummary { solids, parts: Some(parts.len()), ..summary })
+    Ok(StepReport { solids, parts: Some(parts.len()), ..summary })
 }
 
 /// A corner: its point and its vertex.
@@ -371,7 +354,7 @@ mod tests {
         Quadors::new(&Graph { hubs, beams }, Fillet::Auto).expect("a lattice")
     }
 
-    fn text() -> (String, StepSummary) {
+    fn text() -> (String, StepReport) {
         let mut out = Vec::new();
         let made = write_step(&lattice(), &[], Title { name: "it's", ..Title::default() }, None, &mut out)
             .expect("written to memory");

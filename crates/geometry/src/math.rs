@@ -1,5 +1,7 @@
 //! Three-vectors and 3×3 matrices on plain arrays, boxes and intervals.
 
+use serde::Serialize;
+
 use crate::dense::diagonalise;
 
 /// A point or vector in space (mm) or phase (turns).
@@ -221,12 +223,19 @@ pub fn angle_turns(y: f64, x: f64) -> f64 {
 }
 
 /// An axis-aligned box; empty when any `min` exceeds its `max`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(into = "[Vec3; 2]")]
 pub struct Aabb {
     /// Lower corner.
     pub min: Vec3,
     /// Upper corner.
     pub max: Vec3,
+}
+
+impl From<Aabb> for [Vec3; 2] {
+    fn from(of: Aabb) -> Self {
+        [of.min, of.max]
+    }
 }
 
 impl Aabb {

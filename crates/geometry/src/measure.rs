@@ -13,7 +13,7 @@ pub use crate::mesh::self_intersections;
 pub use cavity::{Cavity, cavities};
 use components::Components;
 pub use components::non_manifold_vertices;
-pub use triangle_quality::{Quality, ShapeCounts, Shapes, quality};
+pub use triangle_quality::{ShapeCounts, Shapes, TriangleQuality, quality};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;

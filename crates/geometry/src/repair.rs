@@ -1,5 +1,8 @@
 //! From any triangles to the boundary of a solid: the order of the repairs, a report of them, and when they are refused.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::fault::{Fault, number};
 use crate::math::{add, cross, norm, scale, sub};
 use crate::mesh::{Mesh, self_intersections};
@@ -34,33 +37,34 @@ pub enum Repair {
     Refuse,
 }
 
-/// Counts of repairs. All zero for a mesh that was clean.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What was repaired in a mesh; all zero for a clean one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "RepairReport")]
 pub struct Repaired {
-    /// Vertices of open edges that were merged with others.
+    /// Corners of open edges joined with others.
     pub joined: usize,
-    /// Open edges split at vertices that lay on them.
+    /// Open edges split at corners that lay on them.
     pub split: usize,
-    /// Triangles of zero area that were removed.
+    /// Triangles without area left out.
     pub degenerate: usize,
-    /// Triangles given more than once, or in both orientations, that were removed.
+    /// Triangles given more than once left out.
     pub duplicates: usize,
-    /// Triangles reversed to face as their neighbours do.
+    /// Triangles turned to face as their neighbours do.
     pub turned: usize,
-    /// Connected components that were inside out and were reversed.
+    /// Bodies that were inside out and were turned.
     pub bodies_turned: usize,
-    /// Holes that were capped.
+    /// Holes capped.
     pub holes: usize,
+    /// Pairs of triangles that crossed or covered each other.
+    pub crossings: usize,
+    /// Triangles left out because solid, or none, is on both sides.
+    pub inner: usize,
     /// Length of the boundary loops of the holes, mm.
     pub hole_length: f64,
     /// Area of the caps, mm².
     pub hole_area: f64,
     /// Area of the caps over that of the surface with them.
     pub hole_share: f64,
-    /// Pairs of triangles that crossed or covered each other.
-    pub crossings: usize,
-    /// Triangles removed because solid, or void, is on both sides: components within components.
-    pub inner: usize,
 }
 
 impl Repaired {

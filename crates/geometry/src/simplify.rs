@@ -22,6 +22,8 @@ use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::fault::{Fault, counted, number};
 use crate::measure;
@@ -57,17 +59,23 @@ pub struct Goal {
     pub triangles: Option<usize>,
 }
 
-/// What was done.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
-    /// Triangles before and after.
-    pub triangles: [usize; 2],
-    /// A proven bound of the distance between the two surfaces, in both directions, mm.
+/// What simplification did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct SimplifyReport {
+    /// Triangles before.
+    pub triangles_before: usize,
+    /// Triangles after.
+    pub triangles: usize,
+    /// Proven bound of the distance between the two surfaces, in both directions, mm.
     pub deviation: f64,
-    /// Volume before and after, mm³.
-    pub volume: [f64; 2],
-    /// Area before and after, mm².
-    pub area: [f64; 2],
+    /// Volume before, mm³.
+    pub volume_before: f64,
+    /// Volume after, mm³.
+    pub volume: f64,
+    /// Area before, mm².
+    pub area_before: f64,
+    /// Area after, mm².
+    pub area: f64,
 }
 
 /// The surface with fewer triangles.
@@ -77,16 +85,23 @@ pub struct Report {
 /// # Errors
 /// A goal that is none; a mesh that is not closed, manifold and free of self-intersection after rounding to single
 /// precision; an interruption.
-pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> Result<(SurfaceMesh, Report), Stopped> {
+pub fn simplify(
+    surface: &SurfaceMesh,
+    goal: &Goal,
+    progress: &dyn Progress,
+) -> Result<(SurfaceMesh, SimplifyReport), Stopped> {
     let (tolerance, target) = checked(goal).map_err(Stopped::Refused)?;
     let mesh = &surface.mesh;
     let size = |m: &Mesh| (m.triangles.len(), m.volume(), m.area());
     let before = size(mesh);
-    let report = |after: (usize, f64, f64), deviation| Report {
-        triangles: [before.0, after.0],
+    let report = |after: (usize, f64, f64), deviation| SimplifyReport {
+        triangles_before: before.0,
+        triangles: after.0,
         deviation,
-        volume: [before.1, after.1],
-        area: [before.2, after.2],
+        volume_before: before.1,
+        volume: after.1,
+        area_before: before.2,
+        area: after.2,
     };
     if before.0 <= target {
         return Ok((surface.clone(), report(before, 0.0)));

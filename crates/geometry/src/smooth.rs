@@ -26,9 +26,12 @@
 //! All positions are rounded to single precision first, so that a file of either precision holds what was tested. The
 //! work is done in one order, whatever the number of threads.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::fault::Fault;
 use crate::math::Vec3;
-use crate::measure::{self, Quality};
+use crate::measure::{self, TriangleQuality};
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Stopped};
 use crate::remesh::edited_mesh::single;
@@ -53,17 +56,31 @@ const ROUNDS: usize = 8;
 /// Triangles between two reports of progress.
 const STRIDE: usize = 4096;
 
-/// What was done.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
-    /// Triangles before and after.
-    pub triangles: [usize; 2],
-    /// How well shaped they are, before and after.
-    pub quality: [Quality; 2],
-    /// Volume before and after, mm³.
-    pub volume: [f64; 2],
-    /// Edges flipped, edges merged, vertices moved.
-    pub changes: [usize; 3],
+/// What smoothing did to the triangles of a mesh. Angles are the smallest of each triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SmoothReport {
+    /// Triangles before.
+    pub triangles_before: usize,
+    /// Triangles after.
+    pub triangles: usize,
+    /// Smallest angle before, degrees.
+    pub smallest_angle_before: f64,
+    /// Smallest angle after, degrees.
+    pub smallest_angle: f64,
+    /// 5th percentile of the smallest angles before, degrees.
+    pub smallest_angle_p05_before: f64,
+    /// 5th percentile of the smallest angles after, degrees.
+    pub smallest_angle_p05: f64,
+    /// Volume before, mm³.
+    pub volume_before: f64,
+    /// Volume after, mm³.
+    pub volume: f64,
+    /// Number of edges flipped.
+    pub flipped: usize,
+    /// Number of edges whose ends were merged.
+    pub merged: usize,
+    /// Number of moves of vertices.
+    pub moved: usize,
 }
 
 /// The surface with better triangles.
@@ -72,7 +89,7 @@ pub struct Report {
 ///
 /// # Errors
 /// A mesh that is empty or not closed and manifold; an interruption.
-pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(SurfaceMesh, Report), Stopped> {
+pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(SurfaceMesh, SmoothReport), Stopped> {
     let ordered = in_order(surface);
     let positions: Vec<Vec3> = ordered.mesh.vertices.iter().copied().map(single).collect();
     let rounded = Mesh { vertices: positions, triangles: ordered.mesh.triangles };
@@ -100,18 +117,22 @@ pub fn smooth(surface: &SurfaceMesh, progress: &dyn Progress) -> Result<(Surface
     }
     work.settle();
     let made = gathered(&work.mesh, &ordered.cut);
-    let Some(after) = measure::quality(&made.mesh) else { return Ok((made, unchanged(all, before, volume))) };
-    let report = Report {
-        triangles: [all, made.mesh.triangles.len()],
-        quality: [before, after],
-        volume: [volume, made.mesh.volume()],
-        changes,
+    let after = measure::quality(&made.mesh).unwrap_or(before);
+    let [flipped, merged, moved] = changes;
+    let report = SmoothReport {
+        triangles_before: all,
+        triangles: made.mesh.triangles.len(),
+        smallest_angle_before: before.smallest_angle,
+        smallest_angle: after.smallest_angle,
+        smallest_angle_p05_before: before.smallest_angle_p05,
+        smallest_angle_p05: after.smallest_angle_p05,
+        volume_before: volume,
+        volume: made.mesh.volume(),
+        flipped,
+        merged,
+        moved,
     };
     Ok((made, report))
-}
-
-fn unchanged(triangles: usize, quality: Quality, volume: f64) -> Report {
-    Report { triangles: [triangles; 2], quality: [quality; 2], volume: [volume; 2], changes: [0; 3] }
 }
 
 /// Makes the first change that improves triangle `t`, and counts it.
@@ -142,7 +163,7 @@ fn improve(work: &mut WorkingMesh, t: u32, changes: &mut [usize; 3]) {
 }
 
 /// The half-edge structure and the quality of a closed mesh; otherwise what it lacks.
-fn sound(mesh: &Mesh) -> Result<(HalfEdgeMesh, Quality), Fault> {
+fn sound(mesh: &Mesh) -> Result<(HalfEdgeMesh, TriangleQuality), Fault> {
     let refuse = |what: &str| {
         Err(Fault::new("", format!("a mesh that is to be smoothed must be closed and manifold; this one {what}")))
     };

@@ -10,7 +10,7 @@ pub mod tet_locator;
 pub mod tet_quality;
 
 pub use conformity::Checked;
-pub use tet_quality::{Dihedral, Quality, SLIVER, Spread};
+pub use tet_quality::{DihedralAngles, MinMeanMax, SLIVER, TetQuality};
 
 /// A cube as six tetrahedra around a diagonal; bit a of a corner's number says on which side it is along axis a.
 pub const CUBE: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];

@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use trabecula::analysis;
 use trabecula::corner_normals::corner_normals;
-use trabecula::report::{MeshReport, QualityReport, SimplifyReport, SmoothReport, ThicknessReport, ThicknessSpread};
+use trabecula::report::MeshReport;
 use trabecula::surface_maker::Figures;
 
 use crate::arrays::table;
@@ -343,7 +343,7 @@ impl Mesh {
         let (surface, done) =
             run(py, None, progress, |p| simplify(&self.surface, &goal, p))?.map_err(error::stopped)?;
         let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
-        Ok((mesh, report(py, "SimplifyReport", &SimplifyReport::from(done))?))
+        Ok((mesh, report(py, "SimplifyReport", &done)?))
     }
 
     /// The same surface with better triangles, and what was done, as `reports.SmoothReport`.
@@ -351,7 +351,7 @@ impl Mesh {
     fn smoothed<'py>(&self, py: Python<'py>, progress: Option<Py<PyAny>>) -> PyResult<(Mesh, Bound<'py, PyAny>)> {
         let (surface, done) = run(py, None, progress, |p| smooth(&self.surface, p))?.map_err(error::stopped)?;
         let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
-        Ok((mesh, report(py, "SmoothReport", &SmoothReport::from(done))?))
+        Ok((mesh, report(py, "SmoothReport", &done)?))
     }
 
     /// The figures, against a region of this volume (mm³) if one is known, as `reports.MeshReport`.
@@ -382,7 +382,7 @@ impl Mesh {
     /// How well shaped the triangles are, as `reports.QualityReport`; None without triangles.
     fn quality<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let found = run(py, None, None, |_| measure::quality(&self.surface.mesh))?;
-        found.map(|q| report(py, "QualityReport", &QualityReport::from(q))).transpose()
+        found.map(|q| report(py, "QualityReport", &q)).transpose()
     }
 
     /// Duplicate triangles, triangles without area, vertices where surfaces touch.
@@ -427,10 +427,7 @@ impl Mesh {
         let region = region.map(|r| r.region.clone());
         let found = run(py, threads, progress, |p| analysis::thickness(&self.surface, region.as_ref(), step, p))?
             .map_err(error::stopped)?;
-        let spread = |s: &analysis::Spread| ThicknessSpread::of(s, step, found.accuracy);
-        let reported =
-            ThicknessReport { wall_thickness: spread(&found.wall), pore_size: found.pore.as_ref().map(spread) };
-        report(py, "ThicknessReport", &reported)
+        report(py, "ThicknessReport", &found)
     }
 
     /// Local thickness of the solid at each vertex (n,), mm, on voxels of edge `step` (mm); NaN where it is thinner than a step.

@@ -15,11 +15,9 @@ use trabecula::design::Built;
 use trabecula::extract::{self, SpaceMade};
 use trabecula::field::Field;
 use trabecula::map::{Misfit, Phase};
-use trabecula::report::{
-    DanglingReport, EstimateReport, IslandsReport, MeshReport, QualityReport, RepairReport, SurfaceReport,
-};
+use trabecula::report::{IslandsReport, MeshReport, SurfaceReport};
 use trabecula::solid::Space;
-use trabecula::surface_maker::{self, Islands, ScratchStores, SurfaceMaker, SurfaceOptions};
+use trabecula::surface_maker::{self, Estimate, Islands, SurfaceOptions, ScratchStores, SurfaceMaker};
 use trabecula::truss::Beams;
 
 use crate::arrays::{self, values};
@@ -92,7 +90,7 @@ pub fn islands_word(word: &str) -> PyResult<Islands> {
 
 /// What is measured of a surface in a region of this volume (mm³), as reports.
 pub fn measured<'py>(py: Python<'py>, made: &surface_maker::Measured, region: f64) -> PyResult<Measured<'py>> {
-    let quality = made.quality.map(|q| report(py, "QualityReport", &QualityReport::from(q)));
+    let quality = made.quality.map(|q| report(py, "QualityReport", &q));
     Ok((
         report(py, "MeshReport", &MeshReport::of(&made.figures, true, Some(region)))?,
         quality.transpose()?,
@@ -111,9 +109,7 @@ impl Solid {
     /// What was repaired in each mesh of the region, by the path of its table, as `reports.RepairReport`.
     #[getter]
     fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
-        let reported = |(path, done): &(String, Repaired)| {
-            Ok((path.clone(), report(py, "RepairReport", &RepairReport::from(done))?))
-        };
+        let reported = |(path, done): &(String, Repaired)| Ok((path.clone(), report(py, "RepairReport", done)?));
         self.built.repairs.iter().map(reported).collect()
     }
 
@@ -170,7 +166,7 @@ impl Solid {
     ) -> PyResult<Bound<'py, PyAny>> {
         let found =
             run(py, threads, progress, |p| analysis::dangling(&self.built.solid, neck, p))?.map_err(error::stopped)?;
-        report(py, "DanglingReport", &DanglingReport::from(found))
+        report(py, "DanglingReport", &found)
     }
 
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
@@ -324,9 +320,9 @@ impl Solid {
         let counted = edge.max(coarse.min(slf.get().built.solid.transition.unwrap_or(f64::INFINITY)));
         let work = move || slf.get().built.surface().estimate(counted);
         let made = run_apart(py, None, work)?.map_err(error::fault)?;
-        let (e, times) = (EstimateReport::from(made), (counted / edge).powi(2));
+        let times = (counted / edge).powi(2);
         let scaled =
-            EstimateReport { triangles: e.triangles * times, memory: e.memory * times, stl: e.stl * times, ..e };
+            Estimate { triangles: made.triangles * times, memory: made.memory * times, stl: made.stl * times, ..made };
         report(py, "EstimateReport", &scaled)
     }
 

@@ -58,7 +58,7 @@ use crate::implicit::Implicit;
 use crate::kind::{Kind, NodeCursor};
 use crate::lattice::Lattice;
 use crate::region::Region;
-use crate::report::{DesignReport, PropertyReport, StepReport, TransitionReport};
+use crate::report::{DesignReport, NetReport, PropertyReport, StepReport, TetMeshReport, TransitionReport};
 use crate::shell_mesh;
 use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
@@ -75,14 +75,13 @@ pub use crate::environment::{Loader, NoFiles, Scan, ZoneNames, ZonedElements};
 pub use crate::kind::{DesignError, LineNumbers, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use crate::region::{CadMesh, FaceLabel, Tessellation};
 pub use build_blend::Blended;
-pub use build_tets::{BuiltTets, TetReport};
+pub use build_tets::BuiltTets;
 pub use cell_zones::CellZone;
 use compensated_grid::CompensatedGrid;
 pub use data::*;
 pub use default_spacing::Coarser;
 pub use design_schema::schema;
 pub use joins::Joins;
-pub use net_coverage::Coverage;
 pub use sets_kind::*;
 pub use skin_kind::*;
 pub use study_kind::*;
@@ -154,7 +153,7 @@ pub struct Tiled {
     /// The zones, where they have cells of their own.
     pub zones: Vec<CellZone>,
     /// What is known of the mesh.
-    pub mesh: TetReport,
+    pub mesh: TetMeshReport,
     /// Whether nothing else is in the part: no skin, no kept zone.
     pub alone: bool,
     /// Whether its surface is made without a grid.
@@ -168,7 +167,7 @@ pub struct Tiled {
     /// The least and the greatest radius of the net's rods, or of rounded ends, mm.
     pub radii: Option<[f64; 2]>,
     /// What the net covers.
-    pub coverage: Option<Coverage>,
+    pub coverage: Option<NetReport>,
     /// The solid fraction of the finished part, where the level was solved for it.
     pub finished: Option<f64>,
     /// The lattice as it ends.

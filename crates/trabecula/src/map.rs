@@ -62,7 +62,7 @@ pub use affine::{Affine, Skew};
 pub use affine_kind::AffineKind;
 pub use axis::Axis;
 pub use core_solve::Cores;
-pub use distortion::{Distortion, Misfit, Spread};
+pub use distortion::{Distortion, MapSpread, Misfit};
 pub use frame::Orientation;
 pub use load_cases::{CasesBy, Stress};
 pub use periods::Period;

@@ -20,7 +20,7 @@ mod refinement_criterion;
 mod region_fit;
 
 pub use crate::conforming_tets::{ANGLES, MadeLayers, PrismLayers};
-pub use region_fit::{Fit, Uncovered, fit};
+pub use region_fit::{FitReport, fit};
 
 /// Maximum number of tetrahedra.
 const MOST: usize = 20_000_000;

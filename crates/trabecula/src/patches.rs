@@ -10,7 +10,7 @@
 use std::io;
 
 use geometry::fault::{Fault, number};
-use geometry::formats::part21::Title;
+use geometry::formats::part21::{StepReport, Title};
 use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
 use geometry::progress::{Progress, Stage, Stopped};
 use rayon::prelude::*;
@@ -71,25 +71,6 @@ const ROUNDS: usize = 12;
 /// Least cosine of the angle between a patch's normal and the surface's.
 const TURNED: f64 = 0.5;
 
-/// What a file of patches contains, and how near it is to the solid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PatchSummary {
-    /// Number of solids: connected components.
-    pub solids: usize,
-    /// Number of faces.
-    pub faces: usize,
-    /// Number of edges.
-    pub edges: usize,
-    /// Number of vertices.
-    pub vertices: usize,
-    /// Enclosed volume, mm³.
-    pub volume: f64,
-    /// Greatest distance of the patches from the surface, mm, at 49 points of each.
-    pub deviation: f64,
-    /// Greatest angle between the normals of adjacent patches along their common edge, degrees.
-    pub angle: f64,
-}
-
 /// Patches of a solid.
 pub struct Patches {
     boundary: Boundary,
@@ -139,17 +120,18 @@ impl Patches {
     }
 
     /// What they are.
-    pub fn summary(&self) -> PatchSummary {
+    pub fn summary(&self) -> StepReport {
         let Boundary { vertices, edges, faces, .. } = &self.boundary;
         let shells = self.solids.iter().flat_map(|s| &s.shells);
-        PatchSummary {
+        StepReport {
             solids: self.solids.len(),
+            parts: None,
             faces: faces.len(),
             edges: edges.len(),
             vertices: vertices.len(),
             volume: shells.map(|s| self.boundary.volume(s)).sum(),
             deviation: self.deviation,
-            angle: self.angle,
+            angle: Some(self.angle),
         }
     }
 

@@ -1,5 +1,6 @@
-//! Reports: every figure of a design or a mesh, declared once. The fields are the keys of the JSON that the command
-//! prints and the attributes of the Python classes, whose text is made from the comments here (`scripts/report_classes.py`).
+//! Reports: every figure of a design or a mesh, declared once, here or where it is computed. The fields are the
+//! keys of the JSON that the command prints and the attributes of the Python classes, whose text is made from their comments
+//! (`scripts/report_classes.py`).
 
 mod beams_report;
 mod cell_report;
@@ -13,24 +14,22 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-pub use beams_report::{
-    BeamsFileReport, BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, StepReport, TrimmedReport,
-};
+pub use crate::analysis::{Dangling, Thickness};
+pub use crate::surface_maker::Estimate;
+pub use beams_report::{BeamsFileReport, BeamsReport, FilletShortfall, GraphReport, PatternReport};
 pub use cell_report::{CellGrid, ConductivityReport, PermeabilityReport, StiffnessReport};
 pub use design_report::{
-    BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
-    PeriodReport, PropertyReport, RbfReport, RegionReport, SingularLineReport, TessellationReport, TransitionReport,
+    BlendReport, DesignReport, FractionAlong, LatticeReport, LooseBodies, NarrowestNeck, PropertyReport, RbfReport,
+    RegionReport, SingularLineReport, TessellationReport, TransitionReport,
 };
+pub use geometry::formats::part21::StepReport;
+pub use geometry::measure::TriangleQuality;
+pub use geometry::repair::Repaired;
+pub use geometry::simplify::SimplifyReport;
+pub use geometry::smooth::SmoothReport;
 pub use layers_report::LayersReport;
-pub use mesh_report::{
-    DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,
-    RepairReport, SimplifyReport, SmoothReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread,
-    VoidReport,
-};
-pub use tets_report::{
-    Creases, DihedralReport, FitReport, LayersMade, MinMeanMax, NetReport, TetMeshReport, TetQualityReport,
-    TilingReport, WallSpread, ZoneJoin, ZoneReport,
-};
+pub use mesh_report::{IslandsReport, LargestIsland, MeshReport, SpecificSurface, SurfaceReport};
+pub use tets_report::{NetReport, TetMeshReport, TilingReport, ZoneJoin, ZoneReport};
 pub use volume_report::{BeamMeshReport, DomainReport, SetReport, ShellReport, VolumeReport, VoxelElementsReport};
 
 /// A number, or its least and greatest value over the region where it varies.
@@ -59,14 +58,14 @@ struct Reports {
     design: DesignReport,
     transition: TransitionReport,
     mesh: MeshReport,
-    quality: QualityReport,
+    quality: TriangleQuality,
     surface: SurfaceReport,
     simplified: SimplifyReport,
     smoothed: SmoothReport,
-    thickness: ThicknessReport,
-    dangling: DanglingReport,
-    repair: RepairReport,
-    estimate: EstimateReport,
+    thickness: Thickness,
+    dangling: Dangling,
+    repair: Repaired,
+    estimate: Estimate,
     tets: TetMeshReport,
     step: StepReport,
     beams_file: BeamsFileReport,

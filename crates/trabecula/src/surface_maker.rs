@@ -5,6 +5,9 @@
 
 use std::io;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use geometry::fault::Fault;
 use geometry::formats::stl;
 use geometry::math::Vec3;
@@ -144,18 +147,20 @@ pub struct Summary {
     pub error: Option<f64>,
 }
 
-/// The work and memory that making a surface requires.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What a surface will take, estimated on a coarse grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "EstimateReport")]
 pub struct Estimate {
-    /// Grid cells along each axis; zeros without a grid.
+    /// Grid cells along x, y, z.
     pub cells: [u64; 3],
-    /// Approximate number of triangles.
+    /// Number of triangles.
     pub triangles: f64,
-    /// Approximate number of triangles held in memory while streaming, beyond a bounded number.
+    /// Number of triangles held in memory while streaming, beyond a bounded number.
+    #[serde(skip)]
     pub held: f64,
-    /// Approximate memory of an indexed mesh, bytes.
+    /// Bytes of memory of the mesh.
     pub memory: f64,
-    /// Approximate size of a binary STL, bytes.
+    /// Bytes of a binary STL.
     pub stl: f64,
 }
 

@@ -29,7 +29,7 @@ use crate::map::CarrierMesh;
 use crate::map::bent_tets::within;
 use geometry::math::{Aabb, Interval, Mat3, Vec3, add, norm, scale, spectral_norm};
 
-pub use crease::CreaseAngles;
+pub use crease::WallCreases;
 pub use face_grid::FaceGrid;
 pub use node_levels::Amount;
 pub use ports::Ports;
@@ -37,7 +37,7 @@ pub use rounded::Rounded;
 pub use space_filling::SpaceFilling;
 use surface::Bending;
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
-pub use walls::Spread;
+pub use walls::WallSpread;
 
 /// A cell of a tiling, with its scale and weights.
 #[derive(Clone)]

@@ -3,23 +3,27 @@
 
 use std::collections::HashSet;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::wireframe::{GivenRadii, Incidence, Wireframe};
 use geometry::math::{Vec3, norm, sub};
 use geometry::union_find::{find, singles, unite};
 use geometry::weld::PointHash;
 
-/// Counts of a clean-up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Nodes and struts left out before beams are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(rename = "CleanedReport")]
 pub struct Cleaned {
-    /// Nodes merged into another node at the same position.
+    /// Nodes merged into another at the same position.
     pub merged: usize,
-    /// Struts removed because both ends are the same node.
-    pub short: usize,
-    /// Struts removed because another strut joins the same nodes.
+    /// Struts of zero length.
+    pub zero_length: usize,
+    /// Struts that join the same nodes as another.
     pub duplicates: usize,
-    /// Nodes removed because no strut ends there.
+    /// Nodes without a strut.
     pub isolated: usize,
-    /// Struts with a free end removed one after the other.
+    /// Struts with a free end.
     pub dangling: usize,
 }
 
@@ -36,7 +40,7 @@ impl Wireframe {
             *strut = strut.map(|n| root[n as usize]);
             let [a, b] = *strut;
             let new = a != b && joined.insert([a.min(b), a.max(b)]);
-            counts.short += usize::from(a == b);
+            counts.zero_length += usize::from(a == b);
             counts.duplicates += usize::from(a != b && !new);
             kept.push(new);
         }
@@ -117,7 +121,7 @@ mod tests {
         let struts = (1..6).map(|i| [f64::from(i), 0.0]).collect();
         let mut radii = GivenRadii { nodes: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6], struts };
         let counts = wireframe.clean(1e-6, &mut radii);
-        assert_eq!(counts, Cleaned { merged: 2, short: 1, duplicates: 1, isolated: 1, dangling: 0 });
+        assert_eq!(counts, Cleaned { merged: 2, zero_length: 1, duplicates: 1, isolated: 1, dangling: 0 });
         assert_eq!(wireframe.struts, [[0, 1], [1, 2], [2, 0]]);
         assert_eq!(radii.nodes, [0.1, 0.2, 0.4]);
         assert_eq!(radii.struts, [[1.0, 0.0], [4.0, 0.0], [5.0, 0.0]]);

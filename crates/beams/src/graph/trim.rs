@@ -1,6 +1,8 @@
 //! Trimming of a wireframe to a region.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::wireframe::{GivenRadii, Wireframe};
 use crate::Values;
@@ -18,12 +20,13 @@ pub enum Trim {
     Snap,
 }
 
-/// Counts of a trim.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Struts that leave the region.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(rename = "TrimmedReport")]
 pub struct Trimmed {
-    /// Struts outside the region.
+    /// Struts without a part in the region.
     pub outside: usize,
-    /// Struts removed because they leave the region.
+    /// Struts left out.
     pub dropped: usize,
     /// Struts shortened to the surface.
     pub snapped: usize,

@@ -5,6 +5,9 @@ use core::fmt::{self, Display, Write as _};
 use std::collections::HashMap;
 use std::io;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::math::Vec3;
 
 /// The application protocol of a file. Solids are the same in both.
@@ -55,6 +58,27 @@ pub struct Title<'a> {
     pub name: &'a str,
     /// Its application protocol.
     pub protocol: Protocol,
+}
+
+/// What a STEP file contains.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct StepReport {
+    /// Number of solids: connected components, or placed parts of an assembly.
+    pub solids: usize,
+    /// Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none.
+    pub parts: Option<usize>,
+    /// Number of faces; of an assembly, of its distinct parts.
+    pub faces: usize,
+    /// Number of edges; of an assembly, of its distinct parts.
+    pub edges: usize,
+    /// Number of vertices; of an assembly, of its distinct parts.
+    pub vertices: usize,
+    /// Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches.
+    pub volume: f64,
+    /// Greatest distance of patches from the surface that they stand for, mm, at 49 points of each; 0 for beams, which are exact.
+    pub deviation: f64,
+    /// Greatest angle between the normals of adjacent patches along their common edge, degrees; null for beams.
+    pub angle: Option<f64>,
 }
 
 /// The number of an entity.

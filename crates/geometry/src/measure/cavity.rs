@@ -1,19 +1,23 @@
 //! Closed voids: powder or resin cannot leave them.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::components::{self, Components};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
-/// A closed void in a solid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A closed void, from which powder and resin cannot drain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "VoidReport")]
 pub struct Cavity {
-    /// The volume inside its surface, mm³; solids that float in it are not subtracted.
+    /// Volume, mm³.
     pub volume: f64,
-    /// A point in it, mm: the farthest from its surface of a few tried.
+    /// A point inside, mm.
     pub point: Vec3,
-    /// Its bounds, mm.
+    /// Lower and upper corner of the bounds, mm.
+    #[schemars(with = "[Vec3; 2]")]
     pub bounds: Aabb,
 }
 

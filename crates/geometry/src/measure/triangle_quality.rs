@@ -1,19 +1,23 @@
 //! Angles and aspect ratios of triangles.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 
-/// The shapes of a mesh's triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Quality {
-    /// The smallest angle of any triangle, degrees; 60 at best.
+/// How well shaped the triangles of a mesh are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "QualityReport")]
+pub struct TriangleQuality {
+    /// Smallest angle, degrees; 60 at best.
     pub smallest_angle: f64,
-    /// A twentieth of the triangles has a smaller angle than this, degrees.
+    /// Its 5th percentile, degrees.
     pub smallest_angle_p05: f64,
-    /// The largest aspect ratio: longest edge over 2√3 times the radius of the inscribed circle; 1 at best, infinite
-    /// for a triangle without area.
+    // Infinity is null in JSON.
+    /// Longest edge over 2√3 times the inscribed circle's radius, 1 at best; None for a triangle without area.
+    #[schemars(with = "Option<f64>")]
     pub largest_aspect: f64,
 }
 
@@ -90,7 +94,7 @@ impl ShapeCounts {
     }
 
     /// The quality of all triangles; `None` without triangles. The percentile is exact to a thousandth of a degree.
-    pub fn quality(&self) -> Option<Quality> {
+    pub fn quality(&self) -> Option<TriangleQuality> {
         let total: u64 = self.counts.iter().sum();
         let mut below = 0;
         let place = self.counts.iter().position(|n| {
@@ -99,19 +103,19 @@ impl ShapeCounts {
         })?;
         let smallest_angle_p05 = ((place as f64 + 0.5) / INTERVALS).max(self.all.smallest_angle);
         let Shapes { smallest_angle, largest_aspect, .. } = self.all;
-        Some(Quality { smallest_angle, smallest_angle_p05, largest_aspect })
+        Some(TriangleQuality { smallest_angle, smallest_angle_p05, largest_aspect })
     }
 }
 
 /// The quality of a mesh; `None` without triangles. Exact to rounding.
-pub fn quality(mesh: &Mesh) -> Option<Quality> {
+pub fn quality(mesh: &Mesh) -> Option<TriangleQuality> {
     let shapes: Vec<(f64, f64)> = (0..mesh.triangles.len()).into_par_iter().map(|i| shape(mesh.corners(i))).collect();
     let largest_aspect = shapes.iter().fold(1.0, |m: f64, s| m.max(s.1));
     let mut angles: Vec<f64> = shapes.into_iter().map(|s| s.0).collect();
     let smallest_angle = angles.iter().copied().reduce(f64::min)?;
     let place = angles.len() / 20;
     let (_, p05, _) = angles.select_nth_unstable_by(place, f64::total_cmp);
-    Some(Quality { smallest_angle, smallest_angle_p05: *p05, largest_aspect })
+    Some(TriangleQuality { smallest_angle, smallest_angle_p05: *p05, largest_aspect })
 }
 
 /// Smallest angle (degrees) and aspect ratio of a triangle.

@@ -1,6 +1,8 @@
 //! The fit of a tetrahedral mesh to a part, measured both ways, and the features of the part that it does not keep.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Serialize, Serializer};
 
 use super::TetMesh;
 use super::tet_locator::TetLocator;
@@ -23,8 +25,9 @@ const ONE_WAY: f64 = 0.5;
 /// Above this greatest moment of their normals they face along one axis.
 const TWO_WAYS: f64 = 0.75;
 
-/// Distances from one surface to another, by samples spread evenly over it (mm).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Distances from one surface to another, by samples an eighth of a tetrahedron's size apart, mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "DistanceReport")]
 pub struct Distances {
     /// Mean.
     pub mean: f64,
@@ -34,8 +37,8 @@ pub struct Distances {
     pub p99: f64,
     /// Maximum.
     pub max: f64,
-    /// Position of the maximum.
-    pub at: Vec3,
+    /// Position of the maximum, mm.
+    pub at: [f64; 3],
 }
 
 /// What kind of feature is lost.
@@ -69,16 +72,24 @@ impl LostKind {
     }
 }
 
-/// A feature of a part that its mesh does not keep.
-#[derive(Clone, Copy, Debug, PartialEq)]
+impl Serialize for LostKind {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.word())
+    }
+}
+
+/// A feature of a region that a mesh does not keep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "LostFeatureReport")]
 pub struct LostFeature {
-    /// Its kind.
+    /// Filled: hole, slot, recess; left out: wall, pin, block.
+    #[schemars(with = "String")]
     pub kind: LostKind,
-    /// Where it is farthest from the boundary of the tetrahedra (mm).
-    pub at: Vec3,
-    /// Its width (mm): of a hole or pin the diameter, of a slot or wall the distance between its faces, else the depth.
+    /// Where it is farthest from the boundary of the mesh, mm.
+    pub at: [f64; 3],
+    /// Its width, mm: of a hole or pin the diameter, of a slot or wall the distance between its faces, else the depth.
     pub size: f64,
-    /// The greatest distance from the boundary of the tetrahedra (mm).
+    /// The greatest distance from the boundary of the mesh, mm.
     pub depth: f64,
 }
 

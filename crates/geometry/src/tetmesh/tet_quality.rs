@@ -1,6 +1,8 @@
 //! Dihedral angles, edge lengths and volumes of tetrahedra.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{EDGES, FACES, TetMesh, volume};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
@@ -10,20 +12,20 @@ pub const SLIVER: f64 = 10.0;
 /// Degrees in a step of the histogram.
 const STEP: usize = 10;
 
-/// Least, mean and greatest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
-    /// Least.
+/// Minimum, mean and maximum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MinMeanMax {
+    /// Minimum.
     pub min: f64,
     /// Mean.
     pub mean: f64,
-    /// Greatest.
+    /// Maximum.
     pub max: f64,
 }
 
-impl Spread {
-    fn of(values: impl Iterator<Item = f64>) -> Spread {
-        let (mut s, mut n) = (Spread { min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }, 0usize);
+impl MinMeanMax {
+    fn of(values: impl Iterator<Item = f64>) -> MinMeanMax {
+        let (mut s, mut n) = (MinMeanMax { min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }, 0usize);
         for v in values {
             (s.min, s.mean, s.max, n) = (s.min.min(v), s.mean + v, s.max.max(v), n + 1);
         }
@@ -33,50 +35,52 @@ impl Spread {
 }
 
 /// Dihedral angles, degrees: 70.53 in a regular tetrahedron.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Dihedral {
-    /// The least of all.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "DihedralReport")]
+pub struct DihedralAngles {
+    /// Minimum.
     pub min: f64,
-    /// The greatest of all.
+    /// Maximum.
     pub max: f64,
-    /// 5 % of the tetrahedra have a smaller least angle.
+    /// 5th percentile of each tetrahedron's least angle.
     pub min_p05: f64,
-    /// Half of the tetrahedra have a smaller least angle.
+    /// Median of each tetrahedron's least angle.
     pub min_p50: f64,
-    /// Half of the tetrahedra have a greater greatest angle.
+    /// Median of each tetrahedron's greatest angle.
     pub max_p50: f64,
-    /// 5 % of the tetrahedra have a greater greatest angle.
+    /// 95th percentile of each tetrahedron's greatest angle.
     pub max_p95: f64,
-    /// Angles (six for each tetrahedron) in steps of ten degrees from 0 to 180.
+    /// Number of angles (six for each tetrahedron) in steps of ten degrees from 0 to 180.
     pub histogram: Vec<usize>,
 }
 
-/// The shapes of a mesh's tetrahedra.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Quality {
+/// Shapes and sizes of a mesh's tetrahedra.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "TetQualityReport")]
+pub struct TetQuality {
     /// Number of tetrahedra.
     pub tets: usize,
     /// Number of nodes.
     pub nodes: usize,
-    /// Triangles of the boundary.
+    /// Number of triangles of the boundary.
     pub boundary_triangles: usize,
-    /// Pieces that hold together by faces.
+    /// Number of components connected by faces.
     pub pieces: usize,
-    /// Lower and upper corner of the bounds (mm).
-    pub bounds: [Vec3; 2],
-    /// Volume (mm³).
+    /// Lower and upper corner of the bounds, mm.
+    pub bounds: [[f64; 3]; 2],
+    /// Volume, mm³.
     pub volume: f64,
-    /// Lengths of edges (mm), each counted once for each tetrahedron that has it.
-    pub edge: Spread,
-    /// Sizes (mm): the edge of a regular tetrahedron of the same volume.
-    pub size: Spread,
-    /// Dihedral angles.
-    pub dihedral: Dihedral,
-    /// Aspect: longest edge over √24 times the radius of the inscribed ball; 1 for a regular tetrahedron.
-    pub aspect: Spread,
-    /// Tetrahedra with a dihedral angle below 10° or above 170°.
+    /// Lengths of edges, mm, each counted once for each tetrahedron that has it.
+    pub edge: MinMeanMax,
+    /// Sizes, mm: the edge of a regular tetrahedron of the same volume.
+    pub size: MinMeanMax,
+    /// Dihedral angles, degrees.
+    pub dihedral: DihedralAngles,
+    /// Longest edge over √24 times the radius of the inscribed ball; 1 for a regular tetrahedron.
+    pub aspect: MinMeanMax,
+    /// Number of tetrahedra with a dihedral angle below 10° or above 170°.
     pub slivers: usize,
-    /// Tetrahedra of negative volume.
+    /// Number of tetrahedra of negative volume.
     pub inverted: usize,
 }
 
@@ -107,7 +111,7 @@ pub fn aspect(p: [Vec3; 4]) -> f64 {
 
 impl TetMesh {
     /// The shapes of the tetrahedra; `None` without any.
-    pub fn quality(&self) -> Option<Quality> {
+    pub fn quality(&self) -> Option<TetQuality> {
         if self.tets.is_empty() {
             return None;
         }
@@ -132,16 +136,16 @@ impl TetMesh {
         });
         let used = self.tets.iter().flatten();
         let bounds = used.fold(Aabb::EMPTY, |b, n| b.with(self.nodes[*n as usize]));
-        Some(Quality {
+        Some(TetQuality {
             tets: self.tets.len(),
             nodes: self.nodes.len(),
             boundary_triangles: self.boundary_faces().len(),
             pieces: self.pieces().0,
             bounds: [bounds.min, bounds.max],
             volume: volumes.iter().sum(),
-            edge: Spread::of(lengths),
-            size: Spread::of(volumes.iter().map(|v| size_of(v.abs()))),
-            dihedral: Dihedral {
+            edge: MinMeanMax::of(lengths),
+            size: MinMeanMax::of(volumes.iter().map(|v| size_of(v.abs()))),
+            dihedral: DihedralAngles {
                 min: least[0],
                 max: most[most.len() - 1],
                 min_p05: at(&least, 0.05),
@@ -150,7 +154,7 @@ impl TetMesh {
                 max_p95: at(&most, 0.95),
                 histogram,
             },
-            aspect: Spread::of((0..self.tets.len()).map(|i| aspect(self.corners(i)))),
+            aspect: MinMeanMax::of((0..self.tets.len()).map(|i| aspect(self.corners(i)))),
             slivers,
             inverted: volumes.iter().filter(|v| **v < 0.0).count(),
         })

@@ -10,6 +10,8 @@
 //! block's in which its first point is.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::grid_depth::depths;
 use crate::field::{Block, Field};
@@ -31,19 +33,29 @@ const CUBE: usize = 8;
 /// Most points in all: beyond it a look would take days.
 const MOST: f64 = 1e12;
 
-/// Bits that dangle.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Weakly attached fragments.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "DanglingReport")]
 pub struct Dangling {
     /// Their number.
     pub count: usize,
-    /// Their volume, mm³.
+    /// Their volume in all, mm³.
     pub volume: f64,
-    /// The largest: volume (mm³) and a point in it (mm).
-    pub largest: Option<(f64, Vec3)>,
-    /// The neck below which a bit is dangling, mm.
+    /// The largest of them.
+    pub largest: Option<LargestBit>,
+    /// The neck below which a fragment counts, mm.
     pub neck: f64,
-    /// Distance between points, mm.
+    /// Distance between sample points, mm.
     pub step: f64,
+}
+
+/// The largest weakly attached fragment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LargestBit {
+    /// Volume, mm³.
+    pub volume: f64,
+    /// A point in it, mm.
+    pub place: [f64; 3],
 }
 
 /// Looks for bits of a solid that hang by necks thinner than half of `neck` (mm), the narrowest of its lattice.
@@ -94,7 +106,11 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
     Ok(Dangling {
         count: bits.len(),
         volume: bits.iter().fold(0.0, |sum, b| sum + b.0),
-        largest: bits.iter().copied().reduce(|a, b| if b.0 > a.0 { b } else { a }),
+        largest: bits
+            .iter()
+            .copied()
+            .reduce(|a, b| if b.0 > a.0 { b } else { a })
+            .map(|(volume, place)| LargestBit { volume, place }),
         neck: thin,
         step,
     })
@@ -289,7 +305,7 @@ mod tests {
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         let off = 4.0 * std::f64::consts::PI * found.step / 6.0;
         assert!((found.volume / 3.0 - ball).abs() < off + 0.03, "{}", found.volume);
-        let (largest, at) = found.largest.unwrap();
+        let LargestBit { volume: largest, place: at } = found.largest.unwrap();
         assert!(largest < 1.2 * ball && (at[2] - 1.5).abs() < 1.0, "{at:?}");
     }
 }

@@ -11,6 +11,8 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::field::Block;
 use crate::region::Region;
@@ -46,40 +48,44 @@ const USUAL: f64 = (1u64 << 24) as f64;
 /// Bars of a histogram, about.
 const BARS: f64 = 50.0;
 
-/// How thickness is distributed over a volume. Lengths are mm.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// The thinnest place: the least ball that touches on opposite sides (directions more than 150° apart), cuts by
-    /// the region left out. Sharp edges, where local thickness ends at zero, have no part in it. The least local
-    /// thickness where there is no such ball.
+/// The distribution of local thickness over a volume.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ThicknessSpread {
+    /// Minimum between opposite sides, mm; sharp edges, where local thickness ends at 0, are left out.
     pub min: f64,
-    /// A twentieth of the volume is thinner.
+    /// 5th percentile, mm.
     pub p05: f64,
-    /// The mean over the volume.
+    /// Mean, mm.
     pub mean: f64,
-    /// The standard deviation over the volume.
+    /// Standard deviation, mm.
     pub sd: f64,
-    /// The thickest place.
+    /// Maximum, mm.
     pub max: f64,
-    /// Ends of the bars of the histogram, ascending from 0.
-    pub edges: Vec<f64>,
-    /// The share of the volume in each bar.
-    pub share: Vec<f64>,
-    /// Voxels counted.
-    pub voxels: u64,
-}
-
-/// Local thickness of a solid and of its pores.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Thickness {
     /// Edge of a voxel, mm.
     pub step: f64,
-    /// Means are right to about this, mm: `ACCURACY` steps.
+    /// Accuracy of these figures, mm.
     pub accuracy: f64,
-    /// The solid.
-    pub wall: Spread,
-    /// The region without the solid; `None` without a region, or where nothing is left of it.
-    pub pore: Option<Spread>,
+    /// Shares of the volume by thickness.
+    pub histogram: Histogram,
+}
+
+/// A histogram.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Histogram {
+    /// Ends of the bars, ascending from 0, mm.
+    pub edges: Vec<f64>,
+    /// Share of the volume in each bar.
+    pub share: Vec<f64>,
+}
+
+/// Local thickness: at each point the diameter of the largest ball that fits in and covers the point.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "ThicknessReport")]
+pub struct Thickness {
+    /// Of the solid, mm.
+    pub wall_thickness: ThicknessSpread,
+    /// Of the pores, mm; None without a region.
+    pub pore_size: Option<ThicknessSpread>,
 }
 
 /// Voxels over a mesh.
@@ -187,16 +193,16 @@ pub fn thickness(
     progress: &dyn Progress,
 ) -> Result<Thickness, Stopped> {
     in_solid(surface, region, step, progress, |space, watch| {
-        let wall = spread(&space, watch)?;
-        let mut pore = None;
+        let wall_thickness = spread(&space, watch)?;
+        let mut pore_size = None;
         if let Some(region) = region {
             let pores = pores(space.grid, region);
             let room = |v: [usize; 3]| -region.value(space.grid.place(v)) / step;
             if pores.count() > 0 {
-                pore = Some(spread(&BallSpace { inside: &pores, side: 1.0, open: Some(&room), ..space }, watch)?);
+                pore_size = Some(spread(&BallSpace { inside: &pores, side: 1.0, open: Some(&room), ..space }, watch)?);
             }
         }
-        Ok(Thickness { step, accuracy: ACCURACY * step, wall, pore })
+        Ok(Thickness { wall_thickness, pore_size })
     })
 }
 
@@ -342,7 +348,7 @@ fn pores(grid: &SolidVoxels, region: &Region) -> Bits {
 }
 
 /// The distribution over a space.
-fn spread(space: &BallSpace, watch: &Watch) -> Result<Spread, Stopped> {
+fn spread(space: &BallSpace, watch: &Watch) -> Result<ThicknessSpread, Stopped> {
     let balls = space.balls(watch)?;
     let least = balls.iter().filter_map(|b| b.wall).reduce(f32::min).map(|d| d / 2.0);
     let balls = space.needed(&balls);
@@ -352,7 +358,7 @@ fn spread(space: &BallSpace, watch: &Watch) -> Result<Spread, Stopped> {
     let (n, step) = (radii.len().max(1), space.grid.step);
     let diameter = |r: f32| 2.0 * f64::from(r) * step;
     let (_, p05, _) = match radii.len() {
-        0 => return Ok(Spread::default()),
+        0 => return Ok(ThicknessSpread { step, accuracy: ACCURACY * step, ..ThicknessSpread::default() }),
         len => radii.select_nth_unstable_by(len / 20, f32::total_cmp),
     };
     let p05 = diameter(*p05);
@@ -366,15 +372,18 @@ fn spread(space: &BallSpace, watch: &Watch) -> Result<Spread, Stopped> {
     for r in &radii {
         counts[((diameter(*r) / width) as usize).min(bars - 1)] += 1;
     }
-    Ok(Spread {
+    Ok(ThicknessSpread {
         min: diameter(least.unwrap_or(low)),
         p05,
         mean,
         sd: square.sqrt(),
         max: diameter(high),
-        edges: (0..=bars).map(|i| i as f64 * width).collect(),
-        share: counts.iter().map(|c| *c as f64 / n as f64).collect(),
-        voxels: radii.len() as u64,
+        step,
+        accuracy: ACCURACY * step,
+        histogram: Histogram {
+            edges: (0..=bars).map(|i| i as f64 * width).collect(),
+            share: counts.iter().map(|c| *c as f64 / n as f64).collect(),
+        },
     })
 }
 

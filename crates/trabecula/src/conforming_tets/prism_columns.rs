@@ -4,6 +4,9 @@
 //! their shapes improve: at sharp edges, where columns lean and the prisms' inner ends are small, and where neighbours are
 //! of very different lengths. The mesh beneath is improved in between.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::node_surfaces::{SurfaceSet, onto};
 use super::shaping::{POOR, Shaping};
 use super::tet_shape::{shape, shapes};
@@ -21,19 +24,20 @@ pub(crate) struct FilledLayers {
     pub wanted: Vec<f64>,
 }
 
-/// The layers that were made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Layers of prisms along the surface of a tetrahedral mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "LayersMade")]
 pub struct MadeLayers {
-    /// Number of prisms and wedges.
+    /// Number of prisms and wedges, each cut into tetrahedra.
     pub prisms: usize,
-    /// The mean over their area of the heights in those that are asked for, of nodes where layers do not taper.
+    /// Mean over their area of their heights in those asked for, where layers do not taper to their end.
     pub mean: f64,
-    /// The share of their area where they are lower than nine tenths of these.
+    /// Share of that area where they are lower than nine tenths of these.
     pub lower: f64,
-    /// The least of these.
+    /// The least of these heights.
     pub least: f64,
     /// Where it is, mm.
-    pub at: Vec3,
+    pub at: [f64; 3],
 }
 
 /// Rounds of pushing and improvement, and the parts of the way that are tried in each.

@@ -7,8 +7,8 @@ use super::build_cell::cell;
 use super::data::*;
 use super::finish_tiling::Finished;
 use super::{
-    Built, Coverage, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin,
-    build_tets, build_tiling, sample, warn,
+    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_core, build_level, build_skin, build_tets,
+    build_tiling, sample, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
@@ -18,7 +18,7 @@ use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
 use crate::region::{FARTHEST, Notes, Region};
-use crate::report::PropertyReport;
+use crate::report::{NetReport, PropertyReport};
 use crate::solid::Solid;
 use crate::truss::Beams;
 use geometry::fault::number;
@@ -192,7 +192,7 @@ fn tiled(
     let build_tiling::BuiltTiling { done, alone, on_grid, aim, zones, joins } =
         build_tiling::lattice(&domain, environment, warnings)?;
     let Finished { tiling, placed, field, net, radii, fraction: finished } = done;
-    let coverage = net.as_ref().map(|rods| Coverage::new(&tiling, rods));
+    let coverage = net.as_ref().map(|rods| NetReport::new(&tiling, rods));
     if let Some(of) = &coverage {
         of.warn(opening, &format!("{}.map.tets", environment.path), warnings);
     }

@@ -9,6 +9,7 @@ use crate::blend::{Blend, BlendRule, Constituent, Weights};
 use crate::environment::Environment;
 use crate::grade::Quantity;
 use crate::kind::{DesignError, Key};
+use crate::report::RbfReport;
 use geometry::fault::number;
 use geometry::math::{Vec3, add, norm, scale, sub};
 use geometry::roots::bisect;
@@ -58,21 +59,9 @@ pub struct Blended {
     /// The names of its lattices.
     pub names: Vec<String>,
     /// The radial basis functions among its weights.
-    pub functions: Vec<Functions>,
+    pub functions: Vec<RbfReport>,
     /// Width of the narrowest transition, mm: the inverse of the steepest weight where two lattices have the same weight.
     pub width: Option<f64>,
-}
-
-/// Radial basis functions in a weight.
-pub struct Functions {
-    /// Their path in the design.
-    pub path: String,
-    /// Number of control points.
-    pub points: usize,
-    /// δ, mm.
-    pub delta: f64,
-    /// Condition number of their equations.
-    pub condition: f64,
 }
 
 /// The radial basis functions in a weight, itself or under a step. Warns of lines there that cross themselves.
@@ -80,7 +69,7 @@ fn functions(
     spec: &GradeSpec,
     path: &str,
     environment: &Environment,
-    out: &mut Vec<Functions>,
+    out: &mut Vec<RbfReport>,
     warnings: &mut Vec<Warning>,
 ) -> Result<(), DesignError> {
     match spec {
@@ -103,7 +92,7 @@ fn functions(
             let path = format!("{path}.rbf");
             let made = r.functions(&path, environment)?;
             let (points, delta, condition) = (made.len(), made.delta(), made.condition());
-            out.push(Functions { path, points, delta, condition });
+            out.push(RbfReport { path, points, delta, condition });
             Ok(())
         }
         _ => Ok(()),

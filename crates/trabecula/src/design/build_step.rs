@@ -3,11 +3,10 @@
 use std::io;
 
 use super::{Built, build_beams};
-use crate::patches::{PatchSummary, Patches, TOLERANCE};
-use crate::report::StepReport;
-use ::beams::{StepSummary, write_step};
+use crate::patches::{Patches, TOLERANCE};
+use ::beams::write_step;
 use geometry::fault::Fault;
-use geometry::formats::part21::Title;
+use geometry::formats::part21::{StepReport, Title};
 use geometry::progress::{Progress, Stage, Stopped};
 
 /// Writes the STEP file of a design, as `Built::write_step` says.
@@ -26,9 +25,7 @@ pub(super) fn write(
             return refuse("tolerance", message);
         }
         let (quadors, planes) = build_beams::exact(built).map_err(Stopped::Refused)?;
-        let made = write_step(&quadors, &planes, title, assembly, out)?;
-        let StepSummary { solids, parts, faces, edges, vertices, volume } = made;
-        return Ok(StepReport { solids, parts, faces, edges, vertices, volume, deviation: 0.0, angle: None });
+        return write_step(&quadors, &planes, title, assembly, out);
     }
     if !built.beams.is_empty() {
         let message = "a STEP file has beams alone, with their exact surface, or a lattice in a box, as patches; this design has \
@@ -47,6 +44,5 @@ pub(super) fn write(
     let tolerance = tolerance.unwrap_or(TOLERANCE * built.solid.wavelength);
     let made = Patches::new(&built.solid, tolerance, &Stage { whole: progress, from: 0.0, to: 0.8 })?;
     made.write_step(title, out, &Stage { whole: progress, from: 0.8, to: 1.0 })?;
-    let PatchSummary { solids, faces, edges, vertices, volume, deviation, angle } = made.summary();
-    Ok(StepReport { solids, parts: None, faces, edges, vertices, volume, deviation, angle: Some(angle) })
+    Ok(made.summary())
 }

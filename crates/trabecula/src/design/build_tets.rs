@@ -9,13 +9,13 @@ use super::{Design, Loader, Node, Warning, ZoneNames, sample};
 use crate::environment::{self, Environment};
 use crate::grade::{Quantity, key_of};
 use crate::kind::{DesignError, Key, Kind, NodeCursor};
-use crate::mesher::{self, Background, Fit, MadeLayers, PrismLayers, background};
+use crate::mesher::{self, Background, FitReport, MadeLayers, PrismLayers, background};
 use crate::region::Notes;
-use crate::report::{FitReport, LayersMade, TetMeshReport};
+use crate::report::TetMeshReport;
 use geometry::fault::{Fault, counted, number, position};
 use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::surface_fit::{LostFeature, LostKind};
-use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
+use geometry::tetmesh::{Checked, SLIVER, TetMesh};
 use geometry::transform::Transform;
 use source::{from_file, ftetwild, surface, triangles};
 
@@ -45,48 +45,18 @@ pub struct BuiltTets {
     /// Numbers of zones with names, from its file.
     pub names: ZoneNames,
     /// Its figures.
-    pub report: TetReport,
+    pub report: TetMeshReport,
     /// Warnings of likely mistakes.
     pub warnings: Vec<Warning>,
 }
 
-/// The figures of a tetrahedral mesh.
-#[derive(Clone, Debug)]
-pub struct TetReport {
-    /// Its source: background, ftetwild, or the file's name.
-    pub mesher: String,
-    /// Shapes and sizes.
-    pub quality: Quality,
-    /// How it fits the region, if it is of one.
-    pub fit: Option<Fit>,
-    /// Volume of that region, mm³.
-    pub region_volume: Option<f64>,
-    /// Its layers of prisms.
-    pub layers: Option<MadeLayers>,
-}
-
-impl TetReport {
-    /// Features of the region that the mesh does not keep, but for those that are small against its tetrahedra.
-    pub(super) fn lost_features(&self) -> Vec<&LostFeature> {
-        let matters = |f: &&LostFeature| {
-            let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
-            f.depth > if one_way { FAR } else { DEEP } * self.quality.size.mean
-        };
-        self.fit.iter().flat_map(|f| &f.lost).filter(matters).collect()
-    }
-}
-
-impl From<&TetReport> for TetMeshReport {
-    fn from(r: &TetReport) -> Self {
-        TetMeshReport {
-            mesher: r.mesher.clone(),
-            quality: (&r.quality).into(),
-            fit: r.fit.as_ref().map(FitReport::from),
-            region_volume: r.region_volume,
-            layers: r.layers.as_ref().map(LayersMade::from),
-            warnings: None,
-        }
-    }
+/// Features of the region that a mesh does not keep, but for those that are small against its tetrahedra.
+pub(super) fn lost_features(report: &TetMeshReport) -> Vec<&LostFeature> {
+    let matters = |f: &&LostFeature| {
+        let one_way = matches!(f.kind, LostKind::Block | LostKind::Recess);
+        f.depth > if one_way { FAR } else { DEEP } * report.quality.size.mean
+    };
+    report.fit.iter().flat_map(|f| &f.lost).filter(matters).collect()
 }
 
 impl BuiltTets {
@@ -139,7 +109,7 @@ impl BuiltTets {
 
     /// The figures and the warnings.
     pub fn report(&self) -> TetMeshReport {
-        TetMeshReport { warnings: Some(self.warnings.clone()), ..(&self.report).into() }
+        TetMeshReport { warnings: Some(self.warnings.clone()), ..self.report.clone() }
     }
 }
 
@@ -282,14 +252,14 @@ fn lowered(made: &MadeLayers, path: &str) -> Option<Warning> {
 }
 
 /// Says that tetrahedra were asked for that are larger than the part, which has none of that size.
-fn oversized(spec: &TetsKind, part: Vec3, report: &TetReport, path: &str) -> Option<Warning> {
+fn oversized(spec: &TetsKind, part: Vec3, report: &TetMeshReport, path: &str) -> Option<Warning> {
     let TetsKind::Made(MadeTetsKind { size: GradeSpec::Constant(size), .. }) = spec else { return None };
     let longest = part.into_iter().fold(0.0, f64::max);
     if *size <= longest {
         return None;
     }
     let [x, y, z] = part.map(|v| rounded(v, 4));
-    let uncovered = report.fit.as_ref().map_or(0.0, |f| f.uncovered.share);
+    let uncovered = report.fit.as_ref().map_or(0.0, |f| f.uncovered);
     let left = if uncovered < 1e-3 {
         String::new()
     } else {
@@ -358,14 +328,14 @@ fn checked_mesh(
     mesh: TetMesh,
     checked: &Checked,
     mesher: String,
-    fit: Option<Fit>,
+    fit: Option<FitReport>,
     path: &str,
     is_made: bool,
 ) -> Result<BuiltTets, DesignError> {
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
-    let report = TetReport { mesher, quality, fit, region_volume: None, layers: None };
+    let report = TetMeshReport { mesher, quality, fit, region_volume: None, layers: None, warnings: None };
     let warnings = warnings(&report, checked, path, is_made);
     Ok(BuiltTets { mesh, on_surface: None, names: Vec::new(), report, warnings })
 }
@@ -407,7 +377,7 @@ pub(super) fn of_soup(
 }
 
 /// Warnings of likely mistakes.
-fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) -> Vec<Warning> {
+fn warnings(report: &TetMeshReport, checked: &Checked, path: &str, is_made: bool) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut say = |message: String| {
         out.push(Warning { path: path.to_string(), message });
@@ -442,7 +412,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
         if is_made { "take a smaller size" } else { "is it a mesh of this region, in the right place and unit?" };
     // A mesh of something else has no features of the region to keep.
     let strange = !is_made && fit.to_part.max > FAR * q.size.mean;
-    let lost = report.lost_features();
+    let lost = lost_features(report);
     if !lost.is_empty() && !strange {
         let name = |f: &&LostFeature| format!("a {} of {} mm at {}", f.kind.word(), rounded(f.size, 3), position(f.at));
         let mut named: Vec<String> = lost.iter().take(NAMED).map(name).collect();
@@ -455,12 +425,12 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, is_made: bool) ->
             named.join(", ")
         ));
     }
-    if fit.uncovered.share > MUCH && fit.uncovered.depth > DEEP * q.size.mean {
+    if fit.uncovered > MUCH && fit.uncovered_depth > DEEP * q.size.mean {
         say(format!(
             "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
-            100.0 * fit.uncovered.share,
-            fit.uncovered.depth,
-            position(fit.uncovered.at)
+            100.0 * fit.uncovered,
+            fit.uncovered_depth,
+            position(fit.uncovered_at)
         ));
     }
     if fit.to_part.max > FAR * q.size.mean {
@@ -513,7 +483,7 @@ mod tests {
     fn meshes_are_made_and_read() {
         let it = made("size = 0.3").unwrap();
         assert!((it.report.quality.volume - 1.0).abs() < 1e-12 && it.warnings.is_empty());
-        assert!(it.report.fit.unwrap().uncovered.share == 0.0);
+        assert!(it.report.fit.unwrap().uncovered == 0.0);
         let it = made("path = \"tets.vtk\"").unwrap();
         assert_eq!((it.mesh.tets.len(), it.mesh.zones.as_slice()), (6, &[1, 1, 1, 2, 2, 2][..]));
         let it = made("path = \"hex.vtk\"\nsplit = true").unwrap();

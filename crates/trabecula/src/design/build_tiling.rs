@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::build_cell::orbit_terms;
 use super::build_level::{check_mid, within_wavelength};
-use super::build_tets::{self, TetReport, rounded};
+use super::build_tets::{self, lost_features, rounded};
 use super::data::*;
 use super::finish_tiling::{Finish, Finished};
 use super::joins::{Joins, Zoned, joins};
@@ -21,6 +21,7 @@ use crate::grade::Quantity;
 use crate::kind::DesignError;
 use crate::map::{CarrierMesh, SurfaceEnds};
 use crate::region::{Intersection, MeshRegion, Notes, Region};
+use crate::report::TetMeshReport;
 use crate::tiling::{Amount, NodalLevel, Share, Tiling};
 use geometry::fault::{Fault, position};
 use geometry::mesh::Mesh;
@@ -42,7 +43,7 @@ pub(super) struct TilingDomain<'a> {
     /// Numbers of zones with names.
     names: ZoneNames,
     /// The report on the mesh.
-    pub report: TetReport,
+    pub report: TetMeshReport,
     /// What the lattice fills.
     pub region: Region,
     /// Whether that is the mesh, bent onto the region's surface.
@@ -163,7 +164,7 @@ pub(super) fn domain<'a>(
         None => {
             let bent = CarrierMesh::of_region(&made.mesh, joined.overlap, region).map_err(wrong)?;
             match spec_of_mesh {
-                _ if bent.fits() && made.report.lost_features().is_empty() => (bent, region.clone(), MeshFit::Whole),
+                _ if bent.fits() && lost_features(&made.report).is_empty() => (bent, region.clone(), MeshFit::Whole),
                 TetsKind::Made(_) => (bent, region.clone(), MeshFit::Nearly),
                 TetsKind::File(file) => {
                     let flat = CarrierMesh::new(&made.mesh, joined.overlap).map_err(wrong)?;
@@ -180,8 +181,8 @@ pub(super) fn domain<'a>(
 }
 
 /// What a region and a mesh of something else have in common: the region, if the mesh holds it.
-fn common(region: &Region, mesh: &CarrierMesh, report: &TetReport, path: &str) -> Result<Region, DesignError> {
-    if report.fit.as_ref().is_some_and(|f| f.uncovered.share == 0.0) {
+fn common(region: &Region, mesh: &CarrierMesh, report: &TetMeshReport, path: &str) -> Result<Region, DesignError> {
+    if report.fit.as_ref().is_some_and(|f| f.uncovered == 0.0) {
         return Ok(region.clone());
     }
     let both = Intersection::new(vec![region.clone(), enclosed(mesh.boundary(), path)?]);
@@ -195,7 +196,7 @@ fn common(region: &Region, mesh: &CarrierMesh, report: &TetReport, path: &str) -
 }
 
 /// Says that a region cuts the tetrahedra of a file.
-fn cut(report: &TetReport, file: &str) -> String {
+fn cut(report: &TetMeshReport, file: &str) -> String {
     let [tets, region] = [Some(report.quality.volume), report.region_volume].map(|v| rounded(v.unwrap_or(f64::NAN), 5));
     format!(
         "{file} is not a mesh of this region (its tetrahedra fill {tets} mm³, the region {region} mm³): the lattice fills what they have \
@@ -392,7 +393,7 @@ fn on_grid(domain: &TilingDomain, environment: &Environment, ends: bool) -> Opti
     match domain.fit {
         MeshFit::Whole => None,
         MeshFit::Cut => Some("the region cuts the tetrahedra of the file".into()),
-        MeshFit::Nearly => Some(match (domain.report.lost_features().first(), domain.map.farthest_off()) {
+        MeshFit::Nearly => Some(match (lost_features(&domain.report).first(), domain.map.farthest_off()) {
             (Some(lost), _) => {
                 let size = rounded(lost.size, 3);
                 format!("the tetrahedra do not follow a {} of {size} mm at {}", lost.kind.word(), position(lost.at))

@@ -4,7 +4,6 @@ use std::cell::LazyCell;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use super::build_blend::Functions;
 use super::default_spacing::spacing;
 use super::varied::Varied;
 use super::{Blended, Built, Joins, Tiled, build_beams, sample};
@@ -13,7 +12,7 @@ use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::Lattice;
-use crate::map::{CoreFill, Distortion, Period, Phase, SingularLine, Spread};
+use crate::map::{CoreFill, Period, Phase, SingularLine};
 use crate::region::{CadMesh, Region};
 use crate::report::*;
 use crate::truss::Beams;
@@ -128,7 +127,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         folding: lattice.folding(),
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
-        distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
+        distortion: lattice.map.solved().map(|map| map.distortion().clone()),
         singular: lattice.map.solved().map(singular),
         periods: lattice.map.solved().map(|map| periods(map.periods())),
         fit: None,
@@ -147,14 +146,12 @@ fn phases(phases: Phases) -> &'static str {
 
 /// The blend without its transitions.
 fn blend(b: &Blended) -> BlendReport {
-    let function =
-        |f: &Functions| RbfReport { path: f.path.clone(), points: f.points, delta: f.delta, condition: f.condition };
     BlendReport {
         lattices: b.names.clone(),
         by: if b.blend.phases().is_some() { "fraction" } else { "value" },
         phases: b.blend.phases().map(phases),
         width: b.width,
-        rbf: b.functions.iter().map(function).collect(),
+        rbf: b.functions.clone(),
     }
 }
 
@@ -189,7 +186,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         method: if it.explicit && built.blend.is_none() { "explicit" } else { "implicit" },
         method_reason: it.on_grid.clone().or(built.blend.as_ref().map(|_| "a blend".into())),
         count: tiling.map.len(),
-        mesh: TetMeshReport { fit: None, ..(&it.mesh).into() },
+        mesh: TetMeshReport { fit: None, ..it.mesh.clone() },
         edge: tiling.map.mean_edge(),
         volume,
         solid_fraction: solid / volume,
@@ -200,12 +197,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         overlap: tiling.map.overlap(),
         surface: it.ends.word(),
         end_radius: it.radii.map(|[min, max]| Varied { min, max }.varying()),
-        net: it.coverage.map(|c| NetReport {
-            ports: c.ports,
-            untied: c.untied,
-            opening: c.opening,
-            opening_at: c.opening_at,
-        }),
+        net: it.coverage,
         thickness: None,
         ports: None,
         face_fraction: None,
@@ -228,7 +220,7 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         distortion: None,
         singular: None,
         periods: None,
-        fit: it.mesh.fit.as_ref().map(FitReport::from),
+        fit: it.mesh.fit.clone(),
         tets: None,
     };
     if !it.zones.is_empty() {
@@ -255,20 +247,19 @@ fn tiled(it: &Tiled, built: &Built) -> LatticeReport {
         Some(of_part) if !tiling.varies() => Varied { min: of_part, max: of_part },
         _ => iso.map(|t| tiling.fraction(t)),
     };
-    let spread = tiling.thickness();
     let tets = TilingReport {
         pieces: it.alone.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
-        thickness: spread.as_ref().map(WallSpread::from),
+        thickness: tiling.thickness(),
         ports: Some(cell.count(part, 0.5 * (levels.lo + levels.hi)).ports),
         face_fraction: Some(iso.map(|t| cell.face_fraction(part, t)).varying()),
-        creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max, smoothed: c.smoothed }),
+        creases: tiling.creases(),
         ..mesh
     };
     LatticeReport {
         iso: Some(iso.varying()),
         fraction: share.varying(),
         porosity: share.map(|f| 1.0 - f).varying(),
-        thickness: spread.map(|s| Varying::Range([s.min, s.max])),
+        thickness: tets.thickness.map(|s| Varying::Range([s.min, s.max])),
         connected_fraction: cell.connected_fraction(part),
         tets: Some(tets),
         ..lattice
@@ -353,22 +344,6 @@ fn pores(lattice: &Lattice, iso: Varied) -> (Option<Varying>, Option<[Varying; 2
     (Some(narrower), sides)
 }
 
-/// Deviation of a solved map from its target.
-fn distortion(d: &Distortion) -> DistortionReport {
-    let spread = |s: &Spread| MapSpread { mean: s.mean, p95: s.p95, max: s.max };
-    DistortionReport {
-        angle: d.angle.each_ref().map(spread),
-        spacing: d.spacing.each_ref().map(spread),
-        outside: d.outside,
-        shear: spread(&d.shear),
-        anisotropy: spread(&d.anisotropy),
-        stretch: d.stretch,
-        density: d.density,
-        curl: spread(&d.curl),
-        turn: d.turn,
-    }
-}
-
 /// Singular lines; positions to a millionth of a millimetre.
 fn singular(map: &Phase) -> Vec<SingularLineReport> {
     let one = |l: &SingularLine| SingularLineReport {
@@ -385,13 +360,9 @@ fn singular(map: &Phase) -> Vec<SingularLineReport> {
 }
 
 /// The cells round holes; positions to a millionth of a millimetre.
-fn periods(of: &[Period]) -> Vec<PeriodReport> {
-    let one = |p: &Period| PeriodReport {
-        at: rounded(p.at),
-        along: rounded(p.along),
-        cells: p.cells,
-        asked: rounded(p.asked),
-    };
+fn periods(of: &[Period]) -> Vec<Period> {
+    let one =
+        |p: &Period| Period { at: rounded(p.at), along: rounded(p.along), asked: rounded(p.asked), cells: p.cells };
     of.iter().map(one).collect()
 }
 

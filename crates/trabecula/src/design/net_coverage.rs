@@ -9,26 +9,12 @@ use rayon::prelude::*;
 
 use super::Warning;
 use super::surface_net::Rods;
+use crate::report::NetReport;
 use crate::tiling::{FaceGrid, Tiling};
 
 /// Steps along an edge of a triangle on which ports are found, and at which openings are looked for.
 const STEPS: usize = 24;
 const WIDE: usize = 12;
-
-/// What a net covers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coverage {
-    /// Number of ports on the triangles that it is on.
-    pub ports: usize,
-    /// Number of those that no rod reaches.
-    pub untied: usize,
-    /// Where one of them is, mm.
-    pub at: Option<Vec3>,
-    /// Diameter of the largest disc on the surface that is free of rods, mm.
-    pub opening: f64,
-    /// Its middle, mm.
-    pub opening_at: Vec3,
-}
 
 /// The coordinates in a tetrahedron of a point of one of its faces.
 fn bary(face: [usize; 3], steps: [usize; 3]) -> [f64; 4] {
@@ -38,12 +24,12 @@ fn bary(face: [usize; 3], steps: [usize; 3]) -> [f64; 4] {
     out
 }
 
-impl Coverage {
+impl NetReport {
     /// What the rods of a net cover.
-    pub(super) fn new(tiling: &Tiling, rods: &Rods) -> Coverage {
-        let (ports, untied, at) = ports(tiling, rods);
+    pub(super) fn new(tiling: &Tiling, rods: &Rods) -> NetReport {
+        let (ports, untied, untied_at) = ports(tiling, rods);
         let (opening, opening_at) = opening(tiling, rods);
-        Coverage { ports, untied, at, opening, opening_at }
+        NetReport { ports, untied, untied_at, opening, opening_at }
     }
 
     /// Warns of ports that no rod reaches, and of openings wider than `most` (mm).
@@ -52,7 +38,7 @@ impl Coverage {
         if self.ports == 0 {
             say("surface", "the lattice has no ports on the surface, so the net ties nothing: take a higher fraction or another cell".into());
         }
-        if let Some(at) = self.at {
+        if let Some(at) = self.untied_at {
             say(
                 "surface",
                 format!(

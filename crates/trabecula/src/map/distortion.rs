@@ -3,68 +3,74 @@
 use std::cmp::Ordering;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::cut_cells::CutCells;
 use super::phase_grid::PhaseGrid;
 use super::singular_lines::SingularLine;
 use geometry::math::{Aabb, Mat3, Vec3, cross, determinant, dot, norm, product, spectral_norm, transpose};
 
-/// A number over the region: its mean, its 95th percentile, its greatest value.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
+/// Mean, 95th percentile and maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct MapSpread {
     /// Mean.
     pub mean: f64,
-    /// 95 of 100 are at most that.
+    /// 95th percentile.
     pub p95: f64,
-    /// Greatest.
+    /// Maximum.
     pub max: f64,
 }
 
-impl Spread {
+impl MapSpread {
     /// The mean and the 95th percentile of `values` from index `from` on, the greatest of all.
-    fn of(values: &[f64], from: usize) -> Spread {
+    fn of(values: &[f64], from: usize) -> MapSpread {
         let mut evenly = values[from..].to_vec();
         if evenly.is_empty() {
-            return Spread::default();
+            return MapSpread::default();
         }
         let n = evenly.len();
         let mean = evenly.iter().sum::<f64>() / n as f64;
         evenly.sort_by(f64::total_cmp);
         let max = values.iter().copied().fold(evenly[n - 1], f64::max);
-        Spread { mean, p95: evenly[(95 * (n - 1)).div_ceil(100)], max }
+        MapSpread { mean, p95: evenly[(95 * (n - 1)).div_ceil(100)], max }
     }
 }
 
-/// Deviation of the gradients ∇Φᵢ from the targets Kᵢ in the region: means and percentiles over points between nodes of the
-/// solution's grid, as many in each of its cells, extremes over the nodes as well.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Deviation of a solved map's gradients ∇Φᵢ from the wanted ones Kᵢ.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "DistortionReport")]
 pub struct Distortion {
-    /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
-    pub angle: [Spread; 3],
-    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than the target. `max` and `p95` are of the ratio or its
-    /// inverse, whichever is greater.
-    pub spacing: [Spread; 3],
-    /// Fraction of the points and axes where the spacing ratio is outside 1/1.5 to 1.5.
+    /// Angle between ∇Φᵢ and Kᵢ for each axis, degrees.
+    pub angle: [MapSpread; 3],
+    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
+    /// whichever is greater.
+    pub spacing: [MapSpread; 3],
+    /// Share of points and axes with a spacing ratio outside 1/1.5 to 1.5.
     pub outside: f64,
-    /// The greatest deviation from a right angle between two gradients, degrees.
-    pub shear: Spread,
+    /// Greatest deviation from a right angle between two gradients, degrees.
+    pub shear: MapSpread,
     /// Greatest over least stretch of a cell.
-    pub anisotropy: Spread,
-    /// The least and the greatest length of a cell over the one asked for, along any direction.
+    pub anisotropy: MapSpread,
+    /// Least and greatest length of a cell over the one asked for, along any direction.
     pub stretch: [f64; 2],
     /// Where these are, mm.
+    #[serde(skip)]
     pub stretch_at: [Vec3; 2],
-    /// Least and greatest det J over that of the target: cells for each target cell. Zero or less where the map folds.
+    /// Least and greatest det J over the one asked for; 0 or less where the map folds.
     pub density: [f64; 2],
     /// Where the density is least, mm.
+    #[serde(skip)]
     pub least_at: Vec3,
-    /// |curl Kᵢ| λᵢ² before solving: what no map can follow; zero where K is a gradient.
-    pub curl: Spread,
-    /// The greatest rotation of the target orientation within a cell, or twice that within half a cell or less, degrees.
+    /// |curl Kᵢ| λᵢ², what no map can follow.
+    pub curl: MapSpread,
+    /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
     /// Where that is, mm.
+    #[serde(skip)]
     pub turn_at: Vec3,
     /// The lines round which the target's axes do not come back to themselves.
+    #[serde(skip)]
     pub singular: Vec<SingularLine>,
 }
 
@@ -124,19 +130,19 @@ impl Distortion {
     /// All but the density. What was found from index `from` on is spread evenly; |curl Kᵢ| λᵢ² is separate.
     pub(super) fn of(found: &[Misfit], from: usize, curl: &[f64], (turn, turn_at): (f64, Vec3)) -> Distortion {
         let from = if from < found.len() { from } else { 0 };
-        let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(&found.iter().map(f).collect::<Vec<f64>>(), from);
+        let axis = |f: &dyn Fn(&Misfit) -> f64| MapSpread::of(&found.iter().map(f).collect::<Vec<f64>>(), from);
         let even = &found[from..];
         let outside = even.iter().flat_map(|f| f.spacing).filter(|s| s.max(1.0 / s) > 1.5).count();
         Distortion {
             angle: [0, 1, 2].map(|i| axis(&|f| f.angle[i])),
-            spacing: [0, 1, 2].map(|i| Spread {
+            spacing: [0, 1, 2].map(|i| MapSpread {
                 mean: axis(&|f| f.spacing[i]).mean,
                 ..axis(&|f| f.spacing[i].max(1.0 / f.spacing[i]))
             }),
             outside: outside as f64 / (3 * even.len()).max(1) as f64,
             shear: axis(&|f| f.shear),
             anisotropy: axis(&|f| f.anisotropy),
-            curl: Spread::of(curl, 0),
+            curl: MapSpread::of(curl, 0),
             turn,
             turn_at,
             stretch: [1.0; 2],

@@ -5,6 +5,8 @@
 //! from the least error on, and the first that does not fold is taken.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::edge_squares::{gradient, slopes};
 use super::integral::Problem;
@@ -23,17 +25,18 @@ const KEPT: [usize; 2] = [4, 12];
 /// The part of a step of the grid within which Jacobians do not grow further towards a line.
 const CORE: f64 = 0.25;
 
-/// The cells round a hole.
-#[derive(Clone, Debug, PartialEq)]
+/// The whole numbers of cells round a hole of the region.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "PeriodReport")]
 pub struct Period {
-    /// A point in the hole, mm, and the direction of the line through it there.
-    pub at: Vec3,
-    /// That direction; the sense of the numbers is that of a right-hand screw.
-    pub along: Vec3,
-    /// Whole cells round it along the axes of the cell.
+    /// A point in the hole, on the line through it that cells go round, mm.
+    pub at: [f64; 3],
+    /// Direction of the line there.
+    pub along: [f64; 3],
+    /// Whole cells round the line along each axis of the cell; negative against a right-handed screw.
     pub cells: [i64; 3],
-    /// What least squares ask for.
-    pub asked: Vec3,
+    /// The numbers that least squares ask for.
+    pub asked: [f64; 3],
 }
 
 /// What was tried to keep a map from folding: cells round holes.

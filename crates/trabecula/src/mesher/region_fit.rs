@@ -1,6 +1,8 @@
 //! Fit of a mesh to its region: distances both ways, features that are not kept, and the uncovered part of the region.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::conforming_tets::evaluated as values;
 use crate::field::Field;
@@ -17,34 +19,28 @@ const STEP: f64 = 1.0 / 8.0;
 /// About the maximum number of samples of a surface.
 const MOST: f64 = 400_000.0;
 
-/// The fit of a mesh to its region.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
-    /// From the boundary of the tetrahedra to the region's surface.
+/// How a tetrahedral mesh fits its region.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FitReport {
+    /// Distances from the boundary of the mesh to the region's surface.
     pub to_part: Distances,
-    /// From the region's surface to the boundary of the tetrahedra.
+    /// Distances from the region's surface to the boundary of the mesh.
     pub from_part: Distances,
-    /// Volume of tetrahedra outside the region (mm³), by samples.
+    /// Volume of tetrahedra outside the region, mm³.
     pub gained: f64,
-    /// Volume of the region outside the tetrahedra (mm³), by samples.
+    /// Volume of the region outside the tetrahedra, mm³.
     pub missed: f64,
-    /// Features that are not kept, the deepest first.
+    /// Features of the region that the mesh does not keep, the deepest first: where its surface is farther than an eighth of a
+    /// tetrahedron's size from the boundary.
     pub lost: Vec<LostFeature>,
-    /// What no tetrahedron covers.
-    pub uncovered: Uncovered,
-    /// Volume removed where the boundary was non-manifold, and of small detached fragments (mm³).
+    /// Share of the region that no tetrahedron covers.
+    pub uncovered: f64,
+    /// Greatest depth of such a point below the region's surface, mm.
+    pub uncovered_depth: f64,
+    /// Position of that point, mm.
+    pub uncovered_at: [f64; 3],
+    /// Volume left out where the boundary would meet itself, and of fragments, mm³.
     pub mended: f64,
-}
-
-/// The part of a region that no tetrahedron covers, by samples: cut edges and thin walls.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Uncovered {
-    /// Fraction of the region.
-    pub share: f64,
-    /// Depth below the region's surface of the deepest uncovered point (mm).
-    pub depth: f64,
-    /// Position of that point (mm).
-    pub at: Vec3,
 }
 
 /// The fit of a mesh of tetrahedra of `size` (mm) to a region of some volume (mm³), given its surface, its signed distance (mm) and
@@ -56,7 +52,7 @@ pub fn fit(
     (region, volume): (&dyn Field, f64),
     inside: &[Vec3],
     mended: f64,
-) -> Fit {
+) -> FitReport {
     let spacing = |of: &Mesh| (STEP * size).max((of.area() / MOST).sqrt());
     let boundary = mesh.boundary();
     let own = boundary.samples(spacing(&boundary));
@@ -64,14 +60,16 @@ pub fn fit(
     let step = spacing(surface);
     let samples = on_surface(region, surface.samples(step), step);
     let off = to_boundary(&samples, &boundary, &locator);
-    let uncovered = uncovered(&locator, region, inside);
-    Fit {
+    let (uncovered, uncovered_depth, uncovered_at) = uncovered(&locator, region, inside);
+    FitReport {
         to_part: distances(&own, &values(region, &own.iter().map(|s| s.at).collect::<Vec<_>>())),
         from_part: distances(&samples, &off),
         gained: volume_outside(mesh, |p| values(region, p)),
-        missed: uncovered.share * volume,
+        missed: uncovered * volume,
         lost: lost_features(&samples, &off, size, step),
         uncovered,
+        uncovered_depth,
+        uncovered_at,
         mended,
     }
 }
@@ -93,14 +91,14 @@ fn on_surface(region: &dyn Field, mut samples: Vec<SurfaceSample>, reach: f64) -
     samples
 }
 
-/// The part of a region that no tetrahedron covers, by points inside it.
-fn uncovered(mesh: &TetLocator, region: &dyn Field, inside: &[Vec3]) -> Uncovered {
+/// The share of a region that no tetrahedron covers, by points inside it, and the greatest depth (mm) of such a point and its position.
+fn uncovered(mesh: &TetLocator, region: &dyn Field, inside: &[Vec3]) -> (f64, f64, Vec3) {
     let left: Vec<Vec3> = inside.par_iter().filter(|p| !mesh.covers(**p)).copied().collect();
     let depths = values(region, &left);
     let deep = (0..left.len()).fold(0, |m, i| if depths[i] < depths[m] { i } else { m });
-    Uncovered {
-        share: left.len() as f64 / inside.len().max(1) as f64,
-        depth: depths.get(deep).map_or(0.0, |v| -v),
-        at: left.get(deep).copied().unwrap_or_default(),
-    }
+    (
+        left.len() as f64 / inside.len().max(1) as f64,
+        depths.get(deep).map_or(0.0, |v| -v),
+        left.get(deep).copied().unwrap_or_default(),
+    )
 }

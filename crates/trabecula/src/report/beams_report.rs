@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ::beams::graph::{Cleaned, Trimmed};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -68,9 +69,9 @@ pub struct GraphReport {
     /// Pairs of beams that run into each other without a common node.
     pub collisions: usize,
     /// What was cleaned.
-    pub cleaned: CleanedReport,
+    pub cleaned: Cleaned,
     /// What the region trimmed.
-    pub trimmed: TrimmedReport,
+    pub trimmed: Trimmed,
 }
 
 /// A hub with a fillet smaller than asked for. A crotch is where two of its beams meet.
@@ -107,53 +108,6 @@ pub struct PatternReport {
     pub kinds: usize,
     /// Pairs of beams that run into each other without a common node, about one hub of each kind; None if not known.
     pub collisions: Option<usize>,
-}
-
-/// Nodes and struts left out before beams are made.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct CleanedReport {
-    /// Nodes merged into another at the same position.
-    pub merged: usize,
-    /// Struts of zero length.
-    pub zero_length: usize,
-    /// Struts that join the same nodes as another.
-    pub duplicates: usize,
-    /// Nodes without a strut.
-    pub isolated: usize,
-    /// Struts with a free end.
-    pub dangling: usize,
-}
-
-/// Struts that leave the region.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct TrimmedReport {
-    /// Struts without a part in the region.
-    pub outside: usize,
-    /// Struts left out.
-    pub dropped: usize,
-    /// Struts shortened to the surface.
-    pub snapped: usize,
-}
-
-/// What a STEP file contains.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct StepReport {
-    /// Number of solids: connected components, or placed parts of an assembly.
-    pub solids: usize,
-    /// Number of distinct parts of an assembly, each a hub with its half-beams; null for a file that is none.
-    pub parts: Option<usize>,
-    /// Number of faces; of an assembly, of its distinct parts.
-    pub faces: usize,
-    /// Number of edges; of an assembly, of its distinct parts.
-    pub edges: usize,
-    /// Number of vertices; of an assembly, of its distinct parts.
-    pub vertices: usize,
-    /// Enclosed volume, mm³: of beams to 1e-10, of patches that of the patches.
-    pub volume: f64,
-    /// Greatest distance of patches from the surface that they stand for, mm, at 49 points of each; 0 for beams, which are exact.
-    pub deviation: f64,
-    /// Greatest angle between the normals of adjacent patches along their common edge, degrees; null for beams.
-    pub angle: Option<f64>,
 }
 
 /// What a file of beams contains.

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{BeamsReport, FitReport, TilingReport, Varying};
+use super::{BeamsReport, TilingReport, Varying};
 use crate::kind::Warning;
+use crate::map::{Distortion, Period};
+use crate::mesher::FitReport;
 
 /// The figures of a design, without meshing it.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -68,14 +70,14 @@ pub struct LatticeReport {
     pub truncation: Option<f64>,
     /// Deviation of a solved map from the orientation and wavelength asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub distortion: Option<DistortionReport>,
+    pub distortion: Option<Distortion>,
     /// Lines round which the axes that a solved map is asked for do not come back to themselves, at least half a wavelength long, the
     /// longest first. None without a solved map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub singular: Option<Vec<SingularLineReport>>,
     /// Cells round the holes of the region, empty where the phases of a solved map have one value. None without a solved map.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub periods: Option<Vec<PeriodReport>>,
+    pub periods: Option<Vec<Period>>,
     /// How the tetrahedra of a lattice fit the region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fit: Option<FitReport>,
@@ -161,41 +163,6 @@ pub struct RbfReport {
     pub condition: f64,
 }
 
-/// Mean, 95th percentile and maximum.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct MapSpread {
-    /// Mean.
-    pub mean: f64,
-    /// 95th percentile.
-    pub p95: f64,
-    /// Maximum.
-    pub max: f64,
-}
-
-/// Deviation of a solved map's gradients ∇Φᵢ from the wanted ones Kᵢ.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct DistortionReport {
-    /// Angle between ∇Φᵢ and Kᵢ for each axis, degrees.
-    pub angle: [MapSpread; 3],
-    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
-    /// whichever is greater.
-    pub spacing: [MapSpread; 3],
-    /// Share of points and axes with a spacing ratio outside 1/1.5 to 1.5.
-    pub outside: f64,
-    /// Greatest deviation from a right angle between two gradients, degrees.
-    pub shear: MapSpread,
-    /// Greatest over least stretch of a cell.
-    pub anisotropy: MapSpread,
-    /// Least and greatest length of a cell over the one asked for, along any direction.
-    pub stretch: [f64; 2],
-    /// Least and greatest det J over the one asked for; 0 or less where the map folds.
-    pub density: [f64; 2],
-    /// |curl Kᵢ| λᵢ², what no map can follow.
-    pub curl: MapSpread,
-    /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
-    pub turn: f64,
-}
-
 /// A line round which the wanted axes of a solved map do not come back to themselves: no lattice is without a flaw there, and a core covers
 /// it if the map has one.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -211,19 +178,6 @@ pub struct SingularLineReport {
     pub core: Option<&'static str>,
     /// How far that reaches from the line, mm; null where nothing does.
     pub core_radius: Option<f64>,
-}
-
-/// The whole numbers of cells round a hole of the region.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct PeriodReport {
-    /// A point in the hole, on the line through it that cells go round, mm.
-    pub at: [f64; 3],
-    /// Direction of the line there.
-    pub along: [f64; 3],
-    /// Whole cells round the line along each axis of the cell; negative against a right-handed screw.
-    pub cells: [i64; 3],
-    /// The numbers that least squares ask for.
-    pub asked: [f64; 3],
 }
 
 /// The transition between two lattices of a blend: the lattices alone, without skin and keep zones.

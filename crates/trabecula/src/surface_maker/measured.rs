@@ -1,7 +1,7 @@
 //! Figures of a surface: of one that is held, or taken while it is made.
 
 use geometry::math::{cross, norm, sub};
-use geometry::measure::{self, Cavity, Quality, Size};
+use geometry::measure::{self, Cavity, Size, TriangleQuality};
 use geometry::surface_mesh::SurfaceMesh;
 
 use super::{Components, MeshedSurface};
@@ -23,7 +23,7 @@ pub struct Measured {
     /// Size and topology.
     pub figures: Figures,
     /// The shapes of its triangles.
-    pub quality: Option<Quality>,
+    pub quality: Option<TriangleQuality>,
     /// Connected components of the solid.
     pub components: Components,
 }

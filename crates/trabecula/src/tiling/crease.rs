@@ -1,5 +1,8 @@
 //! The creases of a lattice over a tetrahedral mesh: how much its surface bends at the faces between tetrahedra.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::Tiling;
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Subdivision};
@@ -13,20 +16,21 @@ const FACES: usize = 20_000;
 /// Largest number of tetrahedra whose faces are searched with overlap.
 const SAMPLED: usize = 256;
 
-/// The angles (degrees) between the two sides of the surface at the faces between tetrahedra.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CreaseAngles {
-    /// The mean along all traces.
+/// Angles between walls at the faces of tetrahedra, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "Creases")]
+pub struct WallCreases {
+    /// Mean along all traces, before smoothing by overlap.
     pub mean: f64,
-    /// The greatest.
+    /// Maximum, before smoothing by overlap.
     pub max: f64,
-    /// The greatest between level surfaces of the blended function, where tetrahedra overlap.
+    /// Maximum after smoothing by overlap, at sampled points of the faces; None without overlap.
     pub smoothed: Option<f64>,
 }
 
 impl Tiling {
     /// The creases without overlap, and what is left of them with it, at the mean level where it varies. `None` for transitions, and where no face is met.
-    pub fn creases(&self) -> Option<CreaseAngles> {
+    pub fn creases(&self) -> Option<WallCreases> {
         let [cell] = &self.cells[..] else { return None };
         let levels = self.levels();
         let t = 0.5 * (levels.lo + levels.hi) * cell.scale;
@@ -66,7 +70,7 @@ impl Tiling {
                 }
             }
         }
-        (count > 0.0).then(|| CreaseAngles { mean: sum / count, max, smoothed: self.smoothed() })
+        (count > 0.0).then(|| WallCreases { mean: sum / count, max, smoothed: self.smoothed() })
     }
 
     /// The greatest angle between gradients on both sides of faces, at three points of each of some hundred, 1e-7 of the

@@ -6,6 +6,8 @@
 //! tetrahedra overlap.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::mixture::{Mixture, weights};
 use super::node_levels::{MidSurfacePiece, middle, steepness};
@@ -28,22 +30,22 @@ const PIECES: usize = 2_000_000;
 const ROUNDS: usize = 8;
 const NEAR: f64 = 1e-3;
 
-/// How a thickness (mm) spreads over the walls of all tetrahedra.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// The least of some thousand.
+/// Wall thickness over a tetrahedral mesh, along normals of the mid-surface and weighted by its area, mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct WallSpread {
+    /// Minimum of some thousand.
     pub min: f64,
-    /// A twentieth of the area is below it.
+    /// 5th percentile.
     pub low: f64,
-    /// The volume of walls over the area of their mid-surface.
+    /// Mean: volume of walls over area of their mid-surface.
     pub mean: f64,
-    /// A twentieth of the area is above it.
+    /// 95th percentile.
     pub high: f64,
-    /// The greatest of some thousand.
+    /// Maximum of some thousand.
     pub max: f64,
-    /// The share of the mid-surface from which a wall runs into the next one before it ends.
+    /// Share of the mid-surface from which a wall runs into the next one before it ends.
     pub merged: f64,
-    /// The mean length of the solid along normals, both ways to where it ends: that of the walls unless they run into each other.
+    /// Mean length of the solid along normals, to where it ends: more than the mean wall where walls run into each other.
     pub through: f64,
 }
 
@@ -73,7 +75,7 @@ fn mean(tets: &[usize], pieces: &[MidSurfacePiece], of: impl Fn(usize, &MidSurfa
 impl Tiling {
     /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, by its area. `None` for other parts, for
     /// transitions, and where there is no mid-surface.
-    pub fn thickness(&self) -> Option<Spread> {
+    pub fn thickness(&self) -> Option<WallSpread> {
         let [cell] = &self.cells[..] else { return None };
         if self.part != Part::Sheet {
             return None;
@@ -97,7 +99,7 @@ impl Tiling {
             });
             at.map(|w| w.thickness)
         };
-        Some(Spread {
+        Some(WallSpread {
             min: all.first()?.thickness,
             low: share(0.05)?,
             mean: self.mean_wall(&pieces),

@@ -122,7 +122,7 @@ mod tests {
         let mut wireframe = fill(&graph, &map, &bounds, 0.0).expect("a wireframe");
         let done = wireframe.clean(1e-6, &mut GivenRadii::default());
         // On the axis twelve nodes coincide, and the struts between them have zero length.
-        assert_eq!((done.merged, done.short, done.duplicates), (33, 12, 22));
+        assert_eq!((done.merged, done.zero_length, done.duplicates), (33, 12, 22));
         for s in &wireframe.struts {
             let [a, b] = s.map(|n| wireframe.nodes[n as usize]);
             assert!(norm(sub(a, b)) > 0.9);

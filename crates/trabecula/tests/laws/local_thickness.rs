@@ -8,7 +8,7 @@ use geometry::mesh::Mesh;
 use geometry::mesh::samples::join;
 use geometry::progress::{Progress, Silent, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
-use trabecula::analysis::{Spread, thickness, thickness_at_vertices, usual_step, voxels_for};
+use trabecula::analysis::{ThicknessSpread, thickness, thickness_at_vertices, usual_step, voxels_for};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
@@ -21,8 +21,8 @@ fn bare(mesh: Mesh) -> SurfaceMesh {
     SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh }
 }
 
-fn wall(mesh: Mesh, step: f64) -> Spread {
-    thickness(&bare(mesh), None, step, &Silent).expect("thickness").wall
+fn wall(mesh: Mesh, step: f64) -> ThicknessSpread {
+    thickness(&bare(mesh), None, step, &Silent).expect("thickness").wall_thickness
 }
 
 fn block(min: Vec3, size: Vec3) -> Mesh {
@@ -66,7 +66,7 @@ fn slabs_have_their_thickness_however_they_lie() {
             }
             // Less than the whole only by what no ball reaches at the rim.
             assert!(s.mean > 0.98 * 1.03 && s.mean <= s.max, "{s:?}");
-            assert!((s.share.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!((s.histogram.share.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
     }
 }
@@ -83,7 +83,8 @@ fn faces_of_the_region_in_a_layer_of_centres_are_no_pores() {
     let region: Region = Arc::new(Union::new(whole).expect("union"));
     for shift in [0.0, 5e-9] {
         solid.vertices.iter_mut().for_each(|v| *v = v.map(|x| x - shift));
-        let pore = thickness(&bare(solid.clone()), Some(&region), 0.5, &Silent).expect("thickness").pore.expect("pore");
+        let pore =
+            thickness(&bare(solid.clone()), Some(&region), 0.5, &Silent).expect("thickness").pore_size.expect("pore");
         for found in [pore.min, pore.p05, pore.mean, pore.max] {
             // Planes are exact but for the rounding of single precision; balls touch to a fiftieth of a step.
             assert!((found - 1.0).abs() < 0.02 * 0.5, "{shift}: {pore:?}");
@@ -117,7 +118,7 @@ fn two_slabs_have_two_peaks() {
     let s = wall(two, 0.2);
     assert!((s.min - 1.0).abs() < 0.01 && (s.max - 2.0).abs() < 0.01, "{s:?}");
     let within = |low: f64, high: f64| {
-        let bars = s.edges.windows(2).zip(&s.share);
+        let bars = s.histogram.edges.windows(2).zip(&s.histogram.share);
         bars.filter(|(e, _)| e[0] >= low && e[1] <= high).map(|(_, share)| share).sum::<f64>()
     };
     // A third of the volume and two thirds, less what lies at the rims.
@@ -131,12 +132,12 @@ fn a_shell_and_the_ball_in_it() {
     let shell: Region = Arc::new(Difference::new(vec![region.clone(), Arc::new(ball([0.0; 3], 2.0))]).expect("shell"));
     let made = full(shell, 0.08);
     let t = thickness(&made, Some(&region), 0.15, &Silent).expect("thickness");
-    let pore = t.pore.expect("pore");
-    for found in [t.wall.min, t.wall.p05, t.wall.mean, t.wall.max] {
-        assert!((found - 1.0).abs() < t.accuracy, "{:?}", t.wall);
+    let pore = t.pore_size.expect("pore");
+    for found in [t.wall_thickness.min, t.wall_thickness.p05, t.wall_thickness.mean, t.wall_thickness.max] {
+        assert!((found - 1.0).abs() < t.wall_thickness.accuracy, "{:?}", t.wall_thickness);
     }
     for found in [pore.min, pore.p05, pore.mean, pore.max] {
-        assert!((found - 4.0).abs() < t.accuracy, "{pore:?}");
+        assert!((found - 4.0).abs() < t.wall_thickness.accuracy, "{pore:?}");
     }
 }
 
@@ -157,7 +158,7 @@ fn errors_fall_with_the_step() {
     let (made, region) = gyroid(4.0, Part::Sheet, 0.3, 4.0 / 48.0);
     let mean = |step| {
         let t = thickness(&made, Some(&region), step, &Silent).expect("thickness");
-        [t.wall.mean, t.pore.expect("pores").mean]
+        [t.wall_thickness.mean, t.pore_size.expect("pores").mean]
     };
     let [a, b, c] = [0.16, 0.08, 0.04].map(mean);
     for k in 0..2 {
@@ -175,7 +176,11 @@ fn a_thin_sheet_is_as_thick_as_its_volume_over_half_its_area() {
     let cut = made.cut.iter().enumerate().filter(|c| *c.1);
     let area = made.mesh.area() - cut.map(|(i, _)| triangle(&made.mesh, i)).sum::<f64>();
     let expected = size(&made.mesh).volume / (area / 2.0);
-    assert!((t.wall.mean - expected).abs() < t.accuracy, "{} {expected}", t.wall.mean);
+    assert!(
+        (t.wall_thickness.mean - expected).abs() < t.wall_thickness.accuracy,
+        "{} {expected}",
+        t.wall_thickness.mean
+    );
 }
 
 fn triangle(mesh: &Mesh, i: usize) -> f64 {

@@ -5,7 +5,7 @@ use crate::design::build_tets::rounded;
 use crate::design::data::*;
 use crate::design::{Built, Warning, build_pattern};
 use crate::environment::Environment;
-use crate::report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, TrimmedReport};
+use crate::report::{BeamsReport, FilletShortfall, GraphReport};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
 use ::beams::quador::{Fillet, Shortfall};
@@ -17,7 +17,7 @@ const NARROW: f64 = 15.0;
 pub(super) fn warn_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     let parts: Vec<String> = [
         (c.merged, "node", "merged into another at the same position"),
-        (c.short, "strut", "of no length left out"),
+        (c.zero_length, "strut", "of no length left out"),
         (c.duplicates, "strut", "left out because another joins the same nodes"),
         (c.isolated, "node", "left out because no strut ends there"),
     ]
@@ -124,7 +124,6 @@ pub(in crate::design) fn report(
     let mass = sum.then(|| quadors.mass().ok()).flatten();
     let volume = mass.map(|m| m.volume);
     let (fraction, fraction_exact) = share(volume, truss.whole, built, sampled);
-    let (cleaned, trimmed) = (&truss.cleaned, &truss.trimmed);
     let graph = GraphReport {
         hubs: frame.valence.values().sum(),
         beams: frame.struts,
@@ -142,14 +141,8 @@ pub(in crate::design) fn report(
         pieces: frame.components,
         dangling: truss.dangling,
         collisions: truss.collisions.len(),
-        cleaned: CleanedReport {
-            merged: cleaned.merged,
-            zero_length: cleaned.short,
-            duplicates: cleaned.duplicates,
-            isolated: cleaned.isolated,
-            dangling: cleaned.dangling,
-        },
-        trimmed: TrimmedReport { outside: trimmed.outside, dropped: trimmed.dropped, snapped: trimmed.snapped },
+        cleaned: truss.cleaned,
+        trimmed: truss.trimmed,
     };
     BeamsReport {
         cell: truss.cell,
