@@ -55,6 +55,14 @@ pub fn unit(a: Vec3) -> Vec3 {
     if n > 0.0 { scale(a, 1.0 / n) } else { a }
 }
 
+/// A unit vector across a unit vector: the axis farthest from it, less what lies along it.
+pub fn across(n: Vec3) -> Vec3 {
+    let k = (0..3).fold(0, |k, a| if n[a].abs() < n[k].abs() { a } else { k });
+    let mut e = [0.0; 3];
+    e[k] = 1.0;
+    unit(sub(e, scale(n, dot(e, n))))
+}
+
 /// M x.
 #[inline]
 pub fn apply(m: &Mat3, x: Vec3) -> Vec3 {

@@ -30,23 +30,13 @@ impl CsgTree {
     /// Evaluates 64 positions at once: `negative` gives one bit per position for a surface.
     #[inline]
     pub fn solid(&self, negative: &impl Fn(usize) -> u64) -> u64 {
-        match self {
-            CsgTree::Leaf(i) => negative(*i),
-            CsgTree::Outside(i) => !negative(*i),
-            CsgTree::Intersection(of) => of.iter().fold(u64::MAX, |w, t| w & t.solid(negative)),
-            CsgTree::Union(of) => of.iter().fold(0, |w, t| w | t.solid(negative)),
-        }
+        self.certain(negative, negative)
     }
 
     /// The positions that may be solid, if each surface is negative in `all` and may be in `some`.
     #[inline]
     pub fn possible(&self, some: &impl Fn(usize) -> u64, all: &impl Fn(usize) -> u64) -> u64 {
-        match self {
-            CsgTree::Leaf(i) => some(*i),
-            CsgTree::Outside(i) => !all(*i),
-            CsgTree::Intersection(of) => of.iter().fold(u64::MAX, |w, t| w & t.possible(some, all)),
-            CsgTree::Union(of) => of.iter().fold(0, |w, t| w | t.possible(some, all)),
-        }
+        self.certain(all, some)
     }
 
     /// The positions that are certainly solid, if each surface is negative in `all` and may be in `some`.

@@ -47,7 +47,7 @@ pub trait Field: Send + Sync {
     ///
     /// The default goes through points; structured fields override it, and there most of the speed is won.
     fn fill(&self, block: &Block, out: &mut [f32]) {
-        fill_points(self, block, None, out);
+        fill_points(self, block, 0.0, None, out);
     }
 
     /// As `fill`, for a block at most 64 nodes wide, where only nodes whose bit is set in `wanted` (one word for each
@@ -77,11 +77,17 @@ pub trait Field: Send + Sync {
     }
 }
 
-/// Fills `out` (x fastest) with the values at a block's nodes, or at those whose bit is set in `wanted`, by way of points.
-pub(crate) fn fill_points(of: &(impl Field + ?Sized), block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
+/// Fills `out` (x fastest) with the values less `level` at a block's nodes, or at those whose bit is set in `wanted`, by way of points.
+pub(crate) fn fill_points(
+    of: &(impl Field + ?Sized),
+    block: &Block,
+    level: f64,
+    wanted: Option<&[u64]>,
+    out: &mut [f32],
+) {
     let [xs, ys, zs] = block.axes;
     let (mut points, mut values) = (Vec::with_capacity(xs.len()), vec![0.0; xs.len()]);
-    for (row, out) in out.chunks_exact_mut(xs.len()).enumerate() {
+    for (row, out) in out.chunks_exact_mut(xs.len().max(1)).enumerate() {
         let (y, z) = (ys[row % ys.len()], zs[row / ys.len()]);
         let here = |i: &usize| wanted.is_none_or(|wanted| wanted[row] >> i & 1 == 1);
         points.clear();
@@ -91,7 +97,7 @@ pub(crate) fn fill_points(of: &(impl Field + ?Sized), block: &Block, wanted: Opt
         // What is not wanted is void, whatever was there before.
         out.fill(1.0);
         for (i, v) in (0..xs.len()).filter(here).zip(values) {
-            out[i] = *v as f32;
+            out[i] = (*v - level) as f32;
         }
     }
 }

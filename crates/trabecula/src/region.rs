@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::csg_tree::CsgTree;
-use crate::field::{Block, Field};
+use crate::field::{Block, Field, fill_points};
 use crate::implicit::Surface;
 use crate::kind::{Kind, Warning};
 use geometry::fault::Fault;
@@ -195,18 +195,7 @@ pub trait SignedDistance: Field {
     /// Signs are right at every node. Values are right within one grid cell of the level; farther away a
     /// shape may give a smaller magnitude, but never one below a cell's diagonal.
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-        let [xs, ys, zs] = block.axes;
-        let mut points = Vec::with_capacity(xs.len());
-        let mut values = vec![0.0; xs.len()];
-        let nodes = zs.iter().flat_map(|&z| ys.iter().map(move |&y| (y, z)));
-        for ((y, z), row) in nodes.zip(out.chunks_exact_mut(xs.len().max(1))) {
-            points.clear();
-            points.extend(xs.iter().map(|&x| [x, y, z]));
-            self.values(&points, &mut values);
-            for (o, v) in row.iter_mut().zip(&values) {
-                *o = (v - level) as f32;
-            }
-        }
+        fill_points(self, block, level, None, out);
     }
 
     /// Adds to `out` the implicit surfaces of the shape offset outwards by `by` (mm; inwards if negative) and returns how

@@ -95,11 +95,7 @@ impl Solid {
         };
         let pair = self.field.as_ref().and_then(|f| f.pair());
         let CsgSolid { mut surfaces, tree: region } = self.boundary();
-        let mut filled = Vec::new();
-        for body in &self.filled {
-            filled.push(body.tree.clone().renumbered(surfaces.len()));
-            surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
-        }
+        let mut filled = self.filled_trees(&mut surfaces);
         let [upper, lower] = [surfaces.len(), surfaces.len() + 1];
         surfaces.extend(faces.map(|f| Surface { pair: pair.clone(), ..Surface::smooth(f) }));
         let sheet = CsgTree::Intersection(vec![CsgTree::Leaf(upper), CsgTree::Leaf(lower)]);
@@ -111,16 +107,22 @@ impl Solid {
         Ok(Spaces { trees: [wall, beside(lower), beside(upper)], surfaces, faces: [upper, lower] })
     }
 
+    /// The trees of what is filled, whose surfaces are added to `surfaces`.
+    fn filled_trees(&self, surfaces: &mut Vec<Surface>) -> Vec<CsgTree> {
+        let tree = |body: &CsgSolid| {
+            let tree = body.tree.clone().renumbered(surfaces.len());
+            surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
+            tree
+        };
+        self.filled.iter().map(tree).collect()
+    }
+
     /// The solid as a combination of smooth implicit surfaces. The region's come first.
     pub fn surfaces(&self) -> (Vec<Surface>, CsgTree) {
         let CsgSolid { mut surfaces, tree } = self.boundary();
         let mut all = vec![tree];
         if let Some(field) = &self.field {
-            let mut any = Vec::new();
-            for body in &self.filled {
-                any.push(body.tree.clone().renumbered(surfaces.len()));
-                surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
-            }
+            let mut any = self.filled_trees(&mut surfaces);
             let mut parts = field.parts();
             if parts.is_empty() {
                 parts.push(field.clone());

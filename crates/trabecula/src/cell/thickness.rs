@@ -8,7 +8,7 @@ use super::Part;
 use super::foot_point::LevelSurface;
 use super::periodic_components::{Function, critical, sample};
 use super::series::Series;
-use geometry::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, across, add, apply, cross, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Samples of the mid-surface along each axis of the torus.
 const SAMPLES: usize = 24;
@@ -50,7 +50,9 @@ pub(super) fn least(f: Function, measure: &(dyn Fn(Vec3) -> Option<f64> + Sync))
         let mut step = 0.5 / n as f64;
         while step > 1e-5 {
             let (_, g) = sample(f, at);
-            let (a, b) = across(unit(g));
+            let n = unit(g);
+            let a = across(n);
+            let b = cross(n, a);
             let next = [a, b, scale(a, -1.0), scale(b, -1.0)].into_iter().find_map(|d| {
                 let p = onto_surface(f, add(at, scale(d, step)), step)?;
                 let t = measure(p)?;
@@ -120,15 +122,6 @@ fn first_beyond(f: Function, u: Vec3, d: Vec3, speed: f64, outside: impl Fn(f64)
         lo += first(lo, step).unwrap_or(AT_ONCE) as f64 * step;
     }
     Some(lo + step)
-}
-
-/// Two unit vectors across a unit vector and each other.
-fn across(n: Vec3) -> (Vec3, Vec3) {
-    let k = (0..3).fold(0, |k, a| if n[a].abs() < n[k].abs() { a } else { k });
-    let mut e = [0.0; 3];
-    e[k] = 1.0;
-    let a = unit(sub(e, scale(n, dot(e, n))));
-    (a, geometry::math::cross(n, a))
 }
 
 /// Least diameter (mm) of the necks of the lower (f ≤ iso) or upper (f ≥ iso) part at their saddles, where u = `to_phase` · x: twice

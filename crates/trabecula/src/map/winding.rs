@@ -10,7 +10,7 @@ use core::f64::consts::{PI, TAU};
 use multiversion::multiversion;
 
 use crate::field::Block;
-use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Aabb, Mat3, Vec3, across, add, angle_turns, cross, dot, norm, scale, sub, unit};
 
 /// Distances from a line below this (mm) count as this: the gradient stays finite.
 const NEAR: f64 = 1e-9;
@@ -29,10 +29,7 @@ pub(super) enum Filament {
 impl Filament {
     pub fn straight(point: Vec3, along: Vec3) -> Filament {
         let along = unit(along);
-        let least = (0..3).min_by(|&a, &b| along[a].abs().total_cmp(&along[b].abs())).unwrap_or(0);
-        let mut e = [0.0; 3];
-        e[least] = 1.0;
-        let x = unit(sub(e, scale(along, dot(e, along))));
+        let x = across(along);
         Filament::Straight { point, frame: [x, cross(along, x), along] }
     }
 

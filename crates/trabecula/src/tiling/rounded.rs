@@ -213,7 +213,7 @@ impl Field for Rounded {
     }
 
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
-        fill_points(self, block, Some(wanted), out);
+        fill_points(self, block, 0.0, Some(wanted), out);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
