@@ -40,7 +40,7 @@ SHOWN = (
 
 
 #: The named cells but one of the two gyroids, which are mirror images.
-CELLS = [cell[0] for cell in _core.cells() if cell[0] != "gyroid_mirrored"]
+CELLS = [cell.name for cell in _core.cells() if cell.name != "gyroid_mirrored"]
 BEAMS = lt.beams.names()
 NAMES = dict.fromkeys(PARTS, CELLS) | {"beams": BEAMS, "tetrahedra": lt.cell.tet_names()}
 

@@ -29,7 +29,7 @@ def names() -> list[CellName]:
     """The names of the ready cells; each is a function of this module."""
     from . import _core
 
-    return [c[0] for c in _core.cells()]
+    return [c.name for c in _core.cells()]
 
 
 @named

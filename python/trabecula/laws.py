@@ -238,7 +238,7 @@ def _part_of(cell: str, part: str | None, tet: bool) -> str:
         if part == "beams":
             raise ValueError("the part of a tetrahedral cell is sheet, lower or upper, found 'beams'")
         return part or meant
-    series = [it[0] for it in _core.cells()]
+    series = [it.name for it in _core.cells()]
     named = cell in series
     part = part or ("beams" if not named and cell in unit_cells.names() else "sheet")
     if part == "beams":

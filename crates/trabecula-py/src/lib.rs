@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod beam_files;
 mod beam_mesh;
+mod cells;
 mod design;
 mod effective;
 mod error;
@@ -57,6 +58,8 @@ mod _core {
     use crate::beam_files::{BeamCell, graph_formats, read_graph, write_beam_lattice, write_graph};
     #[pymodule_export]
     use crate::beam_mesh::BeamElements;
+    #[pymodule_export]
+    use crate::cells::NamedCell;
     #[pymodule_export]
     use crate::design::Design;
     #[pymodule_export]
@@ -186,10 +189,10 @@ mod _core {
         Ok((group.number, group.name, operations))
     }
 
-    /// The named cells: (name, title, formula, group, source).
+    /// The named cells.
     #[pyfunction]
-    fn cells() -> Vec<(&'static str, &'static str, &'static str, &'static str, &'static str)> {
-        trabecula::cell::catalogue().iter().map(|n| (n.name, n.title, n.formula, n.group, n.source)).collect()
+    fn cells() -> Vec<NamedCell> {
+        trabecula::cell::catalogue().iter().map(NamedCell::of).collect()
     }
 
     /// The cells of beams.

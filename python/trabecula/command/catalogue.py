@@ -19,12 +19,11 @@ def cell_facts(name: str) -> dict[str, Any]:
 
     Raises KeyError for the name of no cell.
     """
-    known: dict[str, tuple[str, str, str, str, str]] = {c[0]: c for c in _core.cells()}
-    name, title, formula, group, source = known[name]
+    it = {c.name: c for c in _core.cells()}[name]
     span, parts = _core.cell_facts(name)
     whole = {part: [list(w) for w in found] for part, found in parts}
-    facts = {"name": name, "title": title, "formula": formula, "group": group, "range": list(span)}
-    return facts | {"connected_fraction": whole, "source": source}
+    facts = {"name": name, "title": it.title, "formula": it.formula, "group": it.group, "range": list(span)}
+    return facts | {"connected_fraction": whole, "source": it.source}
 
 
 def cell_words(it: dict) -> Iterator[str]:
