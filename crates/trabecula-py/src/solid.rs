@@ -17,7 +17,7 @@ use trabecula::field::Field;
 use trabecula::map::{Misfit, Phase};
 use trabecula::report::{IslandsReport, MeshReport, SurfaceReport};
 use trabecula::solid::Space;
-use trabecula::surface_maker::{self, Estimate, Islands, SurfaceOptions, ScratchStores, SurfaceMaker};
+use trabecula::surface_maker::{self, Estimate, Islands, ScratchStores, SurfaceMaker, SurfaceOptions};
 use trabecula::truss::Beams;
 
 use crate::arrays::{self, values};

@@ -25,13 +25,13 @@ pub(super) fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
 /// Tiles per thread that may be extracted ahead of their turn: few enough to stay in the cache.
 const AHEAD: usize = 4;
 
-/// Tiles that are looked at, at most, to find how much work is done after how many.
+/// Most tiles that are searched to find how the work is spread over them.
 const SAMPLED: usize = 1024;
 
 /// The work in some tiles, in tiles that have a surface: the others take no time, and in a mesh region they are many and come
 /// together.
 struct Workload {
-    /// Every so many tiles one is looked at.
+    /// Tiles from one that is searched to the next.
     every: usize,
     /// How many of these have a surface, up to each.
     busy: Vec<u64>,
