@@ -158,7 +158,7 @@ def test_slips_are_told_where_they_are(tmp_path, change, path, words):
         ("of = { a = 1 }", "blend.of", ["at least 2"]),
         ("of = { a = 1, c = 1 }", "blend.of.c", ["c", "lattice"]),
         ("between = ['a', 'b']", "blend", ["weight"]),
-        ("between = ['a', 'b']\nweight = 0.5\nof = { a = 1, b = 1 }", "blend.of", ["between and of at once"]),
+        ("between = ['a', 'b']\nweight = 0.5\nof = { a = 1, b = 1 }", "blend.of", ["found between and of"]),
         (
             "between = ['a', 'b']\nweight = { rbf = { points = [[0, 0, 0], [3, 0, 0], [0, 0, 0]] } }",
             "blend.weight.rbf.points",

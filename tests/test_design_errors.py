@@ -31,7 +31,7 @@ CASES = [
         "wavelength = 4.0",
         'wavelength = { formula = "4 + x" }',
         f"{MAP}.wavelength",
-        ["map.phase takes a wavelength and an orientation that vary"],
+        ["use map.phase for a wavelength or an orientation that varies"],
     ),
     # amounts
     (
@@ -114,7 +114,7 @@ CASES = [
     ("wavelength = 4.0", "wavelength = 4\nskew = { xz = 90 }", f"{MAP}.skew.xz", ["90"]),
     ("map.affine]", "map.cylinder]", "lattice.core.map.cylinder", ['"around" is missing']),
     ("map.affine]", "map.cylinder]\naround = 2.5", "lattice.core.map.cylinder.around", ["2.5", "whole number"]),
-    ("map.affine]", "map.phase]\nrotate_z = 3\nstress = [1, 2, 3, 0, 0, 0]", f"{MAP[:-6]}phase.rotate_z", ["at once"]),
+    ("map.affine]", "map.phase]\nrotate_z = 3\nstress = [1, 2, 3, 0, 0, 0]", f"{MAP[:-6]}phase.rotate_z", ["found stress and rotate_z"]),
     ("map.affine]", "map.phase]\nstep = 1e-4", f"{MAP[:-6]}phase.step", ["use a step above"]),
     # cells
     ('cell = "gyroid"', "cell.series = { terms = [] }", "lattice.core.cell.series", []),
@@ -159,7 +159,7 @@ CASES = [
     ("size = [8, 8, 8]", "size = [8, 8, 0]", "region.box.size", ["0"]),
     ("size = [8, 8, 8]", "size = [8, 8, -8]", "region.box.size", ["-8"]),
     ("size = [8, 8, 8]", "size = [8, nan, 8]", "region.box.size", ["NaN"]),
-    ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["size and min at once"]),
+    ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["found size and min"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = -2", "region.sphere.radius", ["-2"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'none.stl'", "region.mesh.path", ["does not exist"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.x_t'", "region.mesh.path", ["stl"]),

@@ -539,8 +539,8 @@ mod tests {
         };
         wrong("", "", Some(6), "give exactly one of size, path");
         wrong("size = -1", ".size", Some(7), "size is -1 mm");
-        wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "size and path at once");
-        wrong("size = 1\nsplit = true", ".split", Some(8), "size and split at once");
+        wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "found size and path");
+        wrong("size = 1\nsplit = true", ".split", Some(8), "found size and split");
         wrong("size = 1\nmesher = \"ftetwlid\"", ".mesher", Some(8), "did you mean \"ftetwild\"?");
         wrong("size = 1\nmesher = \"ftetwild\"", ".mesher", Some(8), "not available here");
         wrong("size = 1\nmesh = 3", ".mesh", Some(8), "did you mean");

@@ -298,7 +298,7 @@ fn bad_files_are_refused_with_what_is_wrong() {
         "fraction = 0.3",
         "phase = { wavelength = 2, rotate_z = 3, direction = [0, 0, 1] }",
         "map.phase.rotate_z",
-        &["at once"],
+        &["found direction and rotate_z"],
     );
     says(
         "fraction = 0.3",

@@ -146,7 +146,7 @@ fn what_contradicts_is_refused() {
     let both = "fraction = 0.3, thickness = 0.4";
     assert!(refused("map.affine.wavelength = 4", both).contains("give the wavelength; leave it out"));
     assert!(refused("map.affine = {}", "fraction = 0.3").contains("\"wavelength\" is missing"));
-    assert!(refused("map.affine = {}", "iso = 0.3, thickness = 0.4").contains("at once"));
+    assert!(refused("map.affine = {}", "iso = 0.3, thickness = 0.4").contains("give exactly one of"));
     assert!(
         refused("map.cylinder = { around = 20, wavelength = 4 }", both)
             .contains("give the wavelength of map.affine, map.spartan and map.phase")
