@@ -114,7 +114,12 @@ CASES = [
     ("wavelength = 4.0", "wavelength = 4\nskew = { xz = 90 }", f"{MAP}.skew.xz", ["90"]),
     ("map.affine]", "map.cylinder]", "lattice.core.map.cylinder", ['"around" is missing']),
     ("map.affine]", "map.cylinder]\naround = 2.5", "lattice.core.map.cylinder.around", ["2.5", "whole number"]),
-    ("map.affine]", "map.phase]\nrotate_z = 3\nstress = [1, 2, 3, 0, 0, 0]", f"{MAP[:-6]}phase.rotate_z", ["found stress and rotate_z"]),
+    (
+        "map.affine]",
+        "map.phase]\nrotate_z = 3\nstress = [1, 2, 3, 0, 0, 0]",
+        f"{MAP[:-6]}phase.rotate_z",
+        ["found stress and rotate_z"],
+    ),
     ("map.affine]", "map.phase]\nstep = 1e-4", f"{MAP[:-6]}phase.step", ["use a step above"]),
     # cells
     ('cell = "gyroid"', "cell.series = { terms = [] }", "lattice.core.cell.series", []),
