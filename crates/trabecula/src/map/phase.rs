@@ -370,7 +370,10 @@ impl Mapping for Phase {
 /// The singular lines of a target, but for short ones.
 fn lines(domain: &SolveDomain, wanted: &PhaseRequest, target: &Target) -> Vec<SingularLine> {
     let least = 0.5 * target.wavelength(domain).iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
-    singular_lines(&domain.grid, &target.frames, &domain.inside, &wanted.alike(), least, 0.0)
+    let mut found = singular_lines(&domain.grid, &target.frames, &domain.inside, &wanted.alike(), least, 0.0);
+    // Two that undo each other within a few steps are none for cells.
+    found.retain(|l| l.turn > 0.0);
+    found
 }
 
 /// The mean of lengths at the nodes in a region; of all nodes if none is.

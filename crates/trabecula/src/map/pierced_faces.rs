@@ -24,8 +24,8 @@ enum Next {
     On { face: usize, side: usize, by: Option<Vec3> },
 }
 
-/// The lines through faces, each from end to end with its turn; a closed one repeats its first point.
-pub(super) fn polylines(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, f64)> {
+/// The lines through faces, each from end to end with the numbers of its faces, all of one turn; a closed one repeats its first point.
+pub(super) fn polylines(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, Vec<usize>)> {
     let middle = |i: usize| grid.face_middle(faces[i].node, faces[i].axis);
     let next = links(grid, faces);
     let mut seen = vec![false; faces.len()];
@@ -33,7 +33,7 @@ pub(super) fn polylines(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, 
         if core::mem::replace(&mut seen[start], true) {
             return None;
         }
-        let mut points = Vec::new();
+        let (mut points, mut through) = (Vec::new(), vec![start]);
         if let Next::To(end) = next[start][1 - away] {
             points.push(end);
         }
@@ -45,12 +45,13 @@ pub(super) fn polylines(grid: &PhaseGrid, faces: &[Pierced]) -> Vec<(Vec<Vec3>, 
             if core::mem::replace(&mut seen[face], true) {
                 break;
             }
+            through.push(face);
             at = next[face][1 - side];
         }
         if let Next::To(end) = at {
             points.push(end);
         }
-        Some((points, faces[start].turn))
+        Some((points, through))
     };
     let is_end = |i: usize, side: usize| !matches!(next[i][side], Next::On { .. });
     let mut found = Vec::new();
@@ -170,8 +171,8 @@ mod tests {
         middles.swap(0, 2);
         let found = polylines(&grid(), &pierced(&middles));
         assert_eq!(found.len(), 1);
-        let (points, turn) = &found[0];
-        assert_eq!((points.len(), *turn, length(points)), (4, 180.0, 3.0));
+        let (points, faces) = &found[0];
+        assert_eq!((points.len(), faces.len(), length(points)), (4, 4, 3.0));
         assert!(points.windows(2).all(|p| norm(sub(p[1], p[0])) == 1.0), "{points:?}");
     }
 
@@ -205,9 +206,10 @@ mod tests {
         }
         let mut branch = straight(0, [1.0, 2.5, 2.5], 4);
         branch.extend([([2.5, 3.0, 2.5], 90.0), ([2.5, 4.0, 2.5], 90.0)]);
-        let found = polylines(&grid(), &pierced(&branch));
-        let turns: Vec<f64> = found.iter().map(|l| l.1).collect();
-        assert_eq!(turns, [180.0, 90.0]);
+        let faces = pierced(&branch);
+        let found = polylines(&grid(), &faces);
+        let turns: Vec<Vec<f64>> = found.iter().map(|l| l.1.iter().map(|f| faces[*f].turn).collect()).collect();
+        assert_eq!(turns, [vec![180.0; 4], vec![90.0; 2]]);
         // Both are at the mean of the three middles of that cell.
         let mean = [2.5, 2.5 + 0.5 / 3.0, 2.5];
         let is_there = |p: &Vec3| norm(sub(*p, mean)) < 1e-12;

@@ -2,7 +2,10 @@
 //!
 //! From node to node the axes are followed to the nearest ones. Once round a face of the grid they come back turned by one of the
 //! rotations that take axes to axes (the holonomy), or by a whole turn; unless they come back as they were, a line pierces the face. No
-//! phases have these gradients about such a line. (Nieser, Reitebuch, Polthier, CubeCover, Comput. Graph. Forum 30, 2011.)
+//! phases have these gradients about such a line. Where axes turn fast a line may pierce several faces next to each other, by a quarter
+//! forth, say, and a quarter back: its turn is that once round them all. (Nieser, Reitebuch, Polthier, CubeCover, Comput. Graph. Forum 30, 2011.)
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
@@ -59,7 +62,7 @@ impl SingularLine {
 }
 
 /// The singular lines in the region that are at least `least` mm long, the longest first. They are known to a step of the grid; those that
-/// run within `near` mm of each other, or two steps, are one.
+/// run within `near` mm of each other, or two steps, are one, whose turn is that once round both: zero for two that undo each other.
 pub(super) fn singular_lines(
     grid: &PhaseGrid,
     frames: &[Mat3],
@@ -87,51 +90,116 @@ pub(super) fn singular_lines(
             if (quick[n][a] && quick[n][b] && quick[p][b] && quick[q][a]) || !round.iter().all(|m| inside[*m]) {
                 return None;
             }
-            let turn = alike.round(&round.map(|m| frames[m]));
+            let turn = alike.round(&round.map(|m| &frames[m]));
             (turn > 0.0).then_some(Pierced { node: n, axis, turn })
         })
     });
     let faces: Vec<Pierced> = faces.collect();
-    let line = |(points, turn): (Vec<Vec3>, f64)| SingularLine { length: length(&points), points, turn };
-    let mut found: Vec<SingularLine> = polylines(grid, &faces).into_iter().map(line).collect();
-    found.retain(|l| l.points.len() > 1 && l.length >= least);
-    longest_first(&mut found);
-    apart(found, near.max(2.0 * norm(grid.step)))
+    let near = near.max(2.0 * norm(grid.step));
+    let line = |(points, through): (Vec<Vec3>, Vec<usize>)| {
+        let turn = faces[through[0]].turn;
+        Found { line: SingularLine { length: length(&points), points: points.clone(), turn }, points, through }
+    };
+    let mut found: Vec<Found> = polylines(grid, &faces).into_iter().map(line).collect();
+    found.retain(|l| l.points.len() > 1 && l.line.length >= least);
+    found.sort_by(|a, b| b.line.length.total_cmp(&a.line.length));
+    let round = Surroundings { grid, frames, inside, alike, faces: &faces, levels: levels(grid, &faces), near };
+    let turned = |l: Found| SingularLine { turn: round.turn(&l.through).unwrap_or(l.line.turn), ..l.line };
+    let mut made: Vec<SingularLine> = apart(found, near).into_iter().map(turned).collect();
+    made.sort_by(|a, b| b.length.total_cmp(&a.length));
+    made
 }
 
-fn longest_first(lines: &mut [SingularLine]) {
-    lines.sort_by(|a, b| b.length.total_cmp(&a.length));
+/// A line, its points as they were found, since means wander, and the faces that it pierces.
+struct Found {
+    line: SingularLine,
+    points: Vec<Vec3>,
+    through: Vec<usize>,
 }
 
 /// Lines with those that run within a distance of them made one, at their mean place: a whole turn of axes that are alike after a
 /// quarter is four quarters, some steps of the grid apart.
-fn apart(lines: Vec<SingularLine>, near: f64) -> Vec<SingularLine> {
-    // Each with its points as they were found: means wander.
-    let mut kept: Vec<(SingularLine, Vec<Vec3>)> = Vec::new();
+fn apart(lines: Vec<Found>, near: f64) -> Vec<Found> {
     let close = |a: &[Vec3], b: &[Vec3]| {
         let chord = sub(a[a.len() - 1], a[0]);
         // One after the other they are pieces of one line, between which the part is not.
         let abreast = |d: Vec3| dot(d, chord).abs() <= 0.5 * dot(chord, chord) || chord == [0.0; 3];
         [0, a.len() - 1].map(|i| sub(b[i], a[i])).into_iter().all(|d| norm(d) < near && abreast(d))
     };
+    // With the sum of the turns of those that each is the mean of.
+    let mut kept: Vec<(Found, f64)> = Vec::new();
     for line in lines {
-        let adjacent = |(i, (_, points)): (usize, &(SingularLine, Vec<Vec3>))| {
-            let other = matched(points, &line.points);
-            close(points, &other).then_some((i, other))
+        let adjacent = |(i, (k, _)): (usize, &(Found, f64))| {
+            let other = matched(&k.points, &line.points);
+            close(&k.points, &other).then_some((i, other))
         };
+        let turn = line.line.turn;
         let Some((i, other)) = kept.iter().enumerate().find_map(adjacent) else {
-            kept.push((line.clone(), line.points));
+            kept.push((line, turn));
             continue;
         };
-        let k = &mut kept[i].0;
-        let share = line.turn / (k.turn + line.turn);
+        let (Found { line: k, .. }, sum) = &mut kept[i];
+        let share = turn / (*sum + turn);
         k.points.iter_mut().zip(&other).for_each(|(p, q)| *p = add(*p, scale(sub(*q, *p), share)));
         k.length = length(&k.points);
-        k.turn += line.turn;
+        *sum += turn;
     }
-    let mut made: Vec<SingularLine> = kept.into_iter().map(|k| k.0).collect();
-    longest_first(&mut made);
-    made
+    kept.into_iter().map(|k| k.0).collect()
+}
+
+/// What lies about the faces that a line pierces.
+struct Surroundings<'a> {
+    grid: &'a PhaseGrid,
+    frames: &'a [Mat3],
+    inside: &'a [bool],
+    alike: &'a FrameEquivalence,
+    faces: &'a [Pierced],
+    /// The faces of each axis and layer of the grid.
+    levels: BTreeMap<(usize, usize), Vec<usize>>,
+    /// How far apart faces are that are one line's, mm.
+    near: f64,
+}
+
+fn levels(grid: &PhaseGrid, faces: &[Pierced]) -> BTreeMap<(usize, usize), Vec<usize>> {
+    let mut levels: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    for (i, f) in faces.iter().enumerate() {
+        levels.entry((f.axis, grid.index(f.node)[f.axis])).or_default().push(i);
+    }
+    levels
+}
+
+impl Surroundings<'_> {
+    /// By what the axes are turned once round all faces near those of a line, degrees: in most layers of the grid in which that way lies in
+    /// the region.
+    fn turn(&self, through: &[usize]) -> Option<f64> {
+        let mut found: Vec<f64> = through.iter().filter_map(|f| self.turn_near(&self.faces[*f])).collect();
+        found.sort_by(f64::total_cmp);
+        let runs = found.chunk_by(|a, b| a == b);
+        runs.max_by_key(|run| run.len()).map(|run| run[0])
+    }
+
+    /// The same of the least rectangle round the faces near one.
+    fn turn_near(&self, face: &Pierced) -> Option<f64> {
+        let (at, middle) = (self.grid.index(face.node), self.grid.face_middle(face.node, face.axis));
+        let [a, b] = [(face.axis + 1) % 3, (face.axis + 2) % 3];
+        let ([mut low, mut high], strides) = ([at; 2], self.grid.strides());
+        for f in self.levels.get(&(face.axis, at[face.axis]))?.iter().map(|f| &self.faces[*f]) {
+            if norm(sub(self.grid.face_middle(f.node, f.axis), middle)) <= self.near {
+                let at = self.grid.index(f.node);
+                [a, b].into_iter().for_each(|c| (low[c], high[c]) = (low[c].min(at[c]), high[c].max(at[c])));
+            }
+        }
+        let node = |i: usize, j: usize| {
+            face.node + i * strides[a] + j * strides[b] - (at[a] * strides[a] + at[b] * strides[b])
+        };
+        let (right, top) = (high[a] + 1, high[b] + 1);
+        let up = (low[a]..right).map(|i| node(i, low[b])).chain((low[b]..top).map(|j| node(right, j)));
+        let down =
+            (low[a] + 1..=right).rev().map(|i| node(i, top)).chain((low[b] + 1..=top).rev().map(|j| node(low[a], j)));
+        let way: Vec<usize> = up.chain(down).collect();
+        let inside = way.iter().all(|n| self.inside[*n]);
+        inside.then(|| self.alike.round(&way.iter().map(|n| &self.frames[*n]).collect::<Vec<_>>()))
+    }
 }
 
 impl FrameEquivalence {
@@ -151,9 +219,11 @@ impl FrameEquivalence {
         }
     }
 
-    /// By what the axes are turned once round four frames, degrees; zero where they come back as they were.
-    fn round(&self, frames: &[Mat3; 4]) -> f64 {
-        let pairs = || (0..4).map(|i| (&frames[i], &frames[(i + 1) % 4]));
+    /// By what the axes are turned once round the nodes of a rectangle with these frames, from the lowest one on, degrees; zero where they come
+    /// back as they were.
+    fn round(&self, frames: &[&Mat3]) -> f64 {
+        let count = frames.len();
+        let pairs = || (0..count).map(|i| (frames[i], frames[(i + 1) % count]));
         match self {
             FrameEquivalence::Line => {
                 let turned = pairs().filter(|(a, b)| dot(third(a), third(b)) < 0.0).count();
@@ -162,11 +232,10 @@ impl FrameEquivalence {
             FrameEquivalence::Turned(all) => {
                 // The rotations in space, one after the other, as quaternions: a whole turn is −1.
                 let step = |(a, b): (&Mat3, &Mat3)| quaternion(&product(&nearest(b, a, all), &transpose(a)));
-                // Each edge is followed in one direction, so that both faces at it see the same.
-                let steps = (0..4).map(|i| match i {
-                    0 | 1 => step((&frames[i], &frames[i + 1])),
-                    _ => conjugate(step((&frames[(i + 1) % 4], &frames[i]))),
-                });
+                // Each edge is followed upwards, so that both faces at it see the same: half of the way goes up, the other half down.
+                let steps = pairs()
+                    .enumerate()
+                    .map(|(i, (a, b))| if 2 * i < count { step((a, b)) } else { conjugate(step((b, a))) });
                 let [w, ..] = steps.fold([1.0, 0.0, 0.0, 0.0], |q, s| times(s, q));
                 let turn = 2.0 * w.clamp(-1.0, 1.0).acos().to_degrees();
                 // Rotations that take axes to axes turn by 90 degrees or more.

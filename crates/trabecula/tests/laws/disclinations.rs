@@ -58,6 +58,45 @@ fn closed_forms_have_one_line_at_its_place() {
     }
 }
 
+/// Stresses whose deviator is a product of (w − c) or its conjugate over points c of the plane, w = x + iy: round each the axes turn by a half,
+/// forth or back. Points that are apart are two lines or more, though axes are not clear next to them and the faces there are pierced by
+/// quarters forth and back; two within a step are one line by a whole turn if both go forth, and none if one undoes the other.
+#[test]
+fn a_turn_is_that_once_round_all_that_is_near() {
+    let plane = |points: &[([f64; 2], bool)], scale: f64, out: f64| {
+        let first = ("1".to_string(), "0".to_string());
+        let (re, im) = points.iter().fold(first, |(re, im), ([a, b], back)| {
+            let (x, y) = (format!("(x - ({a}))"), format!("({}*(y - ({b})))", if *back { -1 } else { 1 }));
+            (format!("(({re})*{x} - ({im})*{y})"), format!("(({re})*{y} + ({im})*{x})"))
+        });
+        let f = |sign: f64, of: &str| format!("{{ formula = \"{}*{of}\" }}", sign * scale);
+        format!("stress = [{}, {}, {out}, 0, 0, {}]", f(1.0, &re), f(-1.0, &re), f(1.0, &im))
+    };
+    let four = [[-6.0, -3.0], [5.0, 4.0], [0.0, 6.0], [3.0, -5.0]].map(|p| (p, false));
+    let pair = |by: f64, back: bool| [([0.6 - by, 0.3], false), ([0.6 + by, 0.3], back)];
+    let [forth, undone] = [false, true].map(|back| pair(0.3, back));
+    let middle = vec![([0.6, 0.3], false)];
+    // The points at which lines are, and the turn.
+    let forms = [
+        ("unclear", plane(&four, 0.0016, -60.0), four.to_vec(), 180.0),
+        ("one after the other", plane(&forth, 1.0, -20.0), middle, 360.0),
+        ("undone", plane(&undone, 1.0, -20.0), Vec::new(), 0.0),
+        ("apart", plane(&pair(4.0, true), 1.0, -20.0), pair(4.0, true).to_vec(), 180.0),
+        ("apart, both forth", plane(&pair(4.0, false), 1.0, -20.0), pair(4.0, false).to_vec(), 180.0),
+    ];
+    for (what, stress, at, turn) in rows(4, forms) {
+        let found = lines(&stress);
+        println!("{what}: {:?}", found.iter().map(|l| (l.points[0], l.length, l.turn)).collect::<Vec<_>>());
+        assert_eq!(found.len(), at.len(), "{what}: {found:?}");
+        for line in &found {
+            assert_eq!(line.turn, turn, "{what}: {line:?}");
+            // Two steps: lines so near to each other are one at their mean.
+            let near = |[x, y, _]: &[f64; 3]| at.iter().any(|([a, b], _)| (x - a).hypot(y - b) < 1.5);
+            assert!(line.points.iter().all(near), "{what}: {line:?}");
+        }
+    }
+}
+
 /// Axes that come back reversed round a hole meet along a seam: such a map is refused, or warned of where it only nearly folds.
 #[test]
 fn a_seam_is_never_silent() {
