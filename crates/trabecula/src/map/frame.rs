@@ -11,7 +11,7 @@ use super::load_cases::Stress;
 use super::phase_grid::PhaseGrid;
 use super::principal::{Principal, range};
 use super::singular_lines::FrameEquivalence;
-use super::smooth_frames::{Octahedral, Smoothing};
+use super::smooth_frames::{GIVEN, Octahedral, Smoothing};
 use super::surface_frames::SurfaceDistances;
 use super::two_axes::TwoAxes;
 use crate::grade::Grade;
@@ -109,8 +109,8 @@ impl Orientation {
             Orientation::Angles(_) | Orientation::Direction(_) => {
                 let gaps = match self {
                     Orientation::Angles(of) if of.iter().all(|a| a.constant() == Some(0.0)) => [0.0; 3],
-                    Orientation::Direction(_) => [0.0, 0.0, 1.0],
-                    _ => [1.0; 3],
+                    Orientation::Direction(_) => [0.0, 0.0, GIVEN[2]],
+                    _ => GIVEN,
                 };
                 let frames = self.frames(grid, nodes, None, None, outside)?.at_nodes;
                 Ok((Box::new(move |n| Octahedral::of(&frames[n], &gaps)), 0.0))

@@ -17,6 +17,8 @@ use geometry::progress::checkpoint;
 
 /// A gap between principal values, over the range of a stress in the part, at which a direction is half trusted.
 const HALF_TRUSTED: f64 = 0.05;
+/// The gaps of axes that are given. Less would leave one of them a little surer than the others.
+pub(super) const GIVEN: Vec3 = [f64::INFINITY; 3];
 /// A share of the largest average below which a node has none: rounding of the transforms.
 pub(super) const LEAST_AVERAGE: f64 = 1e-9;
 /// Most steps to the nearest frame, and the change at which they end.
@@ -102,8 +104,7 @@ impl Averages {
 
 /// Confidence in a direction whose principal values differ by this gap.
 pub(super) fn trusted(gap: f64) -> f64 {
-    let square = gap * gap;
-    square / (square + HALF_TRUSTED * HALF_TRUSTED)
+    1.0 / (1.0 + (HALF_TRUSTED / gap).powi(2))
 }
 
 /// A harmonic polynomial of degree four, by the coefficients of x⁴, x³y, x²y², xy³, y⁴, x³z, x²yz, xy²z, y³z, from which those with

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::smooth_frames::Octahedral;
+use super::smooth_frames::{GIVEN, Octahedral};
 use crate::field::Field;
 use geometry::fault::{Fault, number};
 use geometry::math::{Mat3, Vec3, cross, dot, norm, scale, transpose, turned};
@@ -70,7 +70,7 @@ impl SurfaceDistances {
         match about(self.normals[node]) {
             Some(normal) => {
                 let share = self.within.share(self.distance[node]);
-                asked.times(1.0 - share).plus(Octahedral::of(&normal, &[0.0, 0.0, 1.0]).times(share))
+                asked.times(1.0 - share).plus(Octahedral::of(&normal, &[0.0, 0.0, GIVEN[2]]).times(share))
             }
             None => asked,
         }

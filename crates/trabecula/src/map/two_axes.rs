@@ -12,7 +12,7 @@ use super::comb::{comb, first_in};
 use super::cube_rotations::{cube, nearest};
 use super::grade_values::grade_values;
 use super::phase_grid::PhaseGrid;
-use super::smooth_frames::Octahedral;
+use super::smooth_frames::{GIVEN, Octahedral};
 use crate::grade::Grade;
 use geometry::fault::{Fault, position};
 use geometry::math::{IDENTITY, Mat3, Vec3, cross, dot, norm, product, scale, sub, transpose, unit};
@@ -42,7 +42,7 @@ impl TwoAxes {
     /// parallel.
     pub fn coefficients(x: Vec3, z: Vec3) -> Option<[f64; 9]> {
         let frame = squared(vec![unit(x)], vec![unit(z)], &[[0.0; 3]]).ok()?;
-        Some(Octahedral::of(&frame[0], &[1.0; 3]).coefficients())
+        Some(Octahedral::of(&frame[0], &GIVEN).coefficients())
     }
 
     pub(super) fn is_constant(&self) -> bool {
@@ -58,7 +58,7 @@ impl TwoAxes {
     pub(super) fn polynomials(&self, points: &[Vec3]) -> Result<Vec<Octahedral>, Fault> {
         match &self.unordered {
             Some(of) => Ok(grade_values(of, points, "frame")?.into_iter().map(Octahedral::sure).collect()),
-            None => Ok(self.given(points)?.iter().map(|f| Octahedral::of(f, &[1.0; 3])).collect()),
+            None => Ok(self.given(points)?.iter().map(|f| Octahedral::of(f, &GIVEN)).collect()),
         }
     }
 

@@ -12,7 +12,8 @@ use trabecula::map::{Axis, Mapping, Orientation, Phase, PhaseRequest, SolverOpti
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, Region};
 
 const BOX: Aabb = Aabb { min: [0.0; 3], max: [12.0, 9.0, 9.0] };
-const STEP: f64 = 0.75;
+/// Nodes of the phase grid, 0.75 mm apart, lie between these positions: what is found there is a mean of several frames.
+const STEP: f64 = 1.0;
 
 /// A field that turns by up to 20 degrees about each axis.
 fn frame(p: Vec3) -> Mat3 {
@@ -68,9 +69,8 @@ fn orders_and_signs_of_a_result_do_not_count() {
         for seed in [1, 2, 3] {
             let shuffled = solved(Orientation::Frame(result(Some(seed))), smooth);
             let off = apart(&ordered, &shuffled);
-            // An averaged frame is found by steps from a neighbour's, of which there are sixty at most: which neighbour rounding decides.
-            let within = if smooth.is_some() { 1e-4 } else { 1e-9 };
-            assert!(off < within, "smooth {smooth:?}, seed {seed}: {off:e}");
+            println!("smooth {smooth:?}, seed {seed}: {off:e}");
+            assert!(off < 1e-9, "smooth {smooth:?}, seed {seed}: {off:e}");
         }
         let misfits = ordered.misfits(&points(&BOX, 500).collect::<Vec<_>>()).expect("misfits");
         let most = misfits.iter().flat_map(|m| m.angle).fold(0.0, f64::max);
