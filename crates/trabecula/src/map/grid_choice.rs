@@ -317,11 +317,12 @@ impl<'a> Probe<'a> {
 
 /// A region that is thinner than the grid resolves, `deepest` (mm) below its surface at most, in words.
 pub(super) fn thin(grid: &PhaseGrid, deepest: f64) -> Option<String> {
-    let (thick, step) = (2.0 * deepest, grid.step.into_iter().fold(f64::INFINITY, f64::min));
-    if thick >= step {
+    let (thick, step) = (2.0 * deepest, grid.step.into_iter().fold(0.0, f64::max));
+    let size: Vec3 = core::array::from_fn(|a| grid.step[a] * (grid.shape[a] - 1) as f64);
+    // A side of the bounds has some nodes however short it is: a plate along the axes is resolved.
+    if thick >= step || size.iter().any(|s| *s <= 2.0 * thick) {
         return None;
     }
-    let size: Vec3 = core::array::from_fn(|a| grid.step[a] * (grid.shape[a] - 1) as f64);
     let remedy = match rounded_down(0.5 * thick) {
         finer if thick > 0.0 && count(size.map(|s| nodes_along(s, finer))) <= NODES[1] => {
             format!("give step = {}, or a thicker region", number(finer))

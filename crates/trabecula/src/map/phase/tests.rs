@@ -471,6 +471,35 @@ fn a_region_thinner_than_the_grid_is_judged_inside_it() {
     }
 }
 
+/// However thin a plate along the axes is for the step, nodes of the grid lie through it, and its map is that of a thick one. A wall across
+/// the long sides of its bounds is between nodes: that is said, with a step at which it is not.
+#[test]
+fn a_thin_plate_is_resolved_and_a_thin_wall_is_not() {
+    use crate::region::{Cuboid, Region, Union};
+    let block = |min: Vec3, max: Vec3| -> Region { Arc::new(Cuboid::new(min, max).expect("block")) };
+    let solved = |region: &Region, step: f64| {
+        let settings = SolverOptions { region: Some(&**region), folds: false, step: Some(step) };
+        Phase::solve(&region.bounds(), &about_z("x", Grade::Constant(4.0)), &settings).expect("solved")
+    };
+    let [thin, thick] = [0.3, 6.0].map(|z| solved(&block([0.0; 3], [20.0, 20.0, z]), 2.0));
+    let said = |map: &Phase| map.hasty().filter(|w| w.contains("thicker than about")).map(str::to_string);
+    assert_eq!(said(&thin), None);
+    let mut state = 5;
+    for _ in 0..500 {
+        let [x, y, z] = [0; 3].map(|_| 0.5 + 0.5 * geometry::random::random(&mut state));
+        let [a, b] = [(&thin, 0.3), (&thick, 6.0)].map(|(map, high)| map.jacobian([20.0 * x, 20.0 * y, high * z]));
+        let off = (0..3).map(|i| norm(sub(a[i], b[i]))).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{off:e}");
+    }
+    let walls = vec![block([0.0; 3], [0.3, 20.0, 1.0]), block([19.7, 0.0, 0.0], [20.0, 20.0, 1.0])];
+    let walls: Region = Arc::new(Union::new(walls).expect("walls"));
+    assert!(
+        said(&solved(&walls, 2.0))
+            .is_some_and(|w| w.contains("thicker than about 0.3 mm") && w.contains("step = 0.15"))
+    );
+    assert_eq!(said(&solved(&walls, 0.15)), None);
+}
+
 /// A range in which cells of the map for a narrower one lie is met.
 #[test]
 fn a_wider_range_is_met_where_a_narrower_one_gives_such_a_map() {
