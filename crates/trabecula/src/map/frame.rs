@@ -44,7 +44,7 @@ impl Orientation {
     ) -> Result<TargetFrames, Fault> {
         let octahedral = surface.is_some() || matches!(self, Orientation::Stress(_) | Orientation::Frame(_));
         if let (Some(smoothing), true) = (smoothing, octahedral) {
-            let (own, range) = self.asked(grid, nodes, outside)?;
+            let (own, range) = self.asked(grid, nodes, smoothing, outside)?;
             let averages = smoothing.frames(grid, |n| match surface {
                 Some(surface) => surface.mixed(n, own(n)),
                 None => own(n),
@@ -82,7 +82,7 @@ impl Orientation {
             }
             Orientation::Frame(of) => sure(of.at_nodes(grid, nodes, outside)?),
             Orientation::Stress(_) => {
-                let (found, range) = self.ranged(nodes, outside)?;
+                let (found, range) = self.ranged(grid, nodes, None, outside)?;
                 let mut frames: Vec<Mat3> = found.iter().map(|p| p.frame).collect();
                 let least = |n: usize| found[n].gaps().into_iter().map(|g| g / range).fold(f64::INFINITY, f64::min);
                 let turns = cube();
@@ -95,10 +95,16 @@ impl Orientation {
 
     /// The frames that are asked for at nodes, without signs and order, and the range of a stress in the part. Where cells are not turned
     /// at all, nothing is asked for.
-    fn asked(&self, grid: &PhaseGrid, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Asked, f64), Fault> {
+    fn asked(
+        &self,
+        grid: &PhaseGrid,
+        nodes: &[Vec3],
+        smoothing: &Smoothing,
+        outside: Option<&[f64]>,
+    ) -> Result<(Asked, f64), Fault> {
         match self {
             Orientation::Stress(_) => {
-                let (found, range) = self.ranged(nodes, outside)?;
+                let (found, range) = self.ranged(grid, nodes, Some(smoothing), outside)?;
                 let own = move |n: usize| Octahedral::of(&found[n].frame, &scale(found[n].gaps(), 1.0 / range));
                 Ok((Box::new(own), range))
             }
@@ -118,17 +124,25 @@ impl Orientation {
         }
     }
 
-    /// The principal directions of a stress, and the range of its values in the part.
-    fn ranged(&self, nodes: &[Vec3], outside: Option<&[f64]>) -> Result<(Vec<Principal>, f64), Fault> {
-        let found = self.principal(nodes)?;
+    /// The principal directions of a stress at nodes, averaged if it is smoothed, and the range of its values in the part; none of other
+    /// orientations.
+    pub(super) fn ranged(
+        &self,
+        grid: &PhaseGrid,
+        nodes: &[Vec3],
+        smoothing: Option<&Smoothing>,
+        outside: Option<&[f64]>,
+    ) -> Result<(Vec<Principal>, f64), Fault> {
+        let Orientation::Stress(of) = self else { return Ok((Vec::new(), 0.0)) };
+        let tensors = of.tensors(nodes)?;
+        let found = of.directions(&tensors);
         let range = range(&found, outside);
-        if range == 0.0 { Err(no_principal()) } else { Ok((found, range)) }
-    }
-
-    /// The principal directions of a stress at points; none of other orientations.
-    pub(super) fn principal(&self, points: &[Vec3]) -> Result<Vec<Principal>, Fault> {
-        let Orientation::Stress(of) = self else { return Ok(Vec::new()) };
-        of.principal(points)
+        if range == 0.0 {
+            return Err(no_principal());
+        }
+        let Some(smoothing) = smoothing.and_then(Smoothing::of_stresses) else { return Ok((found, range)) };
+        let means: Vec<_> = tensors.iter().map(|case| smoothing.tensors(grid, case)).collect();
+        Ok((of.directions(&means), range))
     }
 
     /// Whether it is the same everywhere.

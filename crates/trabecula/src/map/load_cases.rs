@@ -73,19 +73,27 @@ impl Stress {
         self.cases.iter().all(|(of, _)| of.iter().all(|g| g.constant().is_some()))
     }
 
+    /// The tensors of each case at points.
+    pub(super) fn tensors(&self, points: &[Vec3]) -> Result<Vec<Vec<[f64; 6]>>, Fault> {
+        self.cases.iter().map(|(of, _)| grade_values(of, points, "stress")).collect()
+    }
+
     /// The principal directions at points.
     pub(super) fn principal(&self, points: &[Vec3]) -> Result<Vec<Principal>, Fault> {
-        let values = |(of, _): &([Grade; 6], f64)| grade_values(of, points, "stress");
-        let all = self.cases.iter().map(values).collect::<Result<Vec<_>, Fault>>()?;
-        if let [one] = &all[..] {
-            return Ok(one.par_iter().map(Principal::of).collect());
+        self.tensors(points).map(|all| self.directions(&all))
+    }
+
+    /// The principal directions of the tensors of each case.
+    pub(super) fn directions(&self, all: &[Vec<[f64; 6]>]) -> Vec<Principal> {
+        if let [one] = all {
+            return one.par_iter().map(Principal::of).collect();
         }
         let weights = || self.cases.iter().map(|(_, w)| *w);
         let at = |n: usize| match self.by {
             CasesBy::Mean => common(&all.iter().zip(weights()).map(|(of, w)| (of[n], w)).collect::<Vec<_>>()),
             CasesBy::Worst => worst(all.iter().zip(weights()).map(|(of, w)| of[n].map(|v| w * v))),
         };
-        Ok((0..points.len()).into_par_iter().map(at).collect())
+        (0..all[0].len()).into_par_iter().map(at).collect()
     }
 }
 

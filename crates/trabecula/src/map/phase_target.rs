@@ -182,7 +182,7 @@ impl Target {
         let weight: Vec<f64> = (0..domain.grid.len()).map(|n| domain.nearness(FALL, n).powi(2)).collect();
         let combed = wanted.orientation.is_combed() || domain.surface.is_some();
         let outside = if combed { domain.outside() } else { None };
-        let smoothing = wanted.averaged().map(|length| Smoothing { length, weight: &weight });
+        let smoothing = wanted.averaged().map(|length| Smoothing { length, asked: wanted.smooth, weight: &weight });
         let TargetFrames { at_nodes: frames, trust, range } = wanted.orientation.frames(
             &domain.grid,
             domain.asked_at(),
@@ -193,7 +193,8 @@ impl Target {
         checkpoint();
         let lengths = match wanted.by_principal {
             true => {
-                let of = wanted.orientation.principal(domain.asked_at())?;
+                let (nodes, outside) = (domain.asked_at(), outside.as_deref());
+                let (of, _) = wanted.orientation.ranged(&domain.grid, nodes, smoothing.as_ref(), outside)?;
                 Some(along_axes(&domain.grid, &of, range, &domain.given, &frames, smoothing.as_ref()))
             }
             false => None,

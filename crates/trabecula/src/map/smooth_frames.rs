@@ -1,5 +1,8 @@
 //! Orientations smoothed over a length, in representations that have neither signs nor order.
 //!
+//! Values of a solver are noisy. Noise has no mean, but the directions of a noisy stress have: where two principal values agree it sets
+//! them apart, and confidence in their directions with them. So a stress is averaged as a tensor first, over a shorter length.
+//!
 //! Values of a solver are noisy where little is carried, and principal directions have neither sign nor order, so directions cannot be
 //! averaged as vectors. An axis v is averaged as the tensor v vᵀ, a frame as the harmonic polynomial of degree four
 //! X⁴ + Y⁴ + Z⁴ − ⅗ r⁴ in the coordinates X, Y, Z along its axes, which the 24 rotations of a cube leave as it is (Ray, Sokolov and Lévy,
@@ -15,10 +18,13 @@ use super::poisson::Poisson;
 use geometry::math::{IDENTITY, Mat3, Vec3, add, cross, determinant, dot, norm, rotation, scale, sub, transpose};
 use geometry::progress::checkpoint;
 
-/// A gap between principal values, over the range of a stress in the part, at which a direction is half trusted.
-const HALF_TRUSTED: f64 = 0.05;
 /// The gaps of axes that are given. Less would leave one of them a little surer than the others.
 pub(super) const GIVEN: Vec3 = [f64::INFINITY; 3];
+/// A gap between principal values, over the range of a stress in the part, at which a direction is half trusted.
+const HALF_TRUSTED: f64 = 0.05;
+/// The share of the smoothing length over which stresses are averaged: the deviation of what falls off as (1 − ℓ²Δ)⁻¹ is √2 ℓ, half the
+/// length.
+const OF_STRESS: f64 = 0.5 * core::f64::consts::FRAC_1_SQRT_2;
 /// A share of the largest average below which a node has none: rounding of the transforms.
 pub(super) const LEAST_AVERAGE: f64 = 1e-9;
 /// Most steps to the nearest frame, and the change at which they end.
@@ -34,6 +40,8 @@ const CLEAR: f64 = 0.9;
 pub(super) struct Smoothing<'a> {
     /// ℓ, mm.
     pub length: f64,
+    /// The length that is asked for, mm, if one is: frames that are aligned with a surface are averaged without as well.
+    pub asked: Option<f64>,
     /// From 0 to 1: less outside the region.
     pub weight: &'a [f64],
 }
@@ -52,6 +60,20 @@ impl Smoothing<'_> {
             out.iter_mut().zip(&one).for_each(|(o, v)| o[c] = *v);
         }
         out
+    }
+
+    /// What averages stresses before their directions are taken.
+    pub fn of_stresses(&self) -> Option<Self> {
+        self.asked.map(|length| Smoothing { length: OF_STRESS * length, ..*self })
+    }
+
+    /// Tensors at the nodes, averaged; zero where nothing is left of the weights.
+    pub fn tensors(&self, grid: &PhaseGrid, of: &[[f64; 6]]) -> Vec<[f64; 6]> {
+        let own: Vec<[f64; 7]> = of.iter().map(|s| core::array::from_fn(|c| if c < 6 { s[c] } else { 1.0 })).collect();
+        let all = self.averages(grid, &own);
+        let least = LEAST_AVERAGE * all.iter().fold(0.0f64, |m, s| m.max(s[6]));
+        let mean = |s: &[f64; 7]| core::array::from_fn(|c| if s[6] > least { s[c] / s[6] } else { 0.0 });
+        all.iter().map(mean).collect()
     }
 
     /// The tensors v vᵀ (11, 22, 33, 23, 13, 12) of axes, averaged.
