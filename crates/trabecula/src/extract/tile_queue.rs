@@ -26,14 +26,14 @@ pub(super) fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
 const AHEAD: usize = 4;
 
 /// Most tiles that are searched to find how the work is spread over them.
-const SAMPLED: usize = 1024;
+const SAMPLED: usize = 256;
 
-/// The work in some tiles, in tiles that have a surface: the others take no time, and in a mesh region they are many and come
+/// The work in some tiles, in octants that have a surface: the others take no time, and in a mesh region they are many and come
 /// together.
 struct Workload {
     /// Tiles from one that is searched to the next.
     every: usize,
-    /// How many of these have a surface, up to each.
+    /// Octants with a surface in these tiles, up to each.
     busy: Vec<u64>,
 }
 
@@ -41,15 +41,25 @@ impl Workload {
     fn new(grid: &SamplingGrid, tiles: &Range<usize>) -> Workload {
         let every = tiles.len().div_ceil(SAMPLED).max(1);
         let sampled = tiles.clone().skip(every / 2).step_by(every).map(|i| grid.tile(i));
-        let is_busy = |tile| grid.local(&grid.nodes(tile), &grid.block(tile).bounds()).is_some();
+        let busy_octants = |tile| {
+            let (nodes, all) = (grid.nodes(tile), grid.block(tile).bounds());
+            let octant = |i: usize| {
+                let mut part = all;
+                for (a, middle) in all.center().into_iter().enumerate() {
+                    *(if i >> a & 1 == 0 { &mut part.max[a] } else { &mut part.min[a] }) = middle;
+                }
+                part
+            };
+            (0..8).filter(|i| grid.local(&nodes, &octant(*i)).is_some()).count() as u64
+        };
         let busy = sampled.scan(0, |all, tile| {
-            *all += u64::from(is_busy(tile));
+            *all += busy_octants(tile);
             Some(*all)
         });
         Workload { every, busy: busy.collect() }
     }
 
-    /// The work in the first tiles, in `every`ths of a tile.
+    /// The work in the first tiles, in `every`ths of an octant.
     fn of(&self, tiles: usize) -> u64 {
         let (whole, rest) = (tiles / self.every, (tiles % self.every) as u64);
         let up_to = |n: usize| n.checked_sub(1).map_or(0, |n| self.busy[n.min(self.busy.len() - 1)]);
