@@ -27,7 +27,7 @@ __all__ = [
     "FractionAlong",
     "Histogram",
     "IslandsReport",
-    "LargestBit",
+    "LargestFragment",
     "LargestIsland",
     "LatticeReport",
     "LayersMade",
@@ -296,12 +296,12 @@ class DanglingReport(Report):
     """Weakly attached fragments."""
 
     _parts = {
-        "largest": "LargestBit",
+        "largest": "LargestFragment",
     }
 
     count: int
     """Their number."""
-    largest: LargestBit | None
+    largest: LargestFragment | None
     """The largest of them."""
     neck: float
     """The neck below which a fragment counts, mm."""
@@ -530,7 +530,7 @@ class IslandsReport(Report):
     """Their volume in all, mm³."""
 
 
-class LargestBit(Report):
+class LargestFragment(Report):
     """The largest weakly attached fragment."""
 
     place: list[float]

@@ -8,7 +8,7 @@ mod local_thickness;
 mod transition;
 
 pub use cut_triangles::cut_triangles;
-pub use dangling::{Dangling, LargestBit, dangling};
+pub use dangling::{Dangling, LargestFragment, dangling};
 pub use local_thickness::{
     BYTES_PER_VOXEL, Histogram, Thickness, ThicknessSpread, thickness, thickness_at_vertices, usual_step, voxels_for,
 };

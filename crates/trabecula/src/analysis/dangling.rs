@@ -42,7 +42,7 @@ pub struct Dangling {
     /// Their volume in all, mm³.
     pub volume: f64,
     /// The largest of them.
-    pub largest: Option<LargestBit>,
+    pub largest: Option<LargestFragment>,
     /// The neck below which a fragment counts, mm.
     pub neck: f64,
     /// Distance between sample points, mm.
@@ -51,16 +51,16 @@ pub struct Dangling {
 
 /// The largest weakly attached fragment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct LargestBit {
+pub struct LargestFragment {
     /// Volume, mm³.
     pub volume: f64,
     /// A point in it, mm.
     pub place: [f64; 3],
 }
 
-/// Looks for bits of a solid that hang by necks thinner than half of `neck` (mm), the narrowest of its lattice.
+/// Looks for fragments of a solid that hang by necks thinner than half of `neck` (mm), the narrowest of its lattice.
 ///
-/// Volumes are those of the points nearest to each bit, to within some hundredths; a neck is known to within a step. What is
+/// Volumes are those of the points nearest to each fragment, to within some hundredths; a neck is known to within a step. What is
 /// held by several such necks counts as well; what is thinner than one all over is seen where it is apart.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
             .iter()
             .copied()
             .reduce(|a, b| if b.0 > a.0 { b } else { a })
-            .map(|(volume, place)| LargestBit { volume, place }),
+            .map(|(volume, place)| LargestFragment { volume, place }),
         neck: thin,
         step,
     })
@@ -305,7 +305,7 @@ mod tests {
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         let off = 4.0 * std::f64::consts::PI * found.step / 6.0;
         assert!((found.volume / 3.0 - ball).abs() < off + 0.03, "{}", found.volume);
-        let LargestBit { volume: largest, place: at } = found.largest.unwrap();
+        let LargestFragment { volume: largest, place: at } = found.largest.unwrap();
         assert!(largest < 1.2 * ball && (at[2] - 1.5).abs() < 1.0, "{at:?}");
     }
 }

@@ -7,7 +7,7 @@ use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::bvh::{Bvh, Split, WideBvh};
 use geometry::fault::{Fault, counted};
-use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Aabb, Interval, Vec3, across, add, cross, dot, norm, scale, sub, unit};
 
 /// Least sharpness of the smooth form: below it its weights make noticeably more than one.
 pub const LEAST_SHARPNESS: f64 = 10.0;
@@ -82,10 +82,7 @@ struct Polygon {
 
 impl Polygon {
     fn new(points: &[Vec3], axis: Vec3) -> Polygon {
-        let least = (0..3).fold(0, |m, a| if axis[a].abs() < axis[m].abs() { a } else { m });
-        let mut e = [0.0; 3];
-        e[least] = 1.0;
-        let u = unit(cross(axis, e));
+        let u = across(axis);
         let v = cross(axis, u);
         let edges: Vec<[[f64; 2]; 2]> =
             points.windows(2).map(|w| [w[0], w[1]].map(|q| [dot(q, u), dot(q, v)])).collect();

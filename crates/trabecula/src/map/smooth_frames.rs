@@ -2,8 +2,7 @@
 //!
 //! Values of a solver are noisy. Noise has no mean, but the directions of a noisy stress have: where two principal values agree it sets
 //! them apart, and confidence in their directions with them. So a stress is averaged as a tensor first, over a shorter length.
-//!
-//! Values of a solver are noisy where little is carried, and principal directions have neither sign nor order, so directions cannot be
+//! Principal directions have neither sign nor order, so these cannot be
 //! averaged as vectors. An axis v is averaged as the tensor v vᵀ, a frame as the harmonic polynomial of degree four
 //! X⁴ + Y⁴ + Z⁴ − ⅗ r⁴ in the coordinates X, Y, Z along its axes, which the 24 rotations of a cube leave as it is (Ray, Sokolov and Lévy,
 //! *Practical 3D frame field generation*, ACM Trans. Graph. 35, 2016). Where two principal values agree, the mean over the turns about
